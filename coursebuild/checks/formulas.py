@@ -1,0 +1,44 @@
+"""Formulas: which ones a course has, and where those that do not parse stand.
+
+Entry points: `course_formulas(course)`, `check_formulas(course, typeset)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.model import Course, Math, MathBlock, block_inlines, document_blocks, walk_inlines
+from coursebuild.results import Formula, MathError
+from coursebuild.source import Excerpt
+
+
+def _uses(course: Course) -> Iterator[tuple[Formula, Excerpt]]:
+    for document in course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, MathBlock):
+                yield Formula(block.tex.text, True), block.tex
+            for inline in walk_inlines(block_inlines(block)):
+                if isinstance(inline, Math):
+                    yield Formula(inline.tex.text, inline.display), inline.tex
+
+
+def course_formulas(course: Course) -> tuple[Formula, ...]:
+    """Each different formula of the course, in order of first use."""
+    return tuple(dict.fromkeys(formula for formula, _ in _uses(course)))
+
+
+def check_formulas(
+    course: Course, typeset: Mapping[Formula, str | MathError]
+) -> tuple[Diagnostic, ...]:
+    """One diagnostic for each place where a formula that does not parse stands."""
+    found: list[Diagnostic] = []
+    for formula, tex in _uses(course):
+        result = typeset[formula]
+        if not isinstance(result, MathError):
+            continue
+        size = len(tex.text)
+        at = min(result.position, max(size - 1, 0)) if result.position is not None else None
+        span = tex.span() if at is None else tex.span(at, max(at + 1, min(size, at + 1)))
+        found.append(diagnose("math-syntax", span, f"the formula does not parse: {result.message}"))
+    return tuple(found)

@@ -1,0 +1,57 @@
+"""Labs against the course: the kind exists, the model exists.
+
+Entry point: `check_labs(course)`. Names inside a model (keyframes, sites) are checked where the
+compiled model is known (`checks.compiled`).
+"""
+
+from __future__ import annotations
+
+import posixpath
+
+from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.model import Course, Lab, document_blocks
+
+
+def lab_kinds(course: Course) -> frozenset[str]:
+    """`simlab`, and each `content/labs/NAME.js` that the course brings."""
+    own = (posixpath.split(path) for path in course.files)
+    return frozenset(
+        {
+            "simlab",
+            *(
+                name[:-3]
+                for folder, name in own
+                if folder == "content/labs" and name.endswith(".js")
+            ),
+        }
+    )
+
+
+def check_labs(course: Course) -> tuple[Diagnostic, ...]:
+    """Unknown kinds and models."""
+    kinds = lab_kinds(course)
+    models = {model.name for model in course.models}
+    found: list[Diagnostic] = []
+    for document in course.documents:
+        for lab in document_blocks(document):
+            if not isinstance(lab, Lab):
+                continue
+            if lab.kind not in kinds:
+                found.append(
+                    diagnose(
+                        "lab-kind",
+                        lab.kind_span,
+                        f"no kind of lab is called `{lab.kind}`",
+                        help=did_you_mean(lab.kind, kinds),
+                    )
+                )
+            if lab.model is not None and lab.model not in models and lab.model_span is not None:
+                found.append(
+                    diagnose(
+                        "lab-model",
+                        lab.model_span,
+                        f"no model `{lab.model}` in models/",
+                        help=did_you_mean(lab.model, models),
+                    )
+                )
+    return tuple(found)

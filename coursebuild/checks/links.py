@@ -1,0 +1,253 @@
+"""Links and mentions of the sources: every one leads somewhere.
+
+Entry point: `check_links(course)`.
+
+1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
+   each document.
+2. Walk each document's inlines and compare.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias, assert_never
+from urllib.parse import SplitResult, unquote, urlsplit
+
+from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.model import (
+    Course,
+    Document,
+    ExampleTarget,
+    Heading,
+    HtmlBlock,
+    Image,
+    LessonTarget,
+    LevelTarget,
+    Link,
+    ModelTarget,
+    PageTarget,
+    Quiz,
+    RawInline,
+    Script,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    walk_inlines,
+)
+from coursebuild.source import Span
+
+AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
+
+_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Everything that a link may lead to."""
+
+    lessons: Mapping[str, Document | None]
+    levels: frozenset[str]
+    pages: Mapping[str, Document | None]
+    models: frozenset[str]
+    scripts: frozenset[str]
+    files: frozenset[str]
+
+
+def places(course: Course) -> Places:
+    """What the course offers as targets."""
+    scripts = {
+        b.path for d in course.documents for b in document_blocks(d) if isinstance(b, Script)
+    }
+    return Places(
+        {lesson.id: lesson.document for lesson in course.lessons},
+        frozenset(level.id for level in course.levels),
+        {page.id: page.document for page in course.pages},
+        frozenset(model.name for model in course.models),
+        frozenset(scripts),
+        frozenset(course.files),
+    )
+
+
+def anchors(document: Document) -> frozenset[str]:
+    """The ids that a link may name in a document.
+
+    Headings, quizzes, and ids written in raw HTML.
+    """
+    found: set[str] = set()
+    for block in document_blocks(document):
+        if isinstance(block, Heading):
+            found.add(block.anchor)
+        elif isinstance(block, Quiz):
+            found.add(block.id)
+        elif isinstance(block, HtmlBlock):
+            found.update(_HTML_ID.findall(block.html))
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, RawInline):
+                found.update(_HTML_ID.findall(inline.html))
+    return frozenset(found)
+
+
+def check_links(course: Course) -> tuple[Diagnostic, ...]:
+    """A diagnostic for each link, mention or image that leads nowhere."""
+    known = places(course)
+    known_anchors: dict[str, frozenset[str]] = {}
+
+    def anchors_of(document: Document) -> frozenset[str]:
+        return known_anchors.setdefault(document.source.path, anchors(document))
+
+    found: list[Diagnostic] = []
+    for document in course.documents:
+        for block in document_blocks(document):
+            for inline in walk_inlines(block_inlines(block)):
+                if isinstance(inline, Link):
+                    found += _check_link(inline, document, known, anchors_of)
+                elif isinstance(inline, Image):
+                    found += _check_image(inline, document, known)
+    return tuple(found)
+
+
+def _check_link(
+    link: Link, document: Document, known: Places, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    span = link.target_span
+    target = link.target
+    match target:
+        case LessonTarget():
+            if target.id not in known.lessons:
+                what = "mentioned" if link.mention else "linked to"
+                yield diagnose(
+                    "link-lesson",
+                    span,
+                    f"lesson {target.id} is {what}, and the course map does not have it",
+                    help=did_you_mean(target.id, known.lessons),
+                )
+            else:
+                yield from _anchor(
+                    span, target.anchor, known.lessons[target.id], f"lesson {target.id}", anchors_of
+                )
+        case LevelTarget():
+            if target.id not in known.levels:
+                yield diagnose(
+                    "link-level",
+                    span,
+                    f"level {target.id} is mentioned, and the course map does not have it",
+                    help=did_you_mean(target.id, known.levels),
+                )
+        case PageTarget():
+            if target.id not in known.pages:
+                yield diagnose(
+                    "link-page",
+                    span,
+                    f"no page `{target.id}` in the course map",
+                    help=did_you_mean(target.id, known.pages),
+                )
+            else:
+                yield from _anchor(
+                    span, target.anchor, known.pages[target.id], f"page `{target.id}`", anchors_of
+                )
+        case ModelTarget():
+            if target.name not in known.models:
+                yield diagnose(
+                    "link-model",
+                    span,
+                    f"no model `{target.name}` in models/",
+                    help=did_you_mean(target.name, known.models),
+                )
+        case ExampleTarget():
+            if target.path not in known.scripts:
+                yield diagnose(
+                    "link-example",
+                    span,
+                    f"no lesson has a script `{target.path}`",
+                    help=did_you_mean(target.path, known.scripts),
+                )
+        case UrlTarget():
+            yield from _check_url(span, target.url, document, known, anchors_of)
+        case _:
+            assert_never(target)
+
+
+def _anchor(
+    span: Span, anchor: str | None, document: Document | None, where: str, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    if not anchor:
+        return
+    if document is None:
+        yield diagnose(
+            "link-anchor",
+            span,
+            f"{where} is planned, so it has no anchor `#{anchor}` yet",
+            help="link to the lesson itself",
+        )
+        return
+    known = anchors_of(document)
+    if unquote(anchor) not in known:
+        yield diagnose(
+            "link-anchor",
+            span,
+            f"{where} has no anchor `#{anchor}`",
+            help=did_you_mean(anchor, known),
+        )
+
+
+def _check_url(
+    span: Span, url: str, document: Document, known: Places, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    parts = urlsplit_or_none(url)
+    if parts is None:
+        yield diagnose("link-file", span, f"`{url}` is no address that can be read")
+        return
+    if parts.scheme or parts.netloc:
+        return
+    if not parts.path:
+        yield from _anchor(span, parts.fragment or None, document, "this page", anchors_of)
+        return
+    path = local_file(url, document.source.path)
+    if path not in known.files:
+        yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
+
+
+def _file_help(path: str, known: Places) -> str:
+    name = posixpath.basename(path)
+    if name.endswith(".md"):
+        return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
+    if name.endswith(".xml") and name[:-4] in known.models:
+        return f"link to a model by its name: `model:{name[:-4]}`"
+    return (
+        did_you_mean(path, known.files)
+        if known.files
+        else "files that pages may use lie in content/"
+    )
+
+
+def _check_image(image: Image, document: Document, known: Places) -> Iterator[Diagnostic]:
+    parts = urlsplit_or_none(image.url)
+    if parts is None or parts.scheme or parts.netloc:
+        yield diagnose(
+            "image-remote",
+            image.span,
+            f"the image `{image.url}` is not a file of the course",
+            help="put the file into content/ and name it relative to the lesson",
+        )
+        return
+    path = local_file(image.url, document.source.path)
+    if path not in known.files:
+        yield diagnose("link-file", image.span, f"no file `{path}`", help=_file_help(path, known))
+
+
+def urlsplit_or_none(url: str) -> SplitResult | None:
+    """`urlsplit`, or `None` for an address that it refuses."""
+    try:
+        return urlsplit(url)
+    except ValueError:
+        return None
+
+
+def local_file(url: str, document_path: str) -> str:
+    """The path, relative to the root, of the file that a relative address in a document names."""
+    path = unquote(url.split("#", 1)[0].split("?", 1)[0])
+    base = "" if path.startswith("/") else posixpath.dirname(document_path)
+    return posixpath.normpath(posixpath.join(base, path.lstrip("/")))

@@ -1,0 +1,54 @@
+"""Quizzes across the course: ids are unique, `output` questions name a script of the course.
+
+Entry point: `check_quizzes(course)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
+from coursebuild.model import Course, OutputQuestion, Quiz, Script, document_blocks
+
+
+def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
+    """Repeated ids, and output questions about scripts that nothing runs."""
+    blocks = [block for document in course.documents for block in document_blocks(document)]
+    scripts = {block.path: block for block in blocks if isinstance(block, Script)}
+    seen: dict[str, Quiz] = {}
+    found: list[Diagnostic] = []
+    for quiz in (block for block in blocks if isinstance(block, Quiz)):
+        first = seen.setdefault(quiz.id, quiz)
+        if first is not quiz:
+            note = Note("the first one is here", first.id_span)
+            found.append(
+                diagnose(
+                    "quiz-id-repeated",
+                    quiz.id_span,
+                    f"the quiz id `{quiz.id}` is used twice",
+                    help="a learner's progress hangs on the id; give each quiz its own",
+                    notes=[note],
+                )
+            )
+        found += _output_questions(quiz, scripts)
+    return tuple(found)
+
+
+def _output_questions(quiz: Quiz, scripts: dict[str, Script]) -> Iterator[Diagnostic]:
+    for question in quiz.questions:
+        if not isinstance(question, OutputQuestion):
+            continue
+        script = scripts.get(question.script)
+        if script is None:
+            yield diagnose(
+                "quiz-output",
+                question.script_span,
+                f"no lesson has a script `{question.script}`",
+                help=did_you_mean(question.script, scripts),
+            )
+        elif script.norun:
+            yield diagnose(
+                "quiz-output",
+                question.script_span,
+                f"`{question.script}` is marked `norun`, so it has no output",
+            )

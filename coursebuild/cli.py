@@ -1,0 +1,243 @@
+"""The command line: arguments → pipeline → exit status.
+
+Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
+usage. Heavy imports happen in the command that needs them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from coursebuild.pipeline.options import Options
+    from coursebuild.report import Report, Style
+
+CLEAN, WRONG, USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command that the arguments name; gives the exit status."""
+    _utf8_streams()
+    options = _parser().parse_args(arguments)
+    from coursebuild.pipeline.options import UsageError
+
+    try:
+        command: Callable[[argparse.Namespace], int] = options.command
+        return command(options)
+    except UsageError as error:
+        return _usage(str(error))
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output went away; python would complain again when it closes the stream.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return WRONG
+
+
+def _usage(message: str) -> int:
+    print(f"coursebuild: {message}", file=sys.stderr)
+    return USAGE
+
+
+def _utf8_streams() -> None:
+    """Reports hold whatever a lesson holds, so they are UTF-8 whatever the locale says."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(encoding="utf-8", errors="replace")
+
+
+# --- arguments
+
+
+def _parser() -> argparse.ArgumentParser:
+    from coursebuild import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="coursebuild",
+        description="Build a course of executable lessons: every recorded output is verified.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "-C",
+        dest="root",
+        metavar="DIR",
+        help="the course's folder (default: the nearest one with content/course.toml)",
+    )
+    parser.add_argument("--version", action="version", version=f"coursebuild {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    build = _command(commands, "build", _build, "verify everything and publish the site")
+    build.add_argument(
+        "--out",
+        default="public",
+        metavar="FOLDER",
+        help="where the site goes (default: %(default)s)",
+    )
+    check = _command(commands, "check", _check, "verify, publish nothing")
+    _lessons(check)
+    _format(check)
+    update = _command(commands, "update", _update, "bring recorded outputs up to date")
+    _lessons(update)
+    update.add_argument(
+        "--dry-run", action="store_true", help="show what would change; write nothing"
+    )
+    extract = _command(commands, "extract", _extract, "write the scripts to examples/", runs=False)
+    extract.add_argument(
+        "--adopt",
+        action="store_true",
+        help="bring extracted files that were edited by hand back into their lessons",
+    )
+    serve = _command(
+        commands, "serve", _serve, "preview: build, serve, rebuild and reload on change"
+    )
+    serve.add_argument(
+        "--port",
+        type=_port,
+        default=8000,
+        help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
+    )
+    schema = commands.add_parser(
+        "schema", help="print a JSON Schema for an editor", allow_abbrev=False
+    )
+    schema.add_argument("name", choices=("quiz", "lab", "course"))
+    schema.set_defaults(command=_schema)
+    return parser
+
+
+def _command(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    function: Callable[[argparse.Namespace], int],
+    summary: str,
+    *,
+    runs: bool = True,
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+    parser.set_defaults(command=function)
+    parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
+    if runs:
+        parser.add_argument(
+            "--jobs",
+            "-j",
+            type=_jobs,
+            default=None,
+            metavar="N",
+            help="scripts at a time (default: one a core)",
+        )
+    return parser
+
+
+def _lessons(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "lessons", nargs="*", metavar="LESSON", help="id, slug or file of a lesson (default: all)"
+    )
+
+
+def _format(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "junit", "sarif", "github"),
+        default="text",
+        help="how to print what was found (default: %(default)s)",
+    )
+
+
+def _jobs(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of jobs: a whole number from 1")
+    return int(text)
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is no port: a whole number from 0 to 65535")
+    return int(text)
+
+
+# --- commands
+
+
+def _options(arguments: argparse.Namespace) -> Options:
+    from coursebuild.pipeline.options import Options, find_root
+
+    jobs = getattr(arguments, "jobs", None) or available_cores()
+    return Options(find_root(arguments.root), jobs, arguments.quiet)
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.check import check
+
+    options = _options(arguments)
+    return _print(check(options, tuple(arguments.lessons)), arguments.format, options)
+
+
+def _build(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.build import build
+
+    options = _options(arguments)
+    return _print(build(options, Path(arguments.out)), "text", options)
+
+
+def _update(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.update import update
+
+    options = _options(arguments)
+    return _print(
+        update(options, tuple(arguments.lessons), dry_run=arguments.dry_run), "text", options
+    )
+
+
+def _extract(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.extract import extract
+
+    options = _options(arguments)
+    return _print(extract(options, adopt=arguments.adopt), "text", options)
+
+
+def _serve(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.serve import serve
+
+    serve(_options(arguments), arguments.port)
+    return CLEAN
+
+
+def _schema(arguments: argparse.Namespace) -> int:
+    from coursebuild.syntax.schemas import json_schema
+
+    sys.stdout.write(json_schema(arguments.name))
+    return CLEAN
+
+
+def _print(report: Report, form: str, options: Options) -> int:
+    from coursebuild.report import FORMATS, render_report
+
+    chosen = next(known for known in FORMATS if known == form)
+    text = render_report(report, chosen, _style(sys.stdout))
+    if not (options.quiet and report.ok and not report.diagnostics and form == "text"):
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    return CLEAN if report.ok else WRONG
+
+
+def _style(stream: TextIO) -> Style:
+    """Colour only on a terminal whose user does not ask for none (https://no-color.org)."""
+    import shutil
+
+    from coursebuild.report import Style
+
+    colour = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    width = shutil.get_terminal_size((100, 24)).columns if stream.isatty() else 100
+    return Style(colour, width)

@@ -1,0 +1,133 @@
+"""The course: its map, its lessons and pages, its models.
+
+Entry point: `Course`.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from coursebuild.model.blocks import Comparison, Document, Filter
+from coursebuild.source import Source, Span
+
+
+class Status(enum.Enum):
+    """How far a lesson is."""
+
+    COMPLETE = "complete"
+    DRAFT = "draft"
+    PLANNED = "planned"
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """A lesson of the map; `document` is `None` for a planned one."""
+
+    span: Span
+    """Its entry in the course map."""
+    id: str
+    slug: str
+    title: str
+    status: Status
+    summary: str
+    objectives: tuple[str, ...]
+    prerequisites: tuple[str, ...]
+    prerequisite_spans: tuple[Span, ...]
+    minutes: int | None
+    level: str
+    document: Document | None
+
+    @property
+    def path(self) -> str:
+        """Where its file is, or would be."""
+        return f"content/lessons/{self.id}-{self.slug}.md"
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A level of the map."""
+
+    span: Span
+    id: str
+    title: str
+    summary: str
+    lessons: tuple[Lesson, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page that is no lesson."""
+
+    span: Span
+    id: str
+    title: str
+    path: str
+    document: Document | None
+
+
+@dataclass(frozen=True, slots=True)
+class MjcfModel:
+    """A file of `models/`; its name is its path there without `.xml`."""
+
+    name: str
+    source: Source
+
+
+@dataclass(frozen=True, slots=True)
+class CalloutKind:
+    """A kind of callout: its label, and what it promises."""
+
+    name: str
+    label: str
+    promise: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """A warning that the author does not want to see, and why.
+
+    `path` limits it to a file (glob).
+    """
+
+    rule: str
+    reason: str
+    path: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A whole course."""
+
+    map: Source
+    """course.toml."""
+    title: str
+    summary: str
+    language: str
+    base_url: str
+    repository: str
+    licence: str
+    engine: str | None
+    """The MuJoCo version that the course is written for."""
+    engine_span: Span | None
+    comparison: Comparison
+    filters: tuple[Filter, ...]
+    callouts: tuple[CalloutKind, ...]
+    silences: tuple[Silence, ...]
+    levels: tuple[Level, ...]
+    pages: tuple[Page, ...]
+    models: tuple[MjcfModel, ...]
+    files: tuple[str, ...] = ()
+    """Other files in `content/` that a page may show or link to (pictures, data), by path relative
+    to the root."""
+
+    @property
+    def lessons(self) -> tuple[Lesson, ...]:
+        """All lessons in the order of the map."""
+        return tuple(lesson for level in self.levels for lesson in level.lessons)
+
+    @property
+    def documents(self) -> tuple[Document, ...]:
+        """Every parsed document: lessons, then pages."""
+        parts: tuple[Lesson | Page, ...] = (*self.lessons, *self.pages)
+        return tuple(part.document for part in parts if part.document is not None)

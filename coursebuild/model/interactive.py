@@ -1,0 +1,226 @@
+"""Labs and quizzes: what a reader plays with and is asked.
+
+Entry points: `Lab`, `Quiz`, the union `AnyQuestion`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from coursebuild.model.inlines import Inline
+from coursebuild.source import Excerpt, Span
+
+if TYPE_CHECKING:
+    from coursebuild.model.blocks import Block
+
+
+@dataclass(frozen=True, slots=True)
+class LabControl:
+    """A control of a lab.
+
+    For a slider `minimum` … `step` are set, for a select `options`, for a button `run`.
+    """
+
+    span: Span
+    kind: Literal["slider", "select", "button"]
+    label: str
+    unit: str
+    minimum: float | None
+    maximum: float | None
+    step: float | None
+    value: float | str | None
+    digits: int | None
+    options: tuple[tuple[str, float | str], ...]
+    set: str | None
+    apply: str | None
+    param: str | None
+    run: str | None
+    init: bool
+    reset: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LabReadout:
+    """A number or text that the lab shows while it runs."""
+
+    span: Span
+    label: str
+    expr: str
+    digits: int
+
+
+@dataclass(frozen=True, slots=True)
+class LabTrace:
+    """One line of a plot."""
+
+    span: Span
+    label: str
+    expr: str
+    dash: bool | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LabPlot:
+    """A plot against simulated time (s)."""
+
+    span: Span
+    ylabel: str
+    xlabel: str
+    window: float | None
+    """Seconds shown; `None`: all."""
+    ymin: float | None
+    ymax: float | None
+    height: int | None
+    ref_lines: tuple[tuple[float, str], ...]
+    traces: tuple[LabTrace, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LabExpect:
+    """A claim that the build proves.
+
+    `expr` lies in `[minimum, maximum]` at time `t` (s) after `after`.
+    """
+
+    span: Span
+    after: str | tuple[tuple[str, float | str], ...] | None
+    t: float
+    expr: str
+    minimum: float | None
+    maximum: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Lab:
+    """A live simulation. See LABS: exactly one of `model` and `xml` is given for `simlab`."""
+
+    span: Span
+    kind: str
+    """`simlab`, or the name of a kind that the course adds."""
+    kind_span: Span
+    config: str
+    """The JSON as written, for the browser and for kinds that only their own code understands."""
+    title: str
+    note: tuple[Block, ...]
+    model: str | None
+    model_span: Span | None
+    xml: Excerpt | None
+    height: int
+    dock: bool
+    key: int | str | None
+    key_span: Span | None
+    camera: LabCamera | None
+    toggles: tuple[str, ...]
+    overlays: tuple[str, ...]
+    """Overlays that start on."""
+    force_scale: float | None
+    """m/N."""
+    autoplay: bool
+    stop_at: float | None
+    setup: str
+    controller: str
+    controls: tuple[LabControl, ...]
+    readouts: tuple[LabReadout, ...]
+    plots: tuple[LabPlot, ...]
+    trail: str | None
+    expect: tuple[LabExpect, ...]
+    seed: int | None
+    verify_seconds: float | None
+    verify_rtol: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LabCamera:
+    """MuJoCo's free camera: degrees and metres."""
+
+    azimuth: float
+    elevation: float
+    distance: float
+    target: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An option of a question, with what to say to a learner who takes it."""
+
+    span: Span
+    text: tuple[Inline, ...]
+    feedback: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What every question has, whatever its kind."""
+
+    span: Span
+    label: str
+    text: tuple[Block, ...]
+    explain: tuple[Block, ...]
+    hints: tuple[tuple[Block, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceQuestion(Question):
+    """`mcq` and `predict`.
+
+    `answers` are indices of the right options; `several` when all right ones must be chosen.
+    """
+
+    options: tuple[Choice, ...]
+    answers: tuple[int, ...]
+    several: bool
+    sim: Lab | None
+    """For `predict`: opened once the learner has committed to an answer."""
+    predict: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NumericQuestion(Question):
+    """A number: right within `tolerance` (absolute) of `answer`, in `unit`."""
+
+    answer: float
+    answer_text: str
+    """As the author wrote it."""
+    tolerance: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class OpenQuestion(Question):
+    """Free text, compared by the learner with `reference`."""
+
+    reference: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OutputQuestion(Question):
+    """What does the script print there? The key is the verified output's line `line` (from 1)."""
+
+    script: str
+    script_span: Span
+    line: int
+    line_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class OrderQuestion(Question):
+    """Put the items in order; they are written in the right order."""
+
+    items: tuple[tuple[Inline, ...], ...]
+
+
+AnyQuestion: TypeAlias = (
+    ChoiceQuestion | NumericQuestion | OpenQuestion | OutputQuestion | OrderQuestion
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Quiz:
+    """A quiz; `id` is unique in the course and stable."""
+
+    span: Span
+    id: str
+    id_span: Span
+    title: str
+    questions: tuple[AnyQuestion, ...]

@@ -1,0 +1,111 @@
+"""Walking a document: every block and every inline in order.
+
+Entry points: `document_blocks`, `document_inlines`, `walk_blocks`, `walk_inlines`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coursebuild.model.blocks import (
+    Block,
+    BlockQuote,
+    Callout,
+    Document,
+    Heading,
+    HtmlFlow,
+    Io,
+    ListBlock,
+    Paragraph,
+    Recording,
+    Table,
+)
+from coursebuild.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong
+from coursebuild.model.interactive import (
+    AnyQuestion,
+    ChoiceQuestion,
+    Lab,
+    OpenQuestion,
+    OrderQuestion,
+    Quiz,
+)
+
+
+def child_blocks(block: Block) -> tuple[Block, ...]:
+    """The blocks directly inside a block, texts of quizzes and labs included."""
+    if isinstance(block, BlockQuote | Callout):
+        return block.blocks
+    if isinstance(block, ListBlock):
+        return tuple(b for item in block.items for b in item.blocks)
+    if isinstance(block, Lab):
+        return block.note
+    if isinstance(block, Quiz):
+        return tuple(b for q in block.questions for b in _question_blocks(q))
+    if isinstance(block, Recording) and isinstance(block.body, Table):
+        return (block.body,)
+    return ()
+
+
+def _question_blocks(question: AnyQuestion) -> tuple[Block, ...]:
+    blocks = [*question.text, *question.explain, *(b for hint in question.hints for b in hint)]
+    if isinstance(question, ChoiceQuestion):
+        blocks += [b for option in question.options for b in option.feedback]
+        blocks += [question.sim] if question.sim is not None else []
+    if isinstance(question, OpenQuestion):
+        blocks += question.reference
+    return tuple(blocks)
+
+
+def block_inlines(block: Block) -> tuple[Inline, ...]:
+    """The inlines directly inside a block (not inside its child blocks)."""
+    if isinstance(block, Heading | Paragraph | HtmlFlow):
+        return block.children
+    if isinstance(block, Callout):
+        return block.title
+    if isinstance(block, Table):
+        return tuple(
+            i for row in (block.header, *block.rows) for cell in row for i in cell.children
+        )
+    if isinstance(block, Recording):
+        return block.caption
+    if isinstance(block, Io):
+        return (*block.input, *block.process, *block.output)
+    if isinstance(block, Quiz):
+        return tuple(i for q in block.questions for i in _question_inlines(q))
+    return ()
+
+
+def _question_inlines(question: AnyQuestion) -> tuple[Inline, ...]:
+    if isinstance(question, ChoiceQuestion):
+        return tuple(i for option in question.options for i in option.text)
+    if isinstance(question, OrderQuestion):
+        return tuple(i for item in question.items for i in item)
+    return ()
+
+
+def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
+    """Every block in document order, a container before what it holds."""
+    for block in blocks:
+        yield block
+        yield from walk_blocks(child_blocks(block))
+
+
+def document_blocks(document: Document) -> Iterator[Block]:
+    """Every block of a document, its footnotes last."""
+    yield from walk_blocks(document.blocks)
+    for footnote in document.footnotes:
+        yield from walk_blocks(footnote.blocks)
+
+
+def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
+    """Every inline in order, a container before what it holds."""
+    for inline in inlines:
+        yield inline
+        if isinstance(inline, Emphasis | Strong | Strikethrough | Link):
+            yield from walk_inlines(inline.children)
+
+
+def document_inlines(document: Document) -> Iterator[Inline]:
+    """Every inline of a document."""
+    for block in document_blocks(document):
+        yield from walk_inlines(block_inlines(block))

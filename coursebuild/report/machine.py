@@ -1,0 +1,220 @@
+"""Reports for machines: JSON, JUnit XML, SARIF 2.1.0, and the lines that CI services read.
+
+Entry points: `to_json`, `to_junit`, `to_sarif`, `to_annotations`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+from xml.sax.saxutils import escape, quoteattr
+
+from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.report.text import Style, diagnostic_text
+from coursebuild.report.values import Report, ScriptLine
+from coursebuild.rules import RULES
+from coursebuild.source import Span
+
+
+def _place(span: Span | None) -> dict[str, Any]:
+    if span is None:
+        return dict.fromkeys(("path", "line", "column", "end_line", "end_column"))
+    return {
+        "path": span.path,
+        "line": span.line,
+        "column": span.column,
+        "end_line": span.end_line,
+        "end_column": span.end_column,
+    }
+
+
+def to_json(report: Report) -> str:
+    """The report as one JSON object: `diagnostics`, `scripts`, `summary`."""
+    diagnostics = [
+        {
+            "rule": d.rule,
+            "severity": d.severity.value,
+            **_place(d.span),
+            "message": d.message,
+            "label": d.label,
+            "help": d.help,
+            "notes": [{"message": note.message, **_place(note.span)} for note in d.notes],
+        }
+        for d in report.diagnostics
+    ]
+    scripts = [
+        {
+            "path": s.path,
+            "lesson": s.lesson,
+            "status": s.status,
+            "seconds": round(s.seconds, 3),
+            "cached": s.cached,
+        }
+        for s in report.scripts
+    ]
+    s = report.summary
+    summary = {
+        "ok": report.ok,
+        "lessons": s.lessons,
+        "scripts": s.scripts,
+        "ran": s.ran,
+        "skipped": s.skipped,
+        "errors": s.errors,
+        "warnings": s.warnings,
+        "silenced": s.silenced,
+        "seconds": round(s.seconds, 3),
+    }
+    value = {"diagnostics": diagnostics, "scripts": scripts, "summary": summary}
+    return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+
+
+# --- JUnit
+
+
+def _xml_text(text: str) -> str:
+    """XML 1.0 has no control characters: they are replaced."""
+    return "".join(
+        ch if ch in "\t\n\r" or (ord(ch) >= 0x20 and ch not in "\ufffe\uffff") else "\ufffd"
+        for ch in text
+    )
+
+
+def to_junit(report: Report) -> str:
+    """One test case a script and one a file with diagnostics; errors are failures."""
+    by_path: dict[str, list[Diagnostic]] = {}
+    for d in report.diagnostics:
+        by_path.setdefault(d.span.path, []).append(d)
+    cases = [_script_case(s) for s in report.scripts]
+    cases += [_file_case(path, found) for path, found in by_path.items()]
+    failures = sum(1 for case in cases if "<failure" in case)
+    skipped = sum(1 for case in cases if "<skipped" in case)
+    head = (
+        f'<testsuite name="coursebuild" tests="{len(cases)}" failures="{failures}" errors="0" '
+        f'skipped="{skipped}" time="{report.summary.seconds:.3f}">'
+    )
+    body = "\n".join(cases)
+    declaration = '<?xml version="1.0" encoding="UTF-8"?>'
+    return f"{declaration}\n<testsuites>\n{head}\n{body}\n</testsuite>\n</testsuites>\n"
+
+
+def _script_case(line: ScriptLine) -> str:
+    head = (
+        f'<testcase classname="lesson {escape(line.lesson)}" name={quoteattr(line.path)} '
+        f'time="{line.seconds:.3f}"'
+    )
+    if line.status in ("skipped", "norun"):
+        why = f"needs {', '.join(line.missing)}" if line.missing else "not run"
+        return f"{head}><skipped message={quoteattr(why)}/></testcase>"
+    if line.status != "ok":
+        status = quoteattr(line.status)
+        return f"{head}><failure type={status} message={status}/></testcase>"
+    return f"{head}/>"
+
+
+def _file_case(path: str, found: Iterable[Diagnostic]) -> str:
+    found = list(found)
+    style = Style()
+    parts: list[str] = []
+    for d in found:
+        text = escape(_xml_text(diagnostic_text(d, style)))
+        if d.severity is Severity.ERROR:
+            message = f"{d.span.path}:{d.span.line}:{d.span.column}: {d.message}"
+            attributes = f"type={quoteattr(d.rule)} message={quoteattr(_xml_text(message))}"
+            parts.append(f"<failure {attributes}>{text}</failure>")
+        else:
+            parts.append(f"<system-out>{text}</system-out>")
+    body = "".join(parts)
+    return f'<testcase classname="course" name={quoteattr(path)} time="0.000">{body}</testcase>'
+
+
+# --- SARIF
+
+
+def _region(span: Span) -> dict[str, int]:
+    return {
+        "startLine": span.line,
+        "startColumn": span.column,
+        "endLine": span.end_line,
+        "endColumn": span.end_column,
+    }
+
+
+def _location(span: Span) -> dict[str, Any]:
+    return {
+        "physicalLocation": {
+            "artifactLocation": {"uri": span.path, "uriBaseId": "ROOT"},
+            "region": _region(span),
+        }
+    }
+
+
+def to_sarif(report: Report) -> str:
+    """SARIF 2.1.0; columns count code points."""
+    used = sorted({d.rule for d in report.diagnostics})
+    results = []
+    for d in report.diagnostics:
+        text = "\n".join(
+            [d.message, *([d.label] if d.label else []), *([f"help: {d.help}"] if d.help else [])]
+        )
+        related = [
+            {**_location(note.span), "message": {"text": note.message}}
+            for note in d.notes
+            if note.span is not None
+        ]
+        result: dict[str, Any] = {
+            "ruleId": d.rule,
+            "ruleIndex": used.index(d.rule),
+            "level": d.severity.value,
+            "message": {"text": text},
+            "locations": [_location(d.span)],
+        }
+        if related:
+            result["relatedLocations"] = related
+        results.append(result)
+    rules = [
+        {
+            "id": name,
+            "shortDescription": {"text": RULES[name].summary},
+            "defaultConfiguration": {"level": RULES[name].severity},
+        }
+        for name in used
+    ]
+    run = {
+        "tool": {"driver": {"name": "coursebuild", "rules": rules}},
+        "columnKind": "unicodeCodePoints",
+        "results": results,
+    }
+    value = {
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [run],
+    }
+    return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+
+
+# --- annotations
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def _data(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def to_annotations(report: Report) -> str:
+    """One workflow command a diagnostic; CI services show it beside the changed lines."""
+    lines = []
+    for d in report.diagnostics:
+        text = "\n".join(
+            [d.message, *([d.label] if d.label else []), *([f"help: {d.help}"] if d.help else [])]
+        )
+        lines.append(
+            f"::{d.severity.value} file={_property(d.span.path)},"
+            f"line={d.span.line},col={d.span.column},"
+            f"endLine={d.span.end_line},endColumn={d.span.end_column},"
+            f"title={_property(d.rule)}::{_data(text)}"
+        )
+    return "".join(line + "\n" for line in lines)

@@ -1,0 +1,71 @@
+"""What a report holds.
+
+Entry point: `Report`; `summary_line(report)` is its last line as text.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coursebuild.diagnostics import Diagnostic, Severity
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptLine:
+    """One script, as a report lists it."""
+
+    path: str
+    lesson: str
+    """Id of its lesson; for a script of a page the page's id."""
+    status: str
+    """`ok`, `drift`, or how the run ended otherwise (`failed`, `timeout`, `killed`, …)."""
+    seconds: float
+    cached: bool
+    missing: tuple[str, ...] = ()
+    """For a skipped one: the modules that are not there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The totals."""
+
+    lessons: int
+    scripts: int
+    ran: int
+    skipped: int
+    errors: int
+    warnings: int
+    silenced: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Everything that one command found."""
+
+    diagnostics: tuple[Diagnostic, ...]
+    scripts: tuple[ScriptLine, ...]
+    summary: Summary
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong (warnings do not count)."""
+        return all(d.severity is not Severity.ERROR for d in self.diagnostics)
+
+
+def plural(count: int, noun: str) -> str:
+    """`1 error`, `2 errors`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def summary_line(report: Report) -> str:
+    """One line: what was checked and what was found."""
+    s = report.summary
+    parts = [plural(s.lessons, "lesson"), f"{plural(s.ran, 'script')} run"]
+    if s.skipped:
+        parts.append(f"{s.skipped} skipped")
+    found = [plural(s.errors, "error")] if s.errors else []
+    found += [plural(s.warnings, "warning")] if s.warnings else []
+    verdict = ", ".join(found) if found else "everything holds"
+    silenced = f" ({s.silenced} silenced)" if s.silenced else ""
+    return f"{', '.join(parts)}: {verdict}{silenced}"

@@ -1,0 +1,185 @@
+"""What running a course found: values made by runners, read by comparisons, reports and pages.
+
+Entry points: `ScriptRun`, `Verdict`. They stand beside the model because the stages that make them
+and those that read them don't import each other.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Literal
+
+from coursebuild.model import Comparison, Recording
+from coursebuild.source import Span
+
+
+class Outcome(enum.Enum):
+    """How the run of a script ended."""
+
+    OK = "ok"
+    FAILED = "failed"
+    """It exited with a status other than 0."""
+    TIMEOUT = "timeout"
+    KILLED = "killed"
+    """A signal ended it."""
+    OUTPUT_LIMIT = "output-limit"
+    ENCODING = "encoding"
+    """It printed bytes that are not UTF-8."""
+    SKIPPED = "skipped"
+    """A module that it requires is missing."""
+    NORUN = "norun"
+    """The author said not to run it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptJob:
+    """A script to run: everything that the runner needs to know."""
+
+    path: str
+    """POSIX path relative to the project root, e.g. `examples/l4_2.py`."""
+    args: tuple[str, ...]
+    timeout: float
+    """Seconds."""
+    requires: tuple[str, ...]
+    norun: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptRun:
+    """What a script did."""
+
+    path: str
+    outcome: Outcome
+    status: int
+    """Exit status; the signal's number where one ended it."""
+    stdout: str
+    """LF line ends."""
+    stderr: str
+    """The end of it (64 KiB), with extracted paths still as the interpreter wrote them."""
+    seconds: float
+    missing: tuple[str, ...] = ()
+    """Modules that it requires and that are not there."""
+    cached: bool = False
+
+
+class DriftKind(enum.Enum):
+    """The class of a difference between what was recorded and what ran."""
+
+    ROUNDING = "rounding"
+    """Only the last recorded place of numbers differs."""
+    NUMERIC = "numeric"
+    TEXT = "text"
+    MISSING = "missing lines"
+    EXTRA = "extra lines"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One difference.
+
+    For a number `relative_error` and `digits` say how far apart the two values are.
+    """
+
+    kind: DriftKind
+    span: Span
+    """In the lesson: the number, the text, the missing line, or the place where extra lines would
+    stand."""
+    recorded: str
+    ran: str
+    ran_line: int
+    """Line of the output, from 1; 0 where no line corresponds."""
+    relative_error: float | None = None
+    digits: int | None = None
+    """Leading significant digits that agree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The comparison of one recorded output with a run."""
+
+    recording: Recording
+    comparison: Comparison
+    """What was used: the fence's own or the course's default."""
+    status: Literal["verified", "drift", "volatile", "unchecked"]
+    """`unchecked`: the script did not run to its end."""
+    changes: tuple[Change, ...] = ()
+    diff: str = ""
+    """Unified diff of recorded against ran, empty where nothing differs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A formula to typeset."""
+
+    tex: str
+    display: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MathError:
+    """Why a formula does not parse.
+
+    `position` is an offset in code points into the TeX, `None` where unknown.
+    """
+
+    message: str
+    position: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class CompileResult:
+    """What compiling a piece of MJCF gave; `error` is empty when it compiled."""
+
+    error: str
+    line: int | None = None
+    """Line of the error in the text that was compiled, from 1."""
+    facts: ModelFacts | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ModelFacts:
+    """What a compiled model holds, for its page and for checking the names that labs use."""
+
+    bodies: int
+    """Without the world."""
+    geoms: int
+    joints: int
+    nq: int
+    nv: int
+    nu: int
+    timestep: float
+    """s."""
+    integrator: str
+    total_mass: float
+    """kg."""
+    keyframes: tuple[str, ...]
+    """Names; an unnamed one is empty."""
+    sites: tuple[str, ...]
+    body_names: tuple[str, ...]
+    includes: tuple[str, ...] = ()
+    """Files that the model pulls in, relative to the project root."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFile:
+    """A file of the site: its path there (POSIX, relative) and its bytes."""
+
+    path: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """All that running a course found."""
+
+    runs: tuple[ScriptRun, ...]
+    verdicts: tuple[Verdict, ...]
+    formulas: tuple[tuple[Formula, str | MathError], ...]
+    """Each different formula of the course, and its MathML."""
+    models: tuple[tuple[str, CompileResult], ...]
+    """Each model of `models/` by name."""
+    python: str
+    """Version of the interpreter that ran the scripts."""
+    engine: str
+    """Version of MuJoCo that ran the scripts."""

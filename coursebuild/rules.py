@@ -1,0 +1,167 @@
+"""The closed catalogue of rules: every mistake that the tool can name.
+
+Entry point: `RULES`, from name to `Rule`. `docs/rules.md` is written from it, and a fixture in
+`tests/fixtures/rules/` shows for each what an author sees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One entry of the catalogue."""
+
+    name: str
+    severity: Literal["error", "warning"]
+    summary: str
+    """What it means, one sentence, for the catalogue's page."""
+
+
+_CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
+    # files
+    ("file-encoding", "error", "A file of the course is not UTF-8."),
+    (
+        "file-unreadable",
+        "error",
+        "A file of the course cannot be read, or is reached through a link out of the project.",
+    ),
+    # the course map
+    ("map-missing", "error", "There is no content/course.toml."),
+    ("map-syntax", "error", "course.toml is not valid TOML."),
+    ("id-repeated", "error", "A level, lesson or page id occurs twice in the course map."),
+    ("lesson-unlisted", "error", "A file in content/lessons is not named by the course map."),
+    ("lesson-missing", "error", "The course map names a lesson whose file is missing."),
+    ("lesson-planned-file", "error", "A lesson that the map calls planned has a file."),
+    ("prerequisite-unknown", "error", "A prerequisite is not a lesson of the map."),
+    ("prerequisite-cycle", "error", "Lessons require each other in a circle."),
+    ("page-missing", "error", "The course map names a page whose file is missing."),
+    (
+        "engine-version",
+        "error",
+        "The course names another MuJoCo version than the one that is installed.",
+    ),
+    (
+        "silence-rule",
+        "error",
+        "An entry of [[silence]] names an unknown rule or an error, or gives no reason.",
+    ),
+    ("no-lessons", "error", "The course has no lesson to publish."),
+    ("no-scripts", "error", "A check ran no script, so that it verified nothing."),
+    # fields of JSON and TOML
+    ("json-syntax", "error", "The JSON in a fence is malformed."),
+    ("field-unknown", "error", "A field that nothing reads."),
+    ("field-missing", "error", "A required field is not there."),
+    ("field-repeated", "error", "A field is given twice."),
+    ("field-type", "error", "A value is of the wrong type."),
+    ("field-value", "error", "A value is of the right type and cannot be right."),
+    # Markdown
+    (
+        "front-matter",
+        "error",
+        "A lesson begins with front matter; it is Markdown from its first line.",
+    ),
+    (
+        "heading-top",
+        "error",
+        "A heading of level 1 in a lesson; the title comes from the course map.",
+    ),
+    ("heading-skip", "warning", "A heading skips a level."),
+    ("heading-empty", "error", "A heading has no text."),
+    ("heading-attributes", "error", "The attributes after a heading cannot be read."),
+    ("anchor-repeated", "error", "Two headings of a page have the same explicit id."),
+    ("fence-unclosed", "error", "A code fence is never closed."),
+    ("fence-info", "error", "The info string of a fence cannot be read."),
+    ("fence-key-unknown", "error", "A fence has a key that its kind does not know."),
+    ("fence-key-repeated", "error", "A fence has the same key twice."),
+    ("fence-key-value", "error", "A key of a fence has an impossible value."),
+    ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
+    ("math-syntax", "error", "A formula does not parse."),
+    ("math-unclosed", "error", "Display math is never closed."),
+    ("footnote-undefined", "error", "A footnote is referred to and never written."),
+    ("footnote-unused", "warning", "A footnote is written and never referred to."),
+    ("footnote-repeated", "error", "A footnote is written twice."),
+    (
+        "image-remote",
+        "error",
+        "An image comes from another host; a page shows only what the course holds.",
+    ),
+    ("image-alt", "warning", "An image has no text alternative."),
+    (
+        "html-unbalanced",
+        "error",
+        "Raw HTML opens an element that it does not close, or closes one that is not open.",
+    ),
+    # callouts and io
+    ("callout-unknown", "error", "A callout is of an unknown kind."),
+    ("io-missing", "error", "An io block lacks a line."),
+    ("io-repeated", "error", "An io block has a line twice."),
+    ("io-order", "error", "The lines of an io block are not in the order INPUT, PROCESS, OUTPUT."),
+    ("io-stray", "error", "An io block begins with text that belongs to no line."),
+    # links and numbers
+    ("link-lesson", "error", "A link or mention names a lesson that the map does not have."),
+    ("link-level", "error", "A mention names a level that the map does not have."),
+    ("link-page", "error", "A link names a page that the map does not have."),
+    ("link-model", "error", "A link names a model that is not in models/."),
+    ("link-example", "error", "A link names a script that no lesson has."),
+    ("link-file", "error", "A relative link or image names a file that is not there."),
+    ("link-anchor", "error", "A link names an anchor that its page does not have."),
+    ("link-scheme", "error", "A link uses a scheme that a page must not have."),
+    ("link-broken", "error", "An internal link of a built page leads nowhere."),
+    ("binding-orphan", "error", "A bound number has no recorded output to lean on."),
+    (
+        "binding-mismatch",
+        "error",
+        "A bound number is not a value that the script printed, rounded.",
+    ),
+    ("binding-volatile", "error", "A number is bound to an output that differs by machine."),
+    ("binding-attribute", "error", "The attribute of a bound number cannot be read."),
+    # scripts and recorded outputs
+    ("script-path", "error", "The path of a script is not one that a script may have."),
+    ("script-repeated", "error", "Two blocks are extracted to the same path."),
+    ("python-syntax", "error", "A Python block does not parse."),
+    ("recording-orphan", "error", "A recorded output has no script above it."),
+    (
+        "recording-body",
+        "error",
+        "`Output:` is followed by something that is not a `text` fence or a table.",
+    ),
+    (
+        "recording-keys",
+        "error",
+        "Keys of comparison contradict each other, or stand on a block that is no recorded output.",
+    ),
+    ("example-edited", "error", "An extracted file was changed by hand."),
+    ("script-failed", "error", "A script exited with an error."),
+    ("script-timeout", "error", "A script ran past its time limit."),
+    ("script-killed", "error", "A script was ended by a signal."),
+    ("script-output-limit", "error", "A script printed more than 1 MiB."),
+    ("script-encoding", "error", "A script printed bytes that are not UTF-8."),
+    ("script-silent", "error", "An output is recorded and the script printed nothing."),
+    ("output-drift", "error", "A recorded output differs from what the script prints."),
+    (
+        "output-unstable",
+        "error",
+        "Two runs of a script print different lines, so that there is nothing to record.",
+    ),
+    ("output-not-updatable", "error", "A recorded output cannot be brought up to date by itself."),
+    # models and MJCF
+    ("model-error", "error", "A model in models/ does not compile."),
+    ("mjcf-error", "error", "An MJCF block does not compile."),
+    ("mjcf-compiles", "error", "An MJCF block that must not compile does."),
+    ("mjcf-message", "error", "An MJCF block fails with another message than the lesson says."),
+    # labs
+    ("lab-kind", "error", "A lab is of an unknown kind."),
+    ("lab-model", "error", "A lab names a model that is not in models/."),
+    ("lab-name", "error", "A lab names a keyframe, site, control or button that does not exist."),
+    # quizzes
+    ("quiz-id-repeated", "error", "Two quizzes of the course have the same id."),
+    ("quiz-answer", "error", "The answer of a question is not one of its options."),
+    ("quiz-output", "error", "An output question names a script or a line that no run has."),
+)
+
+RULES: dict[str, Rule] = {
+    name: Rule(name, severity, summary) for name, severity, summary in _CATALOGUE
+}

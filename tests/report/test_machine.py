@@ -1,0 +1,108 @@
+"""The formats that programs read."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ElementTree
+
+from coursebuild.diagnostics import Note, diagnose
+from coursebuild.report import Report, ScriptLine, Style, Summary, render_report
+from coursebuild.source import Source
+
+SOURCE = Source("content/lessons/1.1-a,b.md", "first\nwr\x00ng <&> here\n")
+ERROR = diagnose(
+    "math-syntax",
+    SOURCE.span(6, 11),
+    "it is 100% wrong",
+    label="here",
+    help="mend it",
+    notes=[Note("see", SOURCE.span(0, 5)), Note("and")],
+)
+WARNING = diagnose("image-alt", SOURCE.span(0, 5), "no text")
+SCRIPTS = (
+    ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
+    ScriptLine("examples/b.py", "1.1", "timeout", 60.0, False),
+    ScriptLine("examples/c.py", "1.1", "skipped", 0.0, False, ("torch",)),
+)
+REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 3, 2, 1, 1, 1, 0, 60.25))
+
+
+def test_json() -> None:
+    value = json.loads(render_report(REPORT, "json", Style()))
+    assert list(value) == ["diagnostics", "scripts", "summary"]
+    assert value["diagnostics"][1] == {
+        "rule": "math-syntax",
+        "severity": "error",
+        "path": "content/lessons/1.1-a,b.md",
+        "line": 2,
+        "column": 1,
+        "end_line": 2,
+        "end_column": 6,
+        "message": "it is 100% wrong",
+        "label": "here",
+        "help": "mend it",
+        "notes": [
+            {
+                "message": "see",
+                "path": "content/lessons/1.1-a,b.md",
+                "line": 1,
+                "column": 1,
+                "end_line": 1,
+                "end_column": 6,
+            },
+            {
+                "message": "and",
+                "path": None,
+                "line": None,
+                "column": None,
+                "end_line": None,
+                "end_column": None,
+            },
+        ],
+    }
+    assert value["scripts"][1] == {
+        "path": "examples/b.py",
+        "lesson": "1.1",
+        "status": "timeout",
+        "seconds": 60.0,
+        "cached": False,
+    }
+    assert value["summary"]["ok"] is False
+    assert value["summary"]["errors"] == 1
+
+
+def test_junit_is_xml_and_counts() -> None:
+    suite = ElementTree.fromstring(render_report(REPORT, "junit", Style()).encode()).find(
+        "testsuite"
+    )
+    assert suite is not None
+    assert {key: suite.get(key) for key in ("tests", "failures", "skipped")} == {
+        "tests": "4",
+        "failures": "2",
+        "skipped": "1",
+    }
+    failure = suite.find("./testcase[@name='content/lessons/1.1-a,b.md']/failure")
+    assert failure is not None
+    assert failure.get("message") == "content/lessons/1.1-a,b.md:2:1: it is 100% wrong"
+    assert "<&> here" in (failure.text or "")
+
+
+def test_sarif() -> None:
+    run = json.loads(render_report(REPORT, "sarif", Style()))["runs"][0]
+    result = run["results"][1]
+    assert result["ruleId"] == "math-syntax"
+    assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == "math-syntax"
+    assert result["locations"][0]["physicalLocation"]["region"] == {
+        "startLine": 2,
+        "startColumn": 1,
+        "endLine": 2,
+        "endColumn": 6,
+    }
+    assert [related["message"]["text"] for related in result["relatedLocations"]] == ["see"]
+
+
+def test_annotations_escape_what_their_syntax_uses() -> None:
+    assert render_report(REPORT, "github", Style()).splitlines()[1] == (
+        "::error file=content/lessons/1.1-a%2Cb.md,line=2,col=1,endLine=2,endColumn=6,title=math-syntax"
+        "::it is 100%25 wrong%0Ahere%0Ahelp: mend it"
+    )

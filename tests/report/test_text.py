@@ -1,0 +1,116 @@
+"""The exact text of a diagnostic."""
+
+from __future__ import annotations
+
+from coursebuild.diagnostics import Diagnostic, Note, diagnose, sort_diagnostics
+from coursebuild.report import Report, ScriptLine, Style, Summary, diagnostic_text, render_report
+from coursebuild.source import Source
+
+
+def shown(diagnostic: Diagnostic, width: int = 100) -> str:
+    return diagnostic_text(diagnostic, Style(width=width))
+
+
+def at(text: str, part: str) -> tuple[Source, int, int]:
+    source = Source("content/lessons/4.2-x.md", text)
+    start = text.index(part)
+    return source, start, start + len(part)
+
+
+def test_frame_label_help_and_notes() -> None:
+    source, a, b = at("one\n" * 209 + "  Euler  kinetic energy  +6.641 %\nlast line\n", "+6.641")
+    note = Note("classes: numeric 1\nsecond line")
+    place = Note("leans on it", source.span(0, 3))
+    diagnostic = diagnose(
+        "output-drift",
+        source.span(a, b),
+        "recorded output differs from this run",
+        label="this run printed +6.702",
+        help="run `coursebuild update 4.2`",
+        notes=[note, place],
+    )
+    assert shown(diagnostic) == (
+        "error[output-drift]: recorded output differs from this run\n"
+        "  --> content/lessons/4.2-x.md:210:26\n"
+        "    |\n"
+        "210 |   Euler  kinetic energy  +6.641 %\n"
+        "    |                          ^^^^^^ this run printed +6.702\n"
+        "    = note: classes: numeric 1\n"
+        "            second line\n"
+        "    = note: content/lessons/4.2-x.md:1:1: leans on it\n"
+        "    = help: run `coursebuild update 4.2`"
+    )
+
+
+def test_tabs_wide_characters_and_controls_keep_the_marks_in_place() -> None:
+    source, a, b = at("\t量x\x1b[31mwrong", "wrong")
+    assert shown(diagnose("math-syntax", source.span(a, b), "m")).split("\n")[3:5] == [
+        "  1 |     量x␛[31mwrong",
+        "    |             ^^^^^",
+    ]
+
+
+def test_a_span_over_several_lines_marks_the_rest_of_its_first() -> None:
+    source, _, _ = at("abc def\nghi", "def")
+    lines = shown(diagnose("fence-unclosed", source.span(4, 11), "m")).split("\n")
+    assert lines[3:5] == ["  1 | abc def", "    |     ^^^"]
+
+
+def test_an_empty_span_and_the_end_of_the_text_get_one_mark() -> None:
+    source = Source("a.md", "abc")
+    assert shown(diagnose("fence-unclosed", source.span(3, 3), "m")).split("\n")[4] == "    |    ^"
+
+
+def test_a_long_line_is_cut_around_the_marked_part() -> None:
+    text = "x" * 3000 + "WRONG" + "y" * 3000
+    source, a, b = at(text, "WRONG")
+    lines = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
+    assert len(lines[3]) <= 82
+    column = lines[4].index("^")
+    assert lines[3][column : column + 5] == "WRONG"
+    assert lines[4].count("^") == 5
+    assert lines[3].startswith("  1 | …x")
+    assert lines[3].endswith("y…")
+
+
+def test_a_file_without_text_has_no_frame() -> None:
+    diagnostic = diagnose(
+        "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"
+    )
+    assert shown(diagnostic) == (
+        "error[map-missing]: there is no content/course.toml\n  --> content/course.toml:1:1"
+    )
+
+
+def test_diagnostics_are_sorted_by_place_and_told_once() -> None:
+    source, _, _ = at("abc def", "abc")
+    first, second = (diagnose("math-syntax", source.span(i, i + 1), "m") for i in (0, 4))
+    assert sort_diagnostics([second, first, second]) == (first, second)
+
+
+def test_report_lists_scripts_and_ends_with_a_summary() -> None:
+    scripts = (
+        ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
+        ScriptLine("examples/b.py", "1.1", "drift", 1.0, True),
+        ScriptLine("examples/c.py", "1.2", "skipped", 0.0, False, ("torch",)),
+        ScriptLine("examples/d.py", "1.2", "norun", 0.0, False),
+    )
+    report = Report((), scripts, Summary(2, 4, 2, 1, 0, 0, 1, 1.5))
+    assert render_report(report, "text", Style()) == (
+        "ok       examples/a.py  0.25 s\n"
+        "drift    examples/b.py  cached\n"
+        "skipped  examples/c.py  (needs torch)\n"
+        "norun    examples/d.py  (not run)\n"
+        "\n"
+        "2 lessons, 2 scripts run, 1 skipped: everything holds (1 silenced)\n"
+    )
+
+
+def test_colour_is_only_colour() -> None:
+    source, a, b = at("abc def", "def")
+    diagnostic = diagnose("math-syntax", source.span(a, b), "m", label="l", help="h")
+    import re
+
+    coloured = diagnostic_text(diagnostic, Style(colour=True))
+    assert coloured != shown(diagnostic)
+    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == shown(diagnostic)
