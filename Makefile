@@ -1,0 +1,105 @@
+# make site    the environment, the tool and the course in public/
+# make test    all set-up, then every test
+# make help    the rest
+
+PYTHON ?= python3
+WORKERS ?= 2
+PYTEST_ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+# What an installation depends on. It is editable: a change of Python code or of a template needs
+# none. Folders are listed because they change when a file in them is removed.
+BUILD_INPUTS := pyproject.toml hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+  $(shell find site/css site/js 2>/dev/null)
+
+# An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
+# that it was made with.
+ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
+.PHONY: $(VENV)/.made
+endif
+
+.PHONY: help site serve test lint format types npm system clean distclean
+
+help:
+	@echo 'make site       make the environment, install, build the course into public/'
+	@echo 'make serve      the same, then serve it and rebuild on every change'
+	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
+	@echo 'make lint       check style and formatting; make format mends what can be mended'
+	@echo 'make types      check types'
+	@echo 'make clean      remove what was built; make distclean also what was installed'
+
+site: $(VENV)/.site
+	$(BIN)/coursebuild build
+
+serve: $(VENV)/.site
+	$(BIN)/coursebuild serve
+
+test: $(VENV)/.dev npm system
+	@PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" \
+	  $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(PYTEST_ARGS)
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+types: $(VENV)/.dev
+	$(BIN)/mypy
+
+clean:
+	rm -rf public .coursebuild dist build site/dist site/.bundle* $(VENV)/.site $(VENV)/.dev
+	rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . \( -name $(VENV) -o -name node_modules -o -name .git \) -prune -o \
+	  -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf $(VENV) site/node_modules
+
+$(VENV)/.made:
+	@command -v $(PYTHON) >/dev/null || { \
+	  echo "$(PYTHON) was not found: install Python 3.11 or newer, or run make PYTHON=/path/to/python" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "Python 3.11 or newer is needed, $(PYTHON) is $$($(PYTHON) --version 2>&1): run make PYTHON=/path/to/python" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) has no venv module: install it (on Debian and Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+	@printf '%s' '$(CURDIR)' > $@
+
+$(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
+	@echo 'installing coursebuild and what it needs (the first time takes minutes)'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.made $(BUILD_INPUTS)
+	@echo 'installing coursebuild, what it needs and what its tests need (the first time takes minutes)'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $(VENV)/.site $@
+
+# The packages that only tests use, beside those that are bundled.
+npm: $(VENV)/.dev
+	@$(BIN)/python site/bundle.py packages
+
+# The browser and the Java runtime (for the HTML checker) that tests use.
+system:
+	@missing=''; \
+	command -v chromium >/dev/null || missing='chromium'; \
+	java -version >/dev/null 2>&1 || missing="$$missing default-jre-headless"; \
+	[ -n "$$missing" ] || exit 0; \
+	if [ "$$(id -u)" = 0 ]; then root=''; else root='sudo -n'; fi; \
+	if command -v apt-get >/dev/null && $$root true 2>/dev/null; then \
+	  echo "installing $$missing"; \
+	  export DEBIAN_FRONTEND=noninteractive; \
+	  $$root apt-get update -qq && $$root apt-get install -y -qq --no-install-recommends $$missing; \
+	else \
+	  echo "the tests need Debian's packages (or the like of your system): $$missing" >&2; \
+	  echo "install them, with the commands chromium and java on PATH, and run make test again" >&2; \
+	  exit 1; \
+	fi

@@ -1,0 +1,63 @@
+"""Build hook of the Python package: the browser's half and the templates go into the wheel.
+
+Entry point: `BrowserHook`, which hatchling finds here. In a wheel, the files of site/dist become
+coursebuild/assets/ and templates/ becomes coursebuild/templates/. An editable install only gets an
+up-to-date site/dist: there the tool reads both folders where they are. The work is done by
+site/bundle.py.
+"""
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+# A build environment doesn't have the project on its path.
+sys.path.insert(0, str(Path(__file__).resolve().parent / "site"))
+import bundle
+
+
+class BrowserHook(BuildHookInterface[Any]):
+    """Bundles before the package is made, and keeps other builds waiting until it is."""
+
+    PLUGIN_NAME = "custom"
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._held = contextlib.ExitStack()
+
+    def dependencies(self) -> list[str]:
+        """Returns what a build needs besides hatchling: a Node, if the machine has none."""
+        return [] if bundle.system_node() else [bundle.NODE_REQUIREMENT]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Bundles; for a wheel ("standard", not "editable") also names the files to take."""
+        self._held.enter_context(bundle.exclusive())
+        try:
+            bundle.bundle()
+            files = _assets() | _templates(Path(self.root))
+        except bundle.BundleError as error:
+            self.app.abort(str(error))
+        if version == "standard":
+            build_data["force_include"].update(files)
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Lets the next build go on: the files have been read."""
+        self._held.close()
+
+
+def _assets() -> dict[str, str]:
+    return {str(bundle.DIST / path): f"coursebuild/assets/{path}" for path in bundle.outputs()}
+
+
+def _templates(root: Path) -> dict[str, str]:
+    folder = root / "templates"
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    if not files:
+        raise bundle.BundleError("templates/ holds no file: the package would be without its pages")
+    return {
+        str(path): f"coursebuild/templates/{path.relative_to(folder).as_posix()}"
+        for path in files
+        if not path.name.startswith(".")
+    }

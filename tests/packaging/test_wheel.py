@@ -1,0 +1,176 @@
+"""What is in the wheel and in the source distribution, and that both can be built again."""
+
+import email
+import io
+import json
+import re
+import tarfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import py_mini_racer
+import pytest
+from fontTools.ttLib import TTFont
+
+Copy = Callable[[Path], Path]
+Build = Callable[[Path, str], Path]
+
+SAMPLES = {
+    "latin": "AZaz09 é×÷±²−“”…",
+    "latin-ext": "ĀčłŐŽ",
+    "vietnamese": "ăĐơưẠỹ",
+    "greek": "ΑΩαβγδθλμπσφω",
+    "cyrillic": "АЯаяёі",
+}
+
+
+@pytest.fixture(scope="module")
+def project(copy_project: Copy, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_project(tmp_path_factory.mktemp("packaging") / "project")
+
+
+@pytest.fixture(scope="module")
+def wheel(project: Path, build: Build) -> Path:
+    return build(project, "wheel")
+
+
+@pytest.fixture(scope="module")
+def sdist(project: Path, build: Build, wheel: Path) -> Path:
+    """Made after the wheel, so that site/dist and site/node_modules are there to be left out."""
+    assert (project / "site" / "dist").is_dir()
+    return build(project, "sdist")
+
+
+@pytest.fixture(scope="module")
+def names(wheel: Path) -> list[str]:
+    return zipfile.ZipFile(wheel).namelist()
+
+
+def read(wheel: Path, name: str) -> bytes:
+    return zipfile.ZipFile(wheel).read(name)
+
+
+def below(folder: Path, pattern: str = "*") -> set[str]:
+    paths = (path for path in folder.rglob(pattern) if path.is_file())
+    return {p.relative_to(folder).as_posix() for p in paths if "__pycache__" not in p.parts}
+
+
+def test_wheel_holds_the_packages_and_nothing_beside_them(
+    root: Path, names: list[str], full_name: str
+) -> None:
+    code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
+    assert {name for name in names if name.endswith((".py", "/py.typed"))} == {
+        name for name in code if name.endswith((".py", "/py.typed"))
+    }
+    tops = {name.split("/")[0] for name in names}
+    assert tops == {"coursebuild", "mjcourse", f"{full_name}.dist-info"}
+    assert len(names) == len(set(names))
+    strays = re.compile(r"node_modules|\.pyc$|stamp\.json|package(-lock)?\.json|\.mjs$|/\.")
+    assert [name for name in names if strays.search(name)] == []
+
+
+def test_wheel_holds_every_template(root: Path, names: list[str]) -> None:
+    prefix = "coursebuild/templates/"
+    there = {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
+    assert there == below(root / "templates")
+    assert there
+
+
+def test_wheel_holds_every_script_and_the_style(root: Path, wheel: Path, names: list[str]) -> None:
+    scripts = {path.name for path in (root / "site" / "js").glob("*.js")}
+    tests = {name for name in scripts if name.endswith(".test.js")}
+    there = {n.rsplit("/", 1)[1] for n in names if n.startswith("coursebuild/assets/js/")}
+    assert there == scripts - tests
+    assert there
+    style = read(wheel, "coursebuild/assets/css/site.css").decode()
+    assert "{" in style
+    assert "@import" not in style
+
+
+def test_fonts_are_what_their_list_says(wheel: Path, names: list[str]) -> None:
+    prefix = "coursebuild/assets/fonts/"
+    faces = json.loads(read(wheel, f"{prefix}fonts.json"))
+    files = {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
+    assert sorted(face["file"] for face in faces) == sorted(files - {"fonts.json"})
+    for face in faces:
+        font = TTFont(io.BytesIO(read(wheel, prefix + face["file"])))
+        characters = set(map(chr, font.getBestCmap()))
+        assert set(SAMPLES[face["subset"]]) <= characters, face["file"]
+        assert (face["style"] == "italic") == bool(font["head"].macStyle & 2), face["file"]
+        if face["unicode_range"] is None:
+            assert "MATH" in font
+            assert set("∫√∂∇⟨≈") <= characters
+        else:
+            axis = next(axis for axis in font["fvar"].axes if axis.axisTag == "wght")
+            assert face["weight"] == [axis.minValue, axis.maxValue]
+    families = {face["family"]: face["style"] for face in faces}
+    assert len(families) == 3
+
+
+def test_temml_is_a_classic_script_for_an_engine_without_a_page(wheel: Path) -> None:
+    engine = py_mini_racer.MiniRacer()
+    engine.eval(read(wheel, "coursebuild/assets/temml/temml.min.js").decode())
+    markup = engine.eval(r"temml.renderToString('\\frac{1}{2}\\dot{x}^2')")
+    assert "<mfrac>" in markup
+
+
+def test_every_shipped_package_has_its_licence(
+    wheel: Path, names: list[str], full_name: str
+) -> None:
+    prefix = "coursebuild/assets/licences/"
+    texts = {name.removeprefix(prefix): read(wheel, name) for name in names if prefix in name}
+    assert {
+        "fontsource-stix-two-math.txt",
+        "fontsource-variable-source-code-pro.txt",
+        "fontsource-variable-source-serif-4.txt",
+        "temml.txt",
+    } <= set(texts)
+    assert all(len(text) > 500 for text in texts.values())
+    for name, text in texts.items():
+        if name.startswith("fontsource-"):
+            assert b"SIL OPEN FONT LICENSE" in text
+    assert b"Apache License" in read(wheel, f"{full_name}.dist-info/licenses/LICENSE")
+
+
+def test_metadata_names_the_command_and_the_pins(
+    wheel: Path, pyproject: dict, full_name: str
+) -> None:
+    info = f"{full_name}.dist-info"
+    metadata = email.message_from_bytes(read(wheel, f"{info}/METADATA"))
+    assert metadata["License-Expression"] == "Apache-2.0"
+    assert metadata["Requires-Python"] == ">=3.11"
+    required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
+    declared = pyproject["project"]["dependencies"]
+    assert sorted(map(str.lower, required)) == sorted(map(str.lower, declared))
+    assert b"coursebuild = coursebuild.cli:main" in read(wheel, f"{info}/entry_points.txt")
+
+
+def test_sdist_holds_the_sources_and_nothing_of_a_third_party(root: Path, sdist: Path) -> None:
+    with tarfile.open(sdist) as archive:
+        files = {m.name.split("/", 1)[1] for m in archive.getmembers() if m.isfile()}
+    site = {"bundle.py", "build.mjs", "package.json", "package-lock.json", ".npmrc"}
+    sources = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
+    assert {f"site/{name}" for name in site} | sources <= files
+    for folder in ("templates", "site/js", "site/css", "content", "models"):
+        assert {f"{folder}/{path}" for path in below(root / folder)} <= files
+    assert {"hatch_build.py", "LICENSE", "README.md", "Makefile", "PKG-INFO"} <= files
+    third = re.compile(r"node_modules|^site/dist/|\.woff2?$|temml\.min|\.venv|__pycache__|\.bundle")
+    assert [name for name in files if third.search(name)] == []
+
+
+def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
+    wheel: Path,
+    sdist: Path,
+    packages: Path,
+    copy_project: Copy,
+    build: Build,
+    tmp_path: Path,
+    full_name: str,
+) -> None:
+    assert build(copy_project(tmp_path / "a" / "b c"), "wheel").read_bytes() == wheel.read_bytes()
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    unpacked = tmp_path / full_name
+    (unpacked / "site" / "node_modules").symlink_to(packages)
+    assert build(unpacked, "wheel").read_bytes() == wheel.read_bytes()
