@@ -1,0 +1,293 @@
+"""The same numbers as MuJoCo's own routines and compiler, where these are defined."""
+
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+RNG = np.random.default_rng(59)
+COUNT = 50
+
+
+def unit_quats(count: int = COUNT) -> np.ndarray:
+    return spatial.quat_normalize(RNG.normal(size=(count, 4)))
+
+
+def close(got: np.ndarray, want: np.ndarray, size: float = 1.0) -> None:
+    """Equal to 8 ulp of a size."""
+    np.testing.assert_allclose(got, want, rtol=0, atol=8 * 2.0**-52 * size)
+
+
+def same_rotation(got: np.ndarray, want: np.ndarray) -> None:
+    close(got * np.sign(got @ want), want)
+
+
+def test_mul_and_conj() -> None:
+    res = np.zeros(4)
+    for a, b in zip(unit_quats(), unit_quats(), strict=True):
+        mujoco.mju_mulQuat(res, a, b)
+        close(spatial.quat_mul(a, b), res)
+        mujoco.mju_negQuat(res, a)
+        assert (spatial.quat_conj(a) == res).all()
+
+
+def test_matrices_both_ways() -> None:
+    flat, quat = np.zeros(9), np.zeros(4)
+    half_turns = [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [1e-9, 1, 0, 0], [0, 0.6, 0.8, 0]]
+    for q in (*unit_quats(), *map(spatial.quat_normalize, half_turns)):
+        mujoco.mju_quat2Mat(flat, q)
+        close(spatial.quat_to_mat(q), flat.reshape(3, 3))
+        mujoco.mju_mat2Quat(quat, flat)
+        same_rotation(spatial.mat_to_quat(flat.reshape(3, 3)), quat)
+
+
+def test_rotate() -> None:
+    res = np.zeros(3)
+    for q, v in zip(unit_quats(), RNG.normal(size=(COUNT, 3)), strict=True):
+        mujoco.mju_rotVecQuat(res, v, q)
+        close(spatial.quat_rotate(q, v), res, np.linalg.norm(v))
+
+
+def test_axis_angle_and_rotation_vectors() -> None:
+    quat, rotvec = np.zeros(4), np.zeros(3)
+    for axis, angle in zip(
+        RNG.normal(size=(COUNT, 3)), RNG.uniform(-7, 7, size=COUNT), strict=True
+    ):
+        axis = axis / np.linalg.norm(axis)
+        mujoco.mju_axisAngle2Quat(quat, axis, angle)
+        close(spatial.axis_angle_to_quat(axis, angle), quat)
+        close(spatial.rotvec_to_quat(axis * angle), quat)
+        mujoco.mju_quat2Vel(rotvec, quat, 0.01)
+        close(spatial.quat_to_rotvec(quat) / 0.01, rotvec, 4 / 0.01)
+
+
+def test_differences() -> None:
+    res = np.zeros(3)
+    for a, b in zip(unit_quats(), unit_quats(), strict=True):
+        mujoco.mju_subQuat(res, a, b)
+        close(spatial.quat_sub(a, b), res, 8)
+        close(spatial.angular_distance(a, b), np.linalg.norm(res), 8)
+
+
+def test_integration() -> None:
+    for q, v in zip(unit_quats(), RNG.normal(size=(COUNT, 3)), strict=True):
+        for dt in (0.002, -1.0, 1e-9):
+            quat = q.copy()
+            mujoco.mju_quatIntegrate(quat, v, dt)
+            close(spatial.quat_integrate(q, v, dt), quat)
+
+
+def test_many_small_steps_integrate_as_mujoco_does() -> None:
+    quat, ours = np.array([1.0, 0, 0, 0]), np.array([1.0, 0, 0, 0])
+    for v in RNG.normal(size=(1000, 3)):
+        mujoco.mju_quatIntegrate(quat, v, 0.01)
+        ours = spatial.quat_integrate(ours, v, 0.01)
+    assert spatial.angular_distance(ours, quat) < 1e-14
+
+
+@pytest.mark.parametrize(
+    "letters", [s for s in itertools.product("xyz", repeat=3) if s[0] != s[1] != s[2]]
+)
+def test_euler_sequences(letters: tuple[str, ...]) -> None:
+    quat = np.zeros(4)
+    for seq in ("".join(letters), "".join(letters).upper()):
+        for angles in RNG.uniform(-4, 4, size=(5, 3)):
+            mujoco.mju_euler2Quat(quat, angles, seq)
+            close(spatial.euler_to_quat(angles, seq), quat)
+
+
+def test_poses() -> None:
+    pos, quat = np.zeros(3), np.zeros(4)
+    for q1, q2, p1, p2 in zip(
+        unit_quats(), unit_quats(), *RNG.normal(size=(2, COUNT, 3)), strict=True
+    ):
+        mujoco.mju_mulPose(pos, quat, p1, q1, p2, q2)
+        rot, shift = spatial.pose_compose(spatial.quat_to_mat(q1), p1, spatial.quat_to_mat(q2), p2)
+        close(shift, pos, 8)
+        same_rotation(spatial.mat_to_quat(rot), quat)
+        mujoco.mju_negPose(pos, quat, p1, q1)
+        rot, shift = spatial.pose_inverse(spatial.quat_to_mat(q1), p1)
+        close(shift, pos, 8)
+        same_rotation(spatial.mat_to_quat(rot), quat)
+
+
+def test_spatial_transforms() -> None:
+    res = np.zeros(6)
+    for q, pos, vector in zip(
+        unit_quats(), RNG.normal(size=(COUNT, 3)), RNG.normal(size=(COUNT, 6)), strict=True
+    ):
+        rot = spatial.quat_to_mat(q)
+        # From about oldpos to about newpos, then into the axes of the new frame.
+        for is_force, transform in ((0, spatial.motion_transform), (1, spatial.force_transform)):
+            mujoco.mju_transformSpatial(res, vector, is_force, pos, np.zeros(3), rot.ravel())
+            close(transform(*spatial.pose_inverse(rot, pos)) @ vector, res, 40)
+
+
+def test_velocities_of_two_frames_of_one_body() -> None:
+    xml = """<mujoco><worldbody><body pos="1 2 3" euler="10 20 30"><freejoint/>
+      <geom size="0.1"/><site name="a" pos="0.3 -0.1 0.2" euler="40 -50 60"/>
+      <site name="b" pos="-0.4 0.2 0.5" euler="-70 10 20"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qvel[:] = RNG.normal(size=6)
+    mujoco.mj_forward(model, data)
+    velocities = np.zeros((2, 6))
+    for site in range(2):
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, site, velocities[site], 1)
+    poses = [(data.site_xmat[k].reshape(3, 3), data.site_xpos[k]) for k in range(2)]
+    a_in_b = spatial.pose_compose(*spatial.pose_inverse(*poses[1]), *poses[0])
+    np.testing.assert_allclose(
+        spatial.motion_transform(*a_in_b) @ velocities[0], velocities[1], rtol=0, atol=1e-13
+    )
+
+
+def test_principal_axes() -> None:
+    values, vectors, quat = np.zeros(3), np.zeros(9), np.zeros(4)
+    for base in RNG.normal(size=(COUNT, 3, 3)):
+        tensor = base @ base.T
+        mujoco.mju_eig3(values, vectors, quat, tensor.ravel())
+        moments, axes = spatial.principal_axes(tensor)
+        np.testing.assert_allclose(moments, values[::-1], rtol=0, atol=1e-10)
+        theirs = vectors.reshape(3, 3)[:, ::-1]
+        np.testing.assert_allclose(np.abs((axes * theirs).sum(axis=0)), 1, atol=1e-9)
+
+
+GEOMS = {
+    "box": ((0.3, 0.2, 0.1), lambda m, s: spatial.box_inertia(m, s)),
+    "sphere": ((0.3,), lambda m, s: spatial.sphere_inertia(m, s[0])),
+    "cylinder": ((0.3, 0.2), lambda m, s: spatial.cylinder_inertia(m, s[0], s[1])),
+    "capsule": ((0.2, 0.3), lambda m, s: spatial.capsule_inertia(m, s[0], s[1])),
+    "ellipsoid": ((0.3, 0.2, 0.1), lambda m, s: spatial.ellipsoid_inertia(m, s)),
+}
+
+
+def numbers(values: np.ndarray) -> str:
+    return " ".join(map(repr, map(float, values)))
+
+
+def compiled(*geoms: str) -> mujoco.MjModel:
+    body = f"<body><freejoint/>{''.join(geoms)}</body>"
+    return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+
+
+def geom(kind: str, mass: float, size: np.ndarray, pos: np.ndarray, quat: np.ndarray) -> str:
+    return (
+        f'<geom type="{kind}" mass="{mass!r}" size="{numbers(size)}" pos="{numbers(pos)}" '
+        f'quat="{numbers(quat)}"/>'
+    )
+
+
+@pytest.mark.parametrize("kind", GEOMS)
+def test_inertia_of_one_geom(kind: str) -> None:
+    base, formula = GEOMS[kind]
+    for _ in range(10):
+        mass, size = float(RNG.uniform(0.1, 5)), np.array(base) * RNG.uniform(0.3, 3)
+        pos, quat = RNG.normal(size=3), unit_quats(1)[0]
+        model = compiled(geom(kind, mass, size, pos, quat))
+        theirs = spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1])
+        ours = spatial.rotate_inertia(formula(mass, size), spatial.quat_to_mat(quat))
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=4e-15 * np.abs(theirs).max())
+        close(model.body_ipos[1], pos, 4)
+
+
+def test_inertia_of_a_composed_body() -> None:
+    for _ in range(20):
+        kinds = RNG.choice(list(GEOMS), size=4)
+        masses, centres, quats = RNG.uniform(0.1, 3, size=4), RNG.normal(size=(4, 3)), unit_quats(4)
+        model = compiled(
+            *(
+                geom(kind, float(mass), np.array(GEOMS[kind][0]), centre, quat)
+                for kind, mass, centre, quat in zip(kinds, masses, centres, quats, strict=True)
+            )
+        )
+        tensors = [
+            spatial.rotate_inertia(GEOMS[kind][1](mass, GEOMS[kind][0]), spatial.quat_to_mat(quat))
+            for kind, mass, quat in zip(kinds, masses, quats, strict=True)
+        ]
+        mass, com, inertia = spatial.compose_inertia(masses, centres, tensors)
+        close(mass, model.body_mass[1], 12)
+        close(com, model.body_ipos[1], 4)
+        theirs = spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1])
+        np.testing.assert_allclose(inertia, theirs, rtol=0, atol=1e-9)
+        moments, _ = spatial.principal_axes(inertia)
+        np.testing.assert_allclose(moments, np.sort(model.body_inertia[1]), rtol=1e-12)
+        assert spatial.is_physical_inertia(inertia)
+
+
+def test_an_l_shape_of_two_boxes() -> None:
+    masses, centres = [2.0, 1.0], np.array([[0.1, 0, 0], [0.02, 0.08, 0]])
+    halves = np.array([[0.1, 0.02, 0.02], [0.02, 0.06, 0.02]])
+    mass, com, inertia = spatial.compose_inertia(
+        masses, centres, spatial.box_inertia(masses, halves)
+    )
+    assert mass == 3
+    assert np.round(com, 6).tolist() == [0.073333, 0.026667, 0]
+    moments, _ = spatial.principal_axes(inertia)
+    assert np.round(moments, 8).tolist() == [0.00376854, 0.01383146, 0.0168]
+    one = np.array([1.0, 0, 0, 0])
+    model = compiled(
+        *(
+            geom("box", m, half, centre, one)
+            for m, half, centre in zip(masses, halves, centres, strict=True)
+        )
+    )
+    np.testing.assert_allclose(np.sort(model.body_inertia[1]), moments, rtol=1e-13)
+
+
+def test_spatial_inertia_is_the_mass_matrix_of_a_free_body() -> None:
+    model = compiled(
+        geom("box", 2.0, np.array([0.3, 0.2, 0.1]), RNG.normal(size=3), unit_quats(1)[0]),
+        geom("capsule", 1.0, np.array([0.1, 0.3]), RNG.normal(size=3), unit_quats(1)[0]),
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    columns = np.zeros((6, 6))
+    for k in range(6):
+        mujoco.mj_mulM(model, data, columns[k], np.eye(6)[k])
+    ours = spatial.spatial_inertia(
+        model.body_mass[1],
+        model.body_ipos[1],
+        spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1]),
+    )
+    # A free joint has its linear velocity first, in the world's axes: here the body's.
+    order = [3, 4, 5, 0, 1, 2]
+    np.testing.assert_allclose(ours[np.ix_(order, order)], columns, rtol=0, atol=2e-14)
+
+
+def test_a_composite_of_two_links_is_what_mujoco_adds_up() -> None:
+    xml = """<mujoco><worldbody><body pos="0.1 0.2 0.3"><freejoint/>
+      <geom type="box" size="0.1 0.2 0.3" mass="2"/>
+      <body pos="0.5 -0.3 0.2" quat="0.8 0.2 -0.4 0.4"><joint axis="0 0 1"/>
+        <geom type="capsule" size="0.1 0.2" pos="0.1 0 0.3" euler="20 30 40" mass="1.5"/>
+      </body></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qpos[7] = 0.7
+    mujoco.mj_forward(model, data)
+    world = sum(
+        spatial.transform_spatial_inertia(
+            spatial.spatial_inertia(
+                model.body_mass[k], np.zeros(3), np.diag(model.body_inertia[k])
+            ),
+            data.ximat[k].reshape(3, 3),
+            data.xipos[k],
+        )
+        for k in (1, 2)
+    )
+    mass, com, inertia = spatial.split_spatial_inertia(world)
+    np.testing.assert_allclose(mass, model.body_subtreemass[1], rtol=1e-15)
+    np.testing.assert_allclose(com, data.subtree_com[1], rtol=0, atol=1e-15)
+    # data.crb: the tensor about the tree's centre of mass (xx, yy, zz, xy, xz, yz), m c, m.
+    composite = data.crb[1]
+    theirs = [
+        inertia[0, 0],
+        inertia[1, 1],
+        inertia[2, 2],
+        inertia[0, 1],
+        inertia[0, 2],
+        inertia[1, 2],
+    ]
+    np.testing.assert_allclose(theirs, composite[:6], rtol=0, atol=1e-14)

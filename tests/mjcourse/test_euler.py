@@ -1,0 +1,99 @@
+import itertools
+
+import high_precision as hp
+import mpmath
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+SEQUENCES = [
+    cased
+    for letters in itertools.product("xyz", repeat=3)
+    if letters[0] != letters[1] != letters[2]
+    for cased in ("".join(letters), "".join(letters).upper())
+]
+TURNS = (
+    (0.1, 0.2, 0.3),
+    (-3.0, 1.2, 2.9),
+    (1.0, 1e-9, -2.0),
+    (0.7, 1e-300, 1e-300),
+    (0.4, hp.PI / 2 - 1e-8, -1.1),
+    (3.0, hp.PI / 2, 0.5),
+    (-0.2, -hp.PI / 2, 0.5),
+    (0.3, hp.PI - 1e-8, 1.0),
+    (0.3, hp.PI, -1.0),
+    (0.0, 0.0, 0.0),
+    (hp.PI, 0.0, hp.PI),
+    (2.0, 1e-15, 1.0),
+    (2.0, hp.PI / 2 - 1e-15, 1.0),
+)
+
+
+def exact_quat(angles: np.ndarray, seq: str) -> hp.Vector:
+    turns = []
+    for letter, angle in zip(seq.lower(), hp.exact(angles), strict=True):
+        turns.append(hp.exp([angle if letter == axis else mpmath.mpf(0) for axis in "xyz"]))
+    first, second, third = turns[::-1] if seq.isupper() else turns
+    return hp.mul(first, hp.mul(second, third))
+
+
+@pytest.mark.parametrize("seq", SEQUENCES)
+def test_quaternion_to_four_ulp(seq: str) -> None:
+    for angles in TURNS:
+        got = spatial.euler_to_quat(angles, seq)
+        assert hp.ulps_of(mpmath.mpf(1), got, exact_quat(np.array(angles), seq)) <= 4
+
+
+@pytest.mark.parametrize("seq", SEQUENCES)
+def test_angles_give_the_rotation_back_to_six_ulp(seq: str) -> None:
+    rng = np.random.default_rng(11)
+    for angles in (*TURNS, *rng.uniform(-3.2, 3.2, size=(10, 3))):
+        quat = spatial.euler_to_quat(angles, seq)
+        got = spatial.quat_to_euler(quat * 1e-200, seq)
+        want = hp.same_up_to_sign(quat, exact_quat(got, seq))
+        assert hp.ulps_of(mpmath.mpf(1), quat, want) <= 6
+        assert abs(got[[0, 2]]).max() <= np.pi
+        low, high = (0, np.pi) if seq[0] == seq[2] else (-np.pi / 2, np.pi / 2)
+        assert low <= got[1] <= high
+
+
+@pytest.mark.parametrize("seq", SEQUENCES)
+def test_angles_in_range_come_back(seq: str) -> None:
+    angles = np.array([[0.3, 0.4, -0.5], [-2.9, 1.1, 2.2]])
+    got = spatial.quat_to_euler(spatial.euler_to_quat(angles, seq), seq)
+    np.testing.assert_allclose(got, angles, rtol=0, atol=2e-15)
+
+
+def test_small_angles_keep_their_digits() -> None:
+    angles = np.array([1e-300, -2e-300, 3e-9])
+    got = spatial.quat_to_euler(spatial.euler_to_quat(angles))
+    np.testing.assert_allclose(got[:2], angles[:2], rtol=1e-8)
+    np.testing.assert_allclose(got[2], angles[2], rtol=1e-15)
+
+
+def test_gimbal_lock_has_one_answer() -> None:
+    quat = spatial.euler_to_quat([0.5, np.pi / 2, 0.25], "xyz")
+    got = spatial.quat_to_euler(quat, "xyz")
+    assert got[0] == 0
+    np.testing.assert_allclose(got[1:], [np.pi / 2, 0.75], rtol=0, atol=3e-8)
+    got = spatial.quat_to_euler(spatial.euler_to_quat([0.5, np.pi / 2, 0.25], "XYZ"), "XYZ")
+    assert got[2] == 0
+    got = spatial.quat_to_euler(spatial.euler_to_quat([0.5, 0.0, 0.25], "zxz"), "zxz")
+    assert got.tolist() == pytest.approx([0, 0, 0.75], abs=1e-15)
+    assert spatial.quat_to_euler([1, 0, 0, 0], "zyx").tolist() == [0, 0, 0]
+    assert not np.signbit(spatial.quat_to_euler([1, 0, 0, 0], "zyx")).any()
+
+
+@pytest.mark.parametrize("seq", ["xy", "xxy", "xyY", "XYz", "wxy", "", "xyzx", "rpy", "x y"])
+def test_a_bad_sequence_is_an_error(seq: str) -> None:
+    text = "seq must be three of x, y, z or of X, Y, Z, no two neighbours the same, got " + repr(
+        seq
+    )
+    for call in (
+        lambda: spatial.euler_to_quat([0, 0, 0], seq),
+        lambda: spatial.quat_to_euler([1, 0, 0, 0], seq),
+    ):
+        with pytest.raises(ValueError) as caught:
+            call()
+        assert str(caught.value) == text

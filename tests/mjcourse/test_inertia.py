@@ -1,0 +1,197 @@
+import high_precision as hp
+import mpmath
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+RNG = np.random.default_rng(41)
+
+
+def exact_point(m: mpmath.mpf, d: hp.Vector) -> hp.Vector:
+    square = sum(entry * entry for entry in d)
+    return [m * (square * (i == j) - d[i] * d[j]) for i in range(3) for j in range(3)]
+
+
+def exact_composition(
+    masses: np.ndarray, centres: np.ndarray, tensors: np.ndarray
+) -> tuple[mpmath.mpf, hp.Vector, hp.Vector]:
+    ms = hp.exact(masses)
+    total = sum(ms)
+    points = [hp.exact(centre) for centre in centres]
+    centre = [sum(m * p[k] for m, p in zip(ms, points, strict=True)) / total for k in range(3)]
+    about = [mpmath.mpf(0)] * 9
+    for m, point, tensor in zip(ms, points, tensors, strict=True):
+        shift = exact_point(m, [p - c for p, c in zip(point, centre, strict=True)])
+        about = [a + t + s for a, t, s in zip(about, hp.exact(tensor), shift, strict=True)]
+    return total, centre, about
+
+
+@pytest.mark.parametrize("size", [1e-160, 1e-9, 1.0, 3e7])
+def test_parallel_axis_to_three_ulp(size: float) -> None:
+    for _ in range(20):
+        mass, offset = RNG.uniform(0.1, 9), RNG.normal(size=3) * size
+        tensor = spatial.box_inertia(mass, RNG.uniform(0.01, 1, size=3))
+        point = exact_point(mpmath.mpf(mass), hp.exact(offset))
+        got = spatial.parallel_axis(tensor, mass, offset)
+        larger = [max(abs(t), abs(p)) for t, p in zip(hp.exact(tensor), point, strict=True)]
+        for entry, base, extra, scale in zip(
+            got.ravel(), hp.exact(tensor), point, larger, strict=True
+        ):
+            assert abs(mpmath.mpf(float(entry)) - base - extra) <= 3 * hp.ULP * scale + hp.DENORMAL
+
+
+def test_diagonal_of_the_parallel_axis_theorem_does_not_cancel() -> None:
+    got = spatial.parallel_axis(np.zeros((3, 3)), 1.0, [1e9, 1.0, 0.0])
+    assert got[0, 0] == 1.0
+    assert got.tolist() == [[1, -1e9, 0], [-1e9, 1e18, 0], [0, 0, 1e18 + 1]]
+
+
+@pytest.mark.parametrize("away", [0.0, 1.0, 1e3, 1e9, 1e12])
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_composition_near_and_far(away: float, count: int) -> None:
+    masses = RNG.uniform(0.01, 3, size=count)
+    centres = RNG.normal(size=(count, 3)) * 0.1 + away
+    tensors = spatial.inertia_from_principal(
+        RNG.uniform(0.8, 1.2, size=(count, 3)) * 1e-3, RNG.normal(size=(count, 4))
+    )
+    mass, com, inertia = spatial.compose_inertia(masses, centres, tensors)
+    want_mass, want_com, want_inertia = exact_composition(masses, centres, tensors)
+    assert hp.own_ulps(mass, [want_mass]) <= 4
+    assert hp.ulps_of(max(map(abs, want_com)), com, want_com) <= 4
+    assert hp.ulps_of(max(map(abs, want_inertia)), inertia, want_inertia) <= 4 + 2 * count
+    assert (inertia == inertia.T).all()
+
+
+def test_composition_of_the_lightest_far_away_part() -> None:
+    masses = np.array([1e-30, 1.0, 1.0])
+    centres = np.array([[1e9, 0, 0], [0, 0, 0], [0.1, 0, 0]])
+    _, _, inertia = spatial.compose_inertia(masses, centres, np.zeros((3, 3, 3)))
+    _, _, want = exact_composition(masses, centres, np.zeros((3, 3, 3)))
+    assert hp.ulps_of(max(map(abs, want)), inertia, want) <= 10
+
+
+def test_a_hole_is_a_part_of_negative_mass() -> None:
+    block = spatial.box_inertia(8.0, [0.2, 0.2, 0.2])
+    hole = spatial.box_inertia(1.0, [0.1, 0.1, 0.1])
+    mass, com, inertia = spatial.compose_inertia(
+        [8.0, -1.0], [[0, 0, 0], [0.1, 0.1, 0.1]], [block, -hole]
+    )
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)][:-1]) * 0.1
+    parts = spatial.compose_inertia(np.ones(7), corners, [hole] * 7)
+    assert mass == parts[0] == 7
+    np.testing.assert_allclose(com, parts[1], rtol=1e-14)
+    np.testing.assert_allclose(inertia, parts[2], rtol=1e-13)
+
+
+def test_composition_over_leading_axes() -> None:
+    masses = RNG.uniform(1, 2, size=(4, 1, 3))
+    centres = RNG.normal(size=(5, 3, 3))
+    tensors = np.broadcast_to(np.eye(3), (3, 3, 3))
+    mass, com, inertia = spatial.compose_inertia(masses, centres, tensors)
+    assert (mass.shape, com.shape, inertia.shape) == ((4, 5), (4, 5, 3), (4, 5, 3, 3))
+    for i, j in np.ndindex(4, 5):
+        one = spatial.compose_inertia(masses[i, 0], centres[j], tensors)
+        np.testing.assert_allclose(mass[i, j], one[0], rtol=1e-15)
+        np.testing.assert_allclose(com[i, j], one[1], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(inertia[i, j], one[2], rtol=0, atol=1e-14)
+
+
+def test_composition_errors() -> None:
+    eye = np.eye(3)
+    with pytest.raises(ValueError, match=r"^mass must have shape \(\.\.\., n\), got \(\)$"):
+        spatial.compose_inertia(1.0, [[0, 0, 0]], [eye])
+    with pytest.raises(ValueError, match=r"^com must have shape \(\.\.\., n, 3\), got \(3,\)$"):
+        spatial.compose_inertia([1.0], [0, 0, 0], [eye])
+    with pytest.raises(
+        ValueError, match=r"^inertia must have shape \(\.\.\., n, 3, 3\), got \(3, 3\)$"
+    ):
+        spatial.compose_inertia([1.0], [[0, 0, 0]], eye)
+    with pytest.raises(
+        ValueError,
+        match=r"^leading shapes do not broadcast: mass \(3,\), com \(2,\), inertia \(2,\)$",
+    ):
+        spatial.compose_inertia([1, 2, 3], np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    with pytest.raises(ValueError, match=r"^a body needs at least one part, got none$"):
+        spatial.compose_inertia(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+    with pytest.raises(ValueError, match=r"^total mass is not positive$"):
+        spatial.compose_inertia([1.0, -1.0], np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    with pytest.raises(ValueError, match=r"^total mass at index \(1,\) is not positive$"):
+        spatial.compose_inertia([[1.0], [0.0]], np.zeros((1, 3)), np.zeros((1, 3, 3)))
+
+
+def test_nan_stays_in_its_entry() -> None:
+    _, com, inertia = spatial.compose_inertia(
+        [[1.0, np.nan], [1.0, 2.0]], np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))
+    )
+    assert np.isnan(com[0]).all()
+    assert np.isfinite(inertia[1]).all()
+    got = spatial.parallel_axis(np.eye(3), [1.0, 1.0], [[np.nan, 0, 0], [1, 0, 0]])
+    assert np.isnan(got[0]).any()
+    assert got[1].tolist() == np.diag([1, 2, 2]).tolist()
+
+
+def test_rotation_of_a_tensor_to_eight_ulp() -> None:
+    for _ in range(40):
+        quat, moments = RNG.normal(size=4), RNG.uniform(0, 1, size=3) * 10.0 ** RNG.uniform(-12, 9)
+        rot = spatial.quat_to_mat(quat)
+        rows = hp.exact(rot)
+        middle = hp.exact(np.diag(moments))
+        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        largest = max(hp.exact(moments))
+        got = spatial.rotate_inertia(np.diag(moments), rot)
+        assert hp.ulps_of(largest, got, want) <= 8
+        assert (got == got.T).all()
+        rows = hp.matrix(hp.exact(quat))
+        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        got = spatial.inertia_from_principal(moments, quat * 1e-200)
+        assert hp.ulps_of(largest, got, want) <= 8
+        assert (got == got.T).all()
+
+
+def test_spatial_inertia_block_by_block() -> None:
+    mass, com, tensor = 2.0, np.array([0.5, -1.0, 2.0]), np.diag([1.0, 2.0, 2.5])
+    got = spatial.spatial_inertia(mass, com, tensor)
+    assert got[:3, :3].tolist() == spatial.parallel_axis(tensor, mass, com).tolist()
+    assert got[:3, 3:].tolist() == (mass * spatial.skew(com)).tolist()
+    assert got[3:, 3:].tolist() == (mass * np.eye(3)).tolist()
+    assert (got == got.T).all()
+
+
+def test_spatial_inertia_times_velocity_is_momentum() -> None:
+    mass, com, tensor = 3.0, np.array([0.1, 0.2, -0.4]), np.diag([1.0, 2.0, 2.5])
+    turn, move = np.array([1.0, -2.0, 0.5]), np.array([0.3, 0.1, 4.0])
+    momentum = spatial.spatial_inertia(mass, com, tensor) @ np.concatenate((turn, move))
+    linear = mass * (move + np.cross(turn, com))
+    np.testing.assert_allclose(momentum[3:], linear, rtol=1e-15)
+    np.testing.assert_allclose(momentum[:3], tensor @ turn + np.cross(com, linear), rtol=1e-15)
+
+
+def test_spatial_inertias_add_as_bodies_compose() -> None:
+    masses, centres = RNG.uniform(0.1, 2, size=5), RNG.normal(size=(5, 3))
+    tensors = spatial.inertia_from_principal(
+        RNG.uniform(0.4, 0.6, size=(5, 3)), RNG.normal(size=(5, 4))
+    )
+    whole = spatial.spatial_inertia(masses, centres, tensors).sum(axis=0)
+    got = spatial.split_spatial_inertia(whole)
+    for part, want in zip(got, spatial.compose_inertia(masses, centres, tensors), strict=True):
+        np.testing.assert_allclose(part, want, rtol=0, atol=2e-14)
+
+
+def test_splitting_a_spatial_inertia() -> None:
+    mass, com, tensor = 2.0, np.array([0.5, -1.0, 2.0]), np.diag([1.0, 2.0, 2.5])
+    got = spatial.split_spatial_inertia(spatial.spatial_inertia(mass, com, tensor))
+    assert got[0] == mass
+    assert got[1].tolist() == com.tolist()
+    np.testing.assert_allclose(got[2], tensor, rtol=0, atol=1e-14)
+    with pytest.raises(ValueError, match=r"^mass is not positive$"):
+        spatial.split_spatial_inertia(np.zeros((6, 6)))
+
+
+def test_transformed_spatial_inertia_is_that_of_the_moved_body() -> None:
+    mass, com, tensor = 2.0, np.array([0.5, -1.0, 2.0]), np.diag([1.0, 2.0, 2.5])
+    rot, pos = spatial.exp_so3([0.3, 2.0, -1.0]), np.array([3.0, -2.0, 0.7])
+    got = spatial.transform_spatial_inertia(spatial.spatial_inertia(mass, com, tensor), rot, pos)
+    want = spatial.spatial_inertia(mass, rot @ com + pos, spatial.rotate_inertia(tensor, rot))
+    np.testing.assert_allclose(got, want, rtol=0, atol=2e-14)
+    assert (got == got.T).all()

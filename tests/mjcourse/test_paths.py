@@ -1,0 +1,410 @@
+import concurrent.futures
+import multiprocessing
+import os
+import pickle
+import runpy
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import mjcourse
+from mjcourse import ModelNotFoundError
+
+PACKAGE = Path(mjcourse.__file__).parents[1]
+ASK = "from mjcourse import model_path\nprint(model_path('box'))\n"
+
+
+def write(path: Path, text: str = "") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    """A course as an author has it."""
+    root = tmp_path / "course"
+    write(root / "content" / "course.toml")
+    for name in ("box", "tumbling_box", "pendulum", "arms/ur5", "arms/panda", "v1.2"):
+        write(root / "models" / f"{name}.xml", "<mujoco/>")
+    write(root / "models" / "readme.txt")
+    return root
+
+
+def ask(script: Path, name: object = "box", run_name: str = "__main__") -> Path:
+    """What a script at a path gets."""
+    scope: dict[str, object] = {"__name__": run_name, "__file__": str(script), "name": name}
+    exec("from mjcourse import model_path\nfound = model_path(name)", scope)
+    found = scope["found"]
+    assert isinstance(found, Path)
+    return found
+
+
+def run(script: Path | str, *arguments: str, cwd: Path, code: str | None = None) -> str:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script), *arguments],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(PACKAGE)},
+        input=code,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("box", "box.xml"),
+        ("box.xml", "box.xml"),
+        ("arms/ur5", "arms/ur5.xml"),
+        ("arms/ur5.xml", "arms/ur5.xml"),
+        ("v1.2", "v1.2.xml"),
+        ("v1.2.xml", "v1.2.xml"),
+    ],
+)
+def test_names(course: Path, name: str, file: str) -> None:
+    assert ask(course / "examples" / "x.py", name) == course / "models" / file
+
+
+@pytest.mark.parametrize(
+    "folder", ["examples", "", "examples/deep/down", "content/lessons", "models"]
+)
+def test_from_anywhere_in_the_course(course: Path, folder: str) -> None:
+    assert ask(course / folder / "x.py") == course / "models" / "box.xml"
+
+
+def test_the_nearest_course_counts(course: Path) -> None:
+    inner = course / "tests" / "courses" / "small"
+    write(inner / "content" / "course.toml")
+    write(inner / "models" / "box.xml")
+    assert ask(inner / "examples" / "x.py") == inner / "models" / "box.xml"
+
+
+def test_a_downloaded_course_has_no_content(tmp_path: Path) -> None:
+    root = tmp_path / "unpacked"
+    write(root / "models" / "box.xml")
+    script = write(root / "examples" / "x.py")
+    assert ask(script) == root / "models" / "box.xml"
+    assert ask(root / "my_own.py") == root / "models" / "box.xml"
+
+
+def test_a_map_further_up_wins_over_a_download(course: Path) -> None:
+    write(course / "public" / "models" / "box.xml")
+    script = write(course / "public" / "examples" / "x.py")
+    assert ask(script) == course / "models" / "box.xml"
+
+
+def test_a_models_folder_alone_is_no_course(tmp_path: Path) -> None:
+    write(tmp_path / "models" / "box.xml")
+    script = tmp_path / "x.py"
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(script)
+    assert str(caught.value) == (
+        f"no course for model 'box': no folder at or above {script} has content/course.toml, "
+        "nor models/ beside examples/"
+    )
+
+
+def test_content_without_a_map_is_no_course(tmp_path: Path) -> None:
+    (tmp_path / "content" / "course.toml").mkdir(parents=True)
+    write(tmp_path / "models" / "box.xml")
+    with pytest.raises(ModelNotFoundError, match="no course for model 'box'"):
+        ask(tmp_path / "x.py")
+
+
+@pytest.mark.parametrize(
+    ("name", "tail"),
+    [
+        ("tumbling_bx", "; did you mean 'tumbling_box'?"),
+        ("Tumbling-Box.xml", "; did you mean 'tumbling_box'?"),
+        ("ur5", "; did you mean 'arms/ur5'?"),
+        ("legs/panda", "; did you mean 'arms/panda'?"),
+        ("boxx", "; did you mean 'box'?"),
+        ("lin", "; did you mean 'tumbling_box'?"),
+        ("arms", "; did you mean 'arms/ur5' or 'arms/panda'?"),
+        (
+            "readme",
+            ", which has 'arms/panda', 'arms/ur5', 'box', 'pendulum', 'tumbling_box', 'v1.2'",
+        ),
+    ],
+)
+def test_a_missing_model_lists_near_names(course: Path, name: str, tail: str) -> None:
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "examples" / "x.py", name)
+    assert str(caught.value) == f"no model {name!r} in {course / 'models'}{tail}"
+
+
+def test_a_missing_model_lists_no_more_than_eight_names(course: Path) -> None:
+    for k in range(10):
+        write(course / "models" / f"scene_{k}.xml")
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "examples" / "x.py", "quadruped")
+    assert str(caught.value).endswith(
+        "'pendulum', 'scene_0', 'scene_1', 'scene_2', 'scene_3' and 8 more"
+    )
+
+
+def test_a_course_without_models(course: Path) -> None:
+    for file in [*course.joinpath("models").rglob("*.xml")]:
+        file.unlink()
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "x.py")
+    assert str(caught.value) == f"no model 'box': {course / 'models'} holds no .xml file"
+    (course / "models").rename(course / "meshes")
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "x.py")
+    assert str(caught.value) == f"no model 'box': there is no folder {course / 'models'}"
+
+
+def test_a_folder_is_no_model(course: Path) -> None:
+    (course / "models" / "dir.xml").mkdir()
+    with pytest.raises(ModelNotFoundError, match="no model 'dir'"):
+        ask(course / "x.py", "dir")
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("../models/box", "leads out of models/"),
+        ("arms/../box", "leads out of models/"),
+        ("..", "leads out of models/"),
+        ("/etc/passwd", "is absolute; give it relative to models/"),
+        ("", "is not the name of a file below models/"),
+        (".", "is not the name of a file below models/"),
+        ("./box", "is not the name of a file below models/"),
+        ("arms//ur5", "is not the name of a file below models/"),
+        ("arms/", "is not the name of a file below models/"),
+        (".xml", "is not the name of a file below models/"),
+        ("arms\\ur5", "holds a character that no portable file name has"),
+        ("C:box", "holds a character that no portable file name has"),
+        ("box\0", "holds a character that no portable file name has"),
+    ],
+)
+def test_names_that_are_none(course: Path, name: str, why: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        ask(course / "x.py", name)
+    assert str(caught.value) == f"model name {name!r} {why}"
+
+
+def test_a_name_is_a_string(course: Path) -> None:
+    with pytest.raises(TypeError) as caught:
+        ask(course / "x.py", Path("box"))
+    assert str(caught.value).startswith("the name of a model must be a string, got ")
+
+
+def test_an_overlong_name_is_missing(course: Path) -> None:
+    with pytest.raises(ModelNotFoundError, match=r"^no model 'zzz"):
+        ask(course / "x.py", "z" * 5000)
+
+
+def test_a_link_inside_models_is_fine(course: Path) -> None:
+    (course / "models" / "same.xml").symlink_to("box.xml")
+    assert ask(course / "x.py", "same") == course / "models" / "same.xml"
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_a_link_out_of_models_is_not(course: Path, tmp_path: Path, kind: str) -> None:
+    secret = write(tmp_path / "outside" / "secret.xml")
+    if kind == "file":
+        (course / "models" / "link.xml").symlink_to(secret)
+    else:
+        (course / "models" / "link").symlink_to(secret.parent, target_is_directory=True)
+    name = "link" if kind == "file" else "link/secret"
+    with pytest.raises(ValueError) as caught:
+        ask(course / "x.py", name)
+    assert str(caught.value) == f"model {name!r} is a link that leads out of {course / 'models'}"
+
+
+def test_broken_and_circular_links_are_missing(course: Path) -> None:
+    (course / "models" / "gone.xml").symlink_to("nowhere.xml")
+    (course / "models" / "loop.xml").symlink_to("loop.xml")
+    for name in ("gone", "loop"):
+        with pytest.raises(ModelNotFoundError):
+            ask(course / "x.py", name)
+
+
+def test_models_may_be_a_link_itself(course: Path, tmp_path: Path) -> None:
+    (course / "models").rename(tmp_path / "shared")
+    (course / "models").symlink_to(tmp_path / "shared", target_is_directory=True)
+    assert ask(course / "x.py", "arms/ur5") == course / "models" / "arms" / "ur5.xml"
+
+
+def test_a_linked_script_belongs_where_it_lies_or_where_it_leads(
+    course: Path, tmp_path: Path
+) -> None:
+    script = write(course / "examples" / "x.py")
+    link = tmp_path / "bin" / "x.py"
+    link.parent.mkdir()
+    link.symlink_to(script)
+    assert ask(link) == course / "models" / "box.xml"
+    inside = course / "examples" / "linked.py"
+    inside.symlink_to(write(tmp_path / "elsewhere" / "y.py"))
+    assert ask(inside) == course / "models" / "box.xml"
+
+
+def test_the_error_survives_pickling(course: Path) -> None:
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "x.py", "nothing_like_it")
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert type(again) is ModelNotFoundError
+    assert str(again) == str(caught.value)
+
+
+def test_installed_code_belongs_to_no_course(course: Path, tmp_path: Path) -> None:
+    helper = course / ".venv" / "lib" / "python3.11" / "site-packages" / "helper" / "__init__.py"
+    other = tmp_path / "other"
+    write(other / "content" / "course.toml")
+    write(other / "models" / "box.xml")
+    library: dict[str, object] = {"__name__": "helper", "__file__": str(helper)}
+    exec("from mjcourse import model_path\ndef load(): return model_path('box')", library)
+    script = {"__name__": "__main__", "__file__": str(other / "x.py"), "load": library["load"]}
+    exec("found = load()", script)
+    assert script["found"] == other / "models" / "box.xml"
+
+
+def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path: Path) -> None:
+    helper: dict[str, object] = {"__name__": "helper", "__file__": str(tmp_path / "lib" / "h.py")}
+    exec("from mjcourse import model_path\ndef load(): return model_path('box')", helper)
+    script = {
+        "__name__": "__main__",
+        "__file__": str(course / "examples" / "x.py"),
+        "load": helper["load"],
+    }
+    exec("found = load()", script)
+    assert script["found"] == course / "models" / "box.xml"
+
+
+def test_runpy_with_a_relative_path(
+    course: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write(course / "examples" / "x.py", ASK)
+    monkeypatch.chdir(course)
+    runpy.run_path("examples/x.py", run_name="__main__")
+    runpy.run_path("examples/x.py")
+    runpy.run_path(str(course / "content" / ".." / "examples" / "x.py"), run_name="__main__")
+    assert capsys.readouterr().out.split() == [str(course / "models" / "box.xml")] * 3
+
+
+def test_threads_and_pools_of_the_script(course: Path) -> None:
+    scope: dict[str, object] = {"__name__": "__main__", "__file__": str(course / "x.py")}
+    exec("from mjcourse import model_path\ndef load(name): return model_path(name)", scope)
+    load = scope["load"]
+    assert callable(load)
+    found: list[object] = []
+    threads = [threading.Thread(target=lambda: found.append(load("box"))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        found += pool.map(load, ["box"] * 8)
+    assert found == [course / "models" / "box.xml"] * 16
+
+
+SCRIPT = """
+import concurrent.futures, multiprocessing, os, sys, threading
+import sibling
+from mjcourse import model_path
+
+def main():
+    found = [model_path("box"), sibling.load(), *map(model_path, ["box"])]
+    os.chdir("/")
+    found.append(model_path("box"))
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        found += pool.map(model_path, ["box", "box"])
+    with multiprocessing.get_context(sys.argv[1]).Pool(1) as pool:
+        found += pool.map(model_path, ["box"])
+        found += pool.map(sibling.load_named, ["box"])
+    print(*found)
+
+if __name__ == "__main__":
+    main()
+"""
+SIBLING = """
+from mjcourse import model_path
+
+AT_IMPORT = model_path("box")
+
+def load():
+    return AT_IMPORT
+
+def load_named(name):
+    return model_path(name)
+"""
+
+
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+@pytest.mark.parametrize("relative", [True, False])
+def test_a_real_script_from_any_folder(
+    course: Path, tmp_path: Path, method: str, relative: bool
+) -> None:
+    script = write(course / "examples" / "x.py", SCRIPT)
+    write(course / "examples" / "sibling.py", SIBLING)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    cwd = course if relative else elsewhere
+    out = run("examples/x.py" if relative else script, method, cwd=cwd)
+    assert out.split() == [str(course / "models" / "box.xml")] * 8
+
+
+def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
+    want = str(course / "models" / "box.xml")
+    write(course / "examples" / "x.py", ASK)
+    assert run("-m", "examples.x", cwd=course) == want
+    assert run("-c", ASK, cwd=course / "examples") == want
+    assert run("-", cwd=course, code=ASK) == want
+    prompt = run("-i", "-c", "", cwd=course, code=ASK)
+    assert want in prompt
+    after = run(
+        "-i", str(course / "examples" / "x.py"), cwd=tmp_path, code="print(model_path('v1.2'))\n"
+    )
+    assert str(course / "models" / "v1.2.xml") in after
+
+
+def test_a_stray_script_run_by_a_course_s_is_in_no_course(
+    course: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", [str(write(course / "examples" / "x.py"))])
+    with pytest.raises(ModelNotFoundError, match="no course for model 'box'"):
+        ask(tmp_path / "stray.py")
+
+
+def test_a_shell_inside_a_course_s_environment_works_on_the_current_folder(
+    course: Path, tmp_path: Path
+) -> None:
+    shell = course / ".venv" / "bin" / "shell"
+    other = tmp_path / "other"
+    write(other / "models" / "box.xml")
+    write(other / "examples" / "y.py")
+    code = f"import sys; sys.ps1 = '> '; sys.argv = [{str(shell)!r}]\n{ASK}"
+    assert run("-c", code, cwd=other / "examples") == str(other / "models" / "box.xml")
+
+
+def test_a_script_of_a_relative_path_may_change_folder(course: Path) -> None:
+    write(course / "examples" / "x.py", "import os\nos.chdir('/')\n" + ASK)
+    code = "import mjcourse, runpy; runpy.run_path('examples/x.py', run_name='__main__')"
+    assert run("-c", code, cwd=course) == str(course / "models" / "box.xml")
+
+
+def test_code_outside_any_course_says_where_it_looked(tmp_path: Path) -> None:
+    code = (
+        "from mjcourse import model_path\n"
+        "try: model_path('box')\n"
+        "except FileNotFoundError as error: print(error)\n"
+    )
+    assert run("-c", code, cwd=tmp_path) == (
+        f"no course for model 'box': no folder at or above {tmp_path} has content/course.toml, "
+        "nor models/ beside examples/"
+    )
+    gone = f"import os; os.mkdir('x'); os.chdir('x'); os.rmdir({str(tmp_path / 'x')!r})\n"
+    assert "no course for model 'box'" in run("-c", gone + code, cwd=tmp_path)

@@ -1,0 +1,166 @@
+import high_precision as hp
+import mpmath
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+RNG = np.random.default_rng(31)
+
+
+def about(quat: np.ndarray, moments: list[float]) -> np.ndarray:
+    return spatial.inertia_from_principal(moments, quat)
+
+
+def random_tensors() -> list[np.ndarray]:
+    bases = RNG.normal(size=(40, 3, 3))
+    return [base @ base.T for base in bases]
+
+
+def nearly_equal() -> list[np.ndarray]:
+    tensors = []
+    for split in (0.0, 1e-17, 2e-16, 1e-15, 1e-12, 1e-8, 1e-3):
+        for moments in (
+            [1.0, 1.0 + split, 1.0 - split],
+            [1.0, 1.0, 1.0 + split],
+            [0.5, 1.0, 1.0 + split],
+        ):
+            tensors.append(about(RNG.normal(size=4), moments))
+            tensors.append(np.diag(moments) + split * spatial.skew([1, 1, 1]) ** 2)
+    return tensors
+
+
+def lopsided() -> list[np.ndarray]:
+    thin = [about(RNG.normal(size=4), [flat, 1.0, 1.0]) for flat in (0.0, 1e-300, 1e-17, 1e-9)]
+    graded = [np.outer(d, d) * (np.eye(3) + 0.5) for d in ([1, 1e-4, 1e-8], [1e-70, 1, 1e70])]
+    scaled = [
+        base * size
+        for base, size in zip(random_tensors(), (1e-320, 1e-300, 1e-9, 1e300), strict=False)
+    ]
+    return [*thin, *graded, *scaled]
+
+
+ROUND = [
+    np.eye(3),
+    np.zeros((3, 3)),
+    np.diag([3.0, 1.0, 2.0]),
+    np.full((3, 3), 0.5),
+    np.ones((3, 3)) - np.eye(3),
+]
+
+
+@pytest.mark.parametrize("tensor", [*random_tensors(), *nearly_equal(), *lopsided(), *ROUND])
+def test_moments_and_axes(tensor: np.ndarray) -> None:
+    moments, axes = spatial.principal_axes(tensor)
+    entries, columns, values = hp.exact(tensor), hp.exact(axes), hp.exact(moments)
+    table = mpmath.matrix([entries[:3], entries[3:6], entries[6:]])
+    want = sorted(mpmath.eigsy(table, eigvals_only=True))
+    largest = max(max(map(abs, want)), hp.DENORMAL / hp.ULP)
+    assert list(moments) == sorted(moments)
+    assert hp.ulps_of(largest, moments, want) <= 4
+
+    product = hp.matmul(hp.transpose(columns), columns)
+    assert hp.ulps_of(mpmath.mpf(1), np.eye(3), product) <= 5
+    assert np.linalg.det(axes) == pytest.approx(1, abs=1e-14)
+
+    spread = [columns[k] * values[k % 3] for k in range(9)]
+    again = hp.matmul(spread, hp.transpose(columns))
+    entry = max(max(map(abs, entries)), hp.DENORMAL / hp.ULP)
+    assert hp.ulps_of(entry, tensor, again) <= 8
+
+
+@pytest.mark.parametrize("tensor", lopsided()[4:6])
+def test_graded_tensors_keep_their_small_moments(tensor: np.ndarray) -> None:
+    entries = hp.exact(tensor)
+    table = mpmath.matrix([entries[:3], entries[3:6], entries[6:]])
+    with mpmath.workdps(700):
+        want = sorted(mpmath.eigsy(table, eigvals_only=True))
+    moments, _ = spatial.principal_axes(tensor)
+    assert hp.own_ulps(moments, want) <= 8
+
+
+def test_axes_of_a_diagonal_tensor_are_the_frame_s_own() -> None:
+    moments, axes = spatial.principal_axes(np.diag([3.0, 1.0, 2.0]))
+    assert moments.tolist() == [1, 2, 3]
+    assert axes.tolist() == [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    moments, axes = spatial.principal_axes(np.diag([1.0, 3.0, 2.0]))
+    assert moments.tolist() == [1, 2, 3]
+    assert axes.tolist() == [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    assert not np.signbit(axes[0]).any()
+    assert spatial.principal_axes(2 * np.eye(3))[1].tolist() == np.eye(3).tolist()
+
+
+def test_signs_of_the_axes_do_not_hang_on_rounding() -> None:
+    quarter = spatial.exp_so3([0, 0, np.pi / 4])
+    for noise in (0.0, 1e-15, -1e-15):
+        tensor = quarter @ np.diag([1.0, 2.0, 3.0]) @ quarter.T
+        tensor[0, 0] += noise
+        tensor = (tensor + tensor.T) / 2
+        _, axes = spatial.principal_axes(tensor)
+        np.testing.assert_allclose(axes[:, 0], [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-14)
+        np.testing.assert_allclose(axes[:, 1], [np.sqrt(0.5), -np.sqrt(0.5), 0], atol=1e-14)
+        np.testing.assert_allclose(axes[:, 2], [0, 0, -1], atol=1e-14)
+
+
+def test_a_batch_is_as_good_as_one_by_one() -> None:
+    tensors = np.array([*random_tensors(), *nearly_equal()]).reshape(2, -1, 3, 3)
+    moments, axes = spatial.principal_axes(tensors)
+    for index in np.ndindex(tensors.shape[:2]):
+        one_moments, one_axes = spatial.principal_axes(tensors[index])
+        assert (moments[index] == one_moments).all()
+        assert (axes[index] == one_axes).all()
+
+
+def test_nan_stays_in_its_entry() -> None:
+    tensors = np.array([np.eye(3), np.full((3, 3), np.nan), np.diag([1, np.inf, 1])])
+    tensors[2, 0, 1] = np.nan
+    moments, axes = spatial.principal_axes(tensors)
+    assert moments[0].tolist() == [1, 1, 1]
+    assert np.isnan(moments[1:]).all()
+    assert np.isnan(axes[1:]).all()
+    assert spatial.is_physical_inertia(tensors).tolist() == [True, False, False]
+
+
+def test_an_unsymmetric_tensor_is_an_error() -> None:
+    skewed = np.eye(3)
+    skewed[0, 1] = 1e-6
+    text = r"^inertia is not symmetric to 1e-09 of its largest entry$"
+    with pytest.raises(ValueError, match=text):
+        spatial.principal_axes(skewed)
+    with pytest.raises(ValueError, match=r"^inertia at index \(1,\) is not symmetric to 1e-09"):
+        spatial.principal_axes([np.eye(3), skewed * 1e-300])
+    skewed[0, 1] = 1e-12
+    moments, _ = spatial.principal_axes(skewed)
+    np.testing.assert_allclose(moments, 1, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("moments", "physical"),
+    [
+        ([1.0, 1.0, 1.0], True),
+        ([1.0, 2.0, 3.0], True),
+        ([1.0, 2.0, 3.0 + 1e-9], False),
+        ([0.0, 1.0, 1.0], True),
+        ([0.0, 0.0, 0.0], True),
+        ([0.0, 0.0, 1.0], False),
+        ([-1e-9, 1.0, 1.0], False),
+        ([-1.0, -1.0, -1.0], False),
+        ([1e-310, 1e-310, 2e-310], True),
+        ([1e300, 1e300, 1.7e308], False),
+        ([1.2e308, 1.2e308, 1.7e308], True),
+    ],
+)
+def test_what_a_body_can_have(moments: list[float], physical: bool) -> None:
+    got = spatial.is_physical_inertia(np.diag(moments))
+    assert got == physical
+    assert isinstance(got, np.bool_)
+    for order in ([1, 2, 0], [2, 0, 1], [1, 0, 2]):
+        assert spatial.is_physical_inertia(np.diag(moments)[order][:, order]) == physical
+
+
+def test_a_flat_plate_written_with_few_digits() -> None:
+    plate = np.diag([0.333, 0.083, 0.417])
+    assert not spatial.is_physical_inertia(plate)
+    assert spatial.is_physical_inertia(plate, rtol=5e-3)
+    turned = spatial.rotate_inertia(np.diag([1.0, 2.0, 3.0]), spatial.exp_so3([1, 2, 3]))
+    assert spatial.is_physical_inertia(turned)

@@ -1,0 +1,290 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from mjcourse import spatial
+
+ENTRY = st.floats(-1e3, 1e3, allow_subnormal=False).map(lambda x: x if abs(x) > 1e-150 else 0.0)
+WIDE = st.floats(allow_nan=False, allow_infinity=False)
+VECTOR = npst.arrays(float, 3, elements=ENTRY)
+SIX = npst.arrays(float, 6, elements=ENTRY)
+TURN = npst.arrays(float, 3, elements=st.floats(-10, 10))
+QUAT = npst.arrays(float, 4, elements=ENTRY).filter(np.any)
+ANY_QUAT = npst.arrays(float, 4, elements=WIDE).filter(np.any)
+MASS = st.floats(1e-3, 1e3)
+MOMENTS = st.tuples(*[st.floats(1e-3, 1e3)] * 3).map(
+    lambda parts: np.array([parts[1] + parts[2], parts[0] + parts[2], parts[0] + parts[1]])
+)
+TENSOR = st.builds(spatial.inertia_from_principal, MOMENTS, QUAT)
+
+QUICK = settings(deadline=None, max_examples=60)
+
+
+def size(*arrays: np.ndarray) -> float:
+    return float(np.prod([np.linalg.norm(array) for array in arrays]))
+
+
+def near(got: np.ndarray, want: np.ndarray, scale: float, ulps: float = 16) -> None:
+    np.testing.assert_allclose(got, want, rtol=0, atol=ulps * 2.0**-52 * scale + 1e-300)
+
+
+@QUICK
+@given(ANY_QUAT)
+def test_every_quaternion_but_zero_is_a_rotation(quat: np.ndarray) -> None:
+    unit = spatial.quat_normalize(quat)
+    near(np.linalg.norm(unit), 1, 1, 4)
+    mat = spatial.quat_to_mat(quat)
+    near(mat.T @ mat, np.eye(3), 1)
+    near(np.linalg.det(mat), 1, 1)
+    assert spatial.angular_distance(spatial.mat_to_quat(mat), quat) < 4e-15
+    assert np.linalg.norm(spatial.quat_to_rotvec(quat)) <= np.pi * (1 + 1e-15)
+    near(spatial.quat_to_mat(-quat), mat, 1, 0)
+
+
+@QUICK
+@given(ANY_QUAT)
+def test_exp_undoes_log(quat: np.ndarray) -> None:
+    again = spatial.rotvec_to_quat(spatial.quat_to_rotvec(quat))
+    assert spatial.angular_distance(again, quat) < 4e-15
+
+
+@QUICK
+@given(TURN)
+def test_log_undoes_exp_up_to_whole_turns(rotvec: np.ndarray) -> None:
+    quat = spatial.rotvec_to_quat(rotvec)
+    again = spatial.rotvec_to_quat(spatial.quat_to_rotvec(quat))
+    assert spatial.angular_distance(again, quat) < 4e-15
+    if np.linalg.norm(rotvec) < 3.14:
+        near(spatial.quat_to_rotvec(quat), rotvec, np.linalg.norm(rotvec))
+        near(spatial.log_so3(spatial.exp_so3(rotvec)), rotvec, 3.14)
+
+
+@QUICK
+@given(QUAT, QUAT, QUAT)
+def test_quaternions_are_a_group(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
+    near(
+        spatial.quat_mul(spatial.quat_mul(a, b), c),
+        spatial.quat_mul(a, spatial.quat_mul(b, c)),
+        size(a, b, c),
+    )
+    one = np.array([1.0, 0, 0, 0])
+    assert (spatial.quat_mul(a, one) == a).all()
+    assert (spatial.quat_mul(one, a) == a).all()
+    near(spatial.quat_mul(a, spatial.quat_conj(a)), one * size(a, a), size(a, a))
+    near(
+        spatial.quat_conj(spatial.quat_mul(a, b)),
+        spatial.quat_mul(spatial.quat_conj(b), spatial.quat_conj(a)),
+        size(a, b),
+    )
+
+
+@QUICK
+@given(QUAT, QUAT, VECTOR)
+def test_rotations_by_quaternion_and_matrix_agree(
+    a: np.ndarray, b: np.ndarray, vector: np.ndarray
+) -> None:
+    near(spatial.quat_to_mat(a) @ vector, spatial.quat_rotate(a, vector), size(vector))
+    a, b = spatial.quat_normalize(a), spatial.quat_normalize(b)
+    both = spatial.quat_mul(a, b)
+    near(spatial.quat_to_mat(both), spatial.quat_to_mat(a) @ spatial.quat_to_mat(b), 1)
+    near(
+        spatial.quat_rotate(both, vector),
+        spatial.quat_rotate(a, spatial.quat_rotate(b, vector)),
+        size(vector),
+        24,
+    )
+    near(np.linalg.norm(spatial.quat_rotate(a, vector)), size(vector), size(vector))
+
+
+@QUICK
+@given(QUAT, QUAT, QUAT)
+def test_angular_distance_is_a_metric(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
+    there, back = spatial.angular_distance(a, b), spatial.angular_distance(b, a)
+    near(there, back, there)
+    assert 0 <= there <= np.pi
+    assert spatial.angular_distance(a, -a) == 0
+    assert there <= spatial.angular_distance(a, c) + spatial.angular_distance(c, b) + 1e-14
+    near(np.linalg.norm(spatial.quat_sub(a, b)), there, there)
+    turn = spatial.quat_normalize(c)
+    moved = spatial.angular_distance(spatial.quat_mul(turn, a), spatial.quat_mul(turn, b))
+    near(moved, there, 3.2)
+
+
+@QUICK
+@given(QUAT, QUAT, st.floats(0, 1))
+def test_slerp_goes_at_a_constant_rate(a: np.ndarray, b: np.ndarray, t: float) -> None:
+    whole = spatial.angular_distance(a, b)
+    part = spatial.quat_slerp(a, b, t)
+    near(spatial.angular_distance(a, part), t * whole, 3.2)
+    near(spatial.angular_distance(part, b), (1 - t) * whole, 3.2)
+
+
+@QUICK
+@given(QUAT, VECTOR, st.floats(-1, 1), st.floats(-1, 1))
+def test_integration_adds_up(quat: np.ndarray, angvel: np.ndarray, s: float, t: float) -> None:
+    once = spatial.quat_integrate(quat, angvel, s + t)
+    twice = spatial.quat_integrate(spatial.quat_integrate(quat, angvel, s), angvel, t)
+    scale = 1 + size(angvel)
+    assert spatial.angular_distance(once, twice) < 16 * 2.0**-52 * scale
+
+
+@QUICK
+@given(VECTOR, VECTOR)
+def test_skew_is_the_cross_product(a: np.ndarray, b: np.ndarray) -> None:
+    near(spatial.skew(a) @ b, np.cross(a, b), size(a, b))
+    assert (spatial.unskew(spatial.skew(a)) == a).all()
+
+
+@QUICK
+@given(QUAT, VECTOR, SIX, SIX)
+def test_transforms_preserve_power(
+    quat: np.ndarray, pos: np.ndarray, velocity: np.ndarray, force: np.ndarray
+) -> None:
+    rot = spatial.quat_to_mat(quat)
+    power = (spatial.motion_transform(rot, pos) @ velocity) @ (
+        spatial.force_transform(rot, pos) @ force
+    )
+    near(power, velocity @ force, size(velocity, force) * (1 + size(pos)) ** 2)
+
+
+@QUICK
+@given(QUAT, VECTOR, QUAT, VECTOR)
+def test_transforms_compose_as_poses_do(
+    quat1: np.ndarray, pos1: np.ndarray, quat2: np.ndarray, pos2: np.ndarray
+) -> None:
+    first, second = (spatial.quat_to_mat(quat1), pos1), (spatial.quat_to_mat(quat2), pos2)
+    both = spatial.pose_compose(*first, *second)
+    scale = (1 + size(pos1)) * (1 + size(pos2))
+    for transform in (spatial.motion_transform, spatial.force_transform):
+        near(transform(*both), transform(*first) @ transform(*second), scale)
+    back = spatial.pose_inverse(*first)
+    near(
+        spatial.motion_transform(*back),
+        spatial.force_transform(*first).T,
+        1 + size(pos1),
+    )
+
+
+@QUICK
+@given(SIX, SIX, SIX)
+def test_cross_products_are_dual(v: np.ndarray, m: np.ndarray, f: np.ndarray) -> None:
+    near(spatial.cross_motion(v, m) @ f, -(m @ spatial.cross_force(v, f)), 4 * size(v, m, f))
+    near(spatial.cross_motion(v, m), -spatial.cross_motion(m, v), 4 * size(v, m))
+
+
+@QUICK
+@given(MASS, VECTOR, TENSOR, QUAT, VECTOR, SIX)
+def test_inertia_stays_symmetric_positive_definite(
+    mass: float,
+    com: np.ndarray,
+    tensor: np.ndarray,
+    quat: np.ndarray,
+    pos: np.ndarray,
+    velocity: np.ndarray,
+) -> None:
+    rot = spatial.quat_to_mat(quat)
+    here = spatial.spatial_inertia(mass, com, tensor)
+    there = spatial.transform_spatial_inertia(here, rot, pos)
+    for matrix in (here, there):
+        assert (matrix == matrix.T).all()
+    scale = np.abs(here).max() * (1 + size(pos)) ** 2
+    assert np.linalg.eigvalsh(there).min() > -16 * 2.0**-52 * scale
+    moved = spatial.motion_transform(rot, pos) @ velocity
+    near(
+        moved @ there @ moved,
+        velocity @ here @ velocity,
+        scale * size(velocity) ** 2 * (1 + size(pos)) ** 2,
+    )
+
+
+@QUICK
+@given(MASS, VECTOR, TENSOR, MASS, VECTOR, TENSOR, QUAT)
+def test_composition_of_physical_bodies_is_physical(
+    mass1: float,
+    com1: np.ndarray,
+    tensor1: np.ndarray,
+    mass2: float,
+    com2: np.ndarray,
+    tensor2: np.ndarray,
+    quat: np.ndarray,
+) -> None:
+    parts = [mass1, mass2], np.array([com1, com2]), np.array([tensor1, tensor2])
+    mass, com, inertia = spatial.compose_inertia(*parts)
+    assert (inertia == inertia.T).all()
+    assert spatial.is_physical_inertia(inertia)
+    assert np.linalg.eigvalsh(inertia).min() > 0
+    near(mass, mass1 + mass2, mass)
+    low, high = np.minimum(com1, com2), np.maximum(com1, com2)
+    slack = 4 * 2.0**-52 * np.abs(parts[1]).max()
+    assert ((low - slack <= com) & (com <= high + slack)).all()
+    # Turning the parts turns the whole.
+    rot = spatial.quat_to_mat(quat)
+    _, turned_com, turned = spatial.compose_inertia(
+        parts[0], parts[1] @ rot.T, spatial.rotate_inertia(parts[2], rot)
+    )
+    near(turned_com, rot @ com, np.abs(parts[1]).max(), 32)
+    distance = size(com1 - com2) + 2.0**-50 * np.abs(parts[1]).max()
+    near(turned, spatial.rotate_inertia(inertia, rot), np.abs(inertia).max() + distance**2, 64)
+
+
+@QUICK
+@given(TENSOR, QUAT)
+def test_principal_moments_do_not_depend_on_the_frame(tensor: np.ndarray, quat: np.ndarray) -> None:
+    moments, axes = spatial.principal_axes(tensor)
+    turned, _ = spatial.principal_axes(spatial.rotate_inertia(tensor, spatial.quat_to_mat(quat)))
+    near(turned, moments, moments[2])
+    near(axes * moments @ axes.T, tensor, moments[2])
+    near(spatial.inertia_from_principal(moments, spatial.mat_to_quat(axes)), tensor, moments[2], 32)
+
+
+LEADING = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3)
+
+
+@QUICK
+@given(LEADING, st.integers(0, 2**32 - 1))
+def test_broadcasting_equals_a_loop(shapes: npst.BroadcastableShapes, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    one, two = shapes.input_shapes
+    quat, other = rng.normal(size=(*one, 4)), rng.normal(size=(*two, 4))
+    vector, scalar = rng.normal(size=(*two, 3)) * 4, rng.uniform(0.1, 2, size=two)
+    rot, pos = spatial.quat_to_mat(quat), rng.normal(size=(*two, 3))
+    six, tensor = rng.normal(size=(*two, 6)), spatial.box_inertia(scalar, np.abs(vector))
+    cases = (
+        (spatial.quat_mul, (quat, other), (1, 1)),
+        (spatial.quat_rotate, (quat, vector), (1, 1)),
+        (spatial.quat_sub, (quat, other), (1, 1)),
+        (spatial.angular_distance, (quat, other), (1, 1)),
+        (spatial.quat_slerp, (quat, quat[..., ::-1], scalar), (1, 1, 0)),
+        (spatial.quat_integrate, (quat, vector, scalar), (1, 1, 0)),
+        (spatial.axis_angle_to_quat, (quat[..., 1:], scalar), (1, 0)),
+        (spatial.rotvec_to_quat, (vector,), (1,)),
+        (spatial.quat_to_rotvec, (quat,), (1,)),
+        (spatial.mat_to_quat, (rot,), (2,)),
+        (spatial.quat_to_euler, (quat,), (1,)),
+        (spatial.motion_transform, (rot, pos), (2, 1)),
+        (spatial.force_transform, (rot, pos), (2, 1)),
+        (spatial.cross_motion, (six, six[..., ::-1]), (1, 1)),
+        (spatial.cross_force, (six, six[..., ::-1]), (1, 1)),
+        (spatial.rotate_inertia, (tensor, rot), (2, 2)),
+        (spatial.inertia_from_principal, (vector, quat), (1, 1)),
+        (spatial.parallel_axis, (tensor, scalar, pos), (2, 0, 1)),
+        (spatial.spatial_inertia, (scalar, pos, tensor), (0, 1, 2)),
+        (spatial.is_physical_inertia, (tensor,), (2,)),
+        (spatial.capsule_inertia, (scalar, scalar, scalar), (0, 0, 0)),
+    )
+    for call, arguments, cores in cases:
+        got = call(*arguments)
+        lead = np.broadcast_shapes(
+            *(a.shape[: a.ndim - core] for a, core in zip(arguments, cores, strict=True))
+        )
+        spread = [
+            np.broadcast_to(a, (*lead, *a.shape[a.ndim - core :]))
+            for a, core in zip(arguments, cores, strict=True)
+        ]
+        assert np.shape(got)[: len(lead)] == lead
+        for index in np.ndindex(lead):
+            want = call(*(a[index] for a in spread))
+            np.testing.assert_allclose(
+                got[index], want, rtol=0, atol=1e-15 * (1 + np.abs(want).max())
+            )

@@ -1,0 +1,155 @@
+import high_precision as hp
+import mpmath
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+ONE = mpmath.mpf(1)
+IDENTITY = [mpmath.mpf(i == j) for i in range(3) for j in range(3)]
+
+
+def orthonormality(mat: np.ndarray) -> float:
+    rows = hp.exact(mat)
+    product = hp.matmul(hp.transpose(rows), rows)
+    return max(float(abs(p - i) / hp.ULP) for p, i in zip(product, IDENTITY, strict=True))
+
+
+@pytest.mark.parametrize(
+    "angle", [*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0]
+)
+def test_matrix_of_a_quaternion(angle: float) -> None:
+    for axis in hp.AXES:
+        for size in (1.0, -0.3, 1e-160, 1e-310, 1e300):
+            quat = spatial.axis_angle_to_quat(axis, angle) * size
+            got = spatial.quat_to_mat(quat)
+            assert hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat))) <= 4
+            assert orthonormality(got) <= 5
+
+
+def test_matrix_of_many_quaternions() -> None:
+    rng = np.random.default_rng(5)
+    for quat in rng.normal(size=(300, 4)):
+        got = spatial.quat_to_mat(quat)
+        assert hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat))) <= 4
+        assert orthonormality(got) <= 5
+
+
+def test_matrices_that_doubles_hold_are_exact() -> None:
+    assert spatial.quat_to_mat([-7, 0, 0, 0]).tolist() == np.eye(3).tolist()
+    assert spatial.quat_to_mat([1, 1, 1, 1]).tolist() == [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    assert spatial.quat_to_mat([0, 0, 5e-324, 0]).tolist() == np.diag([-1, 1, -1]).tolist()
+    assert spatial.quat_to_mat([1, 0, 0, 1])[2].tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("angle", [*hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 4.0, 1e-8, 1e-12])
+def test_quaternion_of_a_matrix_at_any_angle(angle: float) -> None:
+    for axis in hp.AXES:
+        mat = spatial.exp_so3(np.array(axis) / np.linalg.norm(axis) * angle)
+        got = spatial.mat_to_quat(mat)
+        want = hp.same_up_to_sign(got, exact_quat(mat))
+        assert hp.ulps_of(ONE, got, want) <= 3
+        assert got[0] >= 0
+
+
+def exact_quat(mat: np.ndarray) -> hp.Vector:
+    """The unit quaternion nearest to a matrix that is a rotation but for rounding.
+
+    Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix", J. Guidance,
+    Control and Dynamics 23 (2000): the eigenvector of the largest eigenvalue.
+    """
+    a, b, c, d, e, f, g, h, i = hp.exact(mat)
+    table = mpmath.matrix(
+        [
+            [a + e + i, h - f, c - g, d - b],
+            [h - f, a - e - i, b + d, c + g],
+            [c - g, b + d, e - a - i, f + h],
+            [d - b, c + g, f + h, i - a - e],
+        ]
+    )
+    _, vectors = mpmath.eigsy(table)
+    return [vectors[k, 3] for k in range(4)]
+
+
+@pytest.mark.parametrize("angle", hp.SMALL_ANGLES)
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_small_rotations_go_through_matrices_whole(axis: tuple[float, ...], angle: float) -> None:
+    rotvec = np.array(axis) / max(map(abs, axis)) * angle
+    got = spatial.log_so3(spatial.exp_so3(rotvec))
+    # A matrix entry of a rotation by 1e-8 is a sum of the small term and its square.
+    large = [k for k in range(3) if abs(rotvec[k]) >= 1e-3 * angle]
+    assert hp.own_ulps(got[large], hp.exact(rotvec[large])) <= 8
+
+
+@pytest.mark.parametrize("angle", [*hp.PLAIN_ANGLES, *hp.NEAR_PI[:5], 1e-5])
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_log_undoes_exp_up_to_pi(axis: tuple[float, ...], angle: float) -> None:
+    rotvec = np.array(axis) / np.linalg.norm(axis) * angle
+    got = spatial.log_so3(spatial.exp_so3(rotvec))
+    want = hp.exact(rotvec)
+    if angle > hp.PI - 1e-14 and got @ rotvec < 0:  # The matrix may be rounded beyond π.
+        want = [-entry for entry in want]
+    assert hp.ulps_of(ONE, got, want) <= 8
+
+
+@pytest.mark.parametrize("angle", [*hp.NEAR_PI, *hp.BEYOND_PI])
+def test_exp_beyond_pi(angle: float) -> None:
+    for axis in hp.AXES:
+        rotvec = np.array(axis) * angle
+        got = spatial.exp_so3(rotvec)
+        assert hp.ulps_of(ONE, got, hp.matrix(hp.exp(hp.exact(rotvec)))) <= 5
+
+
+def test_half_turns_have_one_quaternion_and_one_logarithm() -> None:
+    assert spatial.mat_to_quat(np.diag([-1.0, -1.0, 1.0])).tolist() == [0, 0, 0, 1]
+    assert spatial.log_so3(np.diag([-1.0, 1.0, -1.0])).tolist() == [0, np.pi, 0]
+    half = spatial.quat_to_mat([0, -1, 1, 0])
+    assert spatial.mat_to_quat(half).tolist() == [0, *(np.array([1, -1, 0]) / np.sqrt(2))]
+
+
+def test_matrices_that_are_no_rotations_are_errors() -> None:
+    stretched = np.stack([np.eye(3), np.diag([1, 1.001, 1])])
+    text = r"^mat at index \(1,\) is not a rotation: its columns are not orthonormal to 1e-05$"
+    for call in (spatial.mat_to_quat, spatial.log_so3):
+        with pytest.raises(ValueError, match=text):
+            call(stretched)
+        with pytest.raises(
+            ValueError, match=r"^mat is a reflection, not a rotation: its determinant is -1$"
+        ):
+            call(np.diag([1, 1, -1]))
+    with pytest.raises(ValueError, match="not orthonormal"):
+        spatial.mat_to_quat([[1, 0, 0], [0, 1, 0.01], [0, 0, 1]])
+    with pytest.raises(ValueError, match="not orthonormal"):
+        spatial.mat_to_quat(np.full((3, 3), 1e300))
+    with pytest.raises(ValueError, match="not orthonormal"):
+        spatial.mat_to_quat(np.zeros((3, 3)))
+
+
+def test_single_precision_passes_as_a_rotation() -> None:
+    mat = spatial.exp_so3([0.3, -0.2, 2.8]).astype(np.float32)
+    want = spatial.rotvec_to_quat([0.3, -0.2, 2.8])
+    assert spatial.angular_distance(spatial.mat_to_quat(mat), want) < 3e-7
+
+
+def test_nan_in_a_matrix_stays_in_its_entry() -> None:
+    mats = np.stack([np.eye(3)] * 10)
+    mats[np.arange(9), np.arange(9) // 3, np.arange(9) % 3] = np.nan
+    got = spatial.mat_to_quat(mats)
+    assert np.isnan(got[:9]).all()
+    assert got[9].tolist() == [1, 0, 0, 0]
+    assert np.isnan(spatial.log_so3(mats)[:9]).all()
+
+
+def test_skew_and_back() -> None:
+    vector = np.array([5e-324, -1.7e308, 3.0])
+    mat = spatial.skew(vector)
+    assert (mat == -mat.T).all()
+    assert spatial.unskew(mat).tolist() == vector.tolist()
+    assert (spatial.skew([1, 2, 3]) @ [4, 5, 6]).tolist() == np.cross([1, 2, 3], [4, 5, 6]).tolist()
+    assert not np.signbit(spatial.skew([0, 0, 0])).any()
+
+
+def test_unskew_takes_the_skew_symmetric_part() -> None:
+    symmetric = np.array([[1, 2, 3], [2, 4, 5], [3, 5, 6]])
+    assert spatial.unskew(symmetric).tolist() == [0, 0, 0]
+    assert spatial.unskew(spatial.skew([1, -2, 4]) + symmetric).tolist() == [1, -2, 4]

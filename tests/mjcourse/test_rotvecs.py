@@ -1,0 +1,171 @@
+import high_precision as hp
+import mpmath
+import numpy as np
+import pytest
+
+from mjcourse import spatial
+
+ONE = mpmath.mpf(1)
+ALL_ANGLES = (*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, *hp.BEYOND_PI)
+
+
+def rotvec_of(axis: tuple[float, ...], angle: float) -> np.ndarray:
+    return np.array(axis) / max(map(abs, axis)) * angle
+
+
+@pytest.mark.parametrize("angle", ALL_ANGLES)
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_exp_to_three_ulp_of_one(axis: tuple[float, ...], angle: float) -> None:
+    rotvec = rotvec_of(axis, angle)
+    assert hp.ulps_of(ONE, spatial.rotvec_to_quat(rotvec), hp.exp(hp.exact(rotvec))) <= 3
+
+
+@pytest.mark.parametrize("angle", [*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, hp.PI])
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_exp_to_four_ulp_of_each_component(axis: tuple[float, ...], angle: float) -> None:
+    rotvec = rotvec_of(axis, angle)
+    if hp.length(hp.exact(rotvec)) > mpmath.pi:
+        rotvec = rotvec / 2
+    assert hp.own_ulps(spatial.rotvec_to_quat(rotvec)[1:], hp.exp(hp.exact(rotvec))[1:]) <= 4
+
+
+@pytest.mark.parametrize("angle", [1e16, 1e30, 1e154, 1e200, 1.7e308])
+def test_exp_of_an_absurd_angle_about_one_axis_is_still_right(angle: float) -> None:
+    with mpmath.workdps(400):
+        want = hp.exp(hp.exact([0, angle, 0]))
+    assert hp.ulps_of(ONE, spatial.rotvec_to_quat([0, angle, 0]), want) <= 3
+
+
+def test_exp_of_an_absurd_angle_is_a_rotation() -> None:
+    for rotvec in ([1e300, 1e300, -3e299], [1.7e308] * 3, [1e20, 1e-300, 5e-324]):
+        assert abs(np.linalg.norm(spatial.rotvec_to_quat(rotvec)) - 1) < 1e-15
+
+
+def test_exp_of_nothing_and_of_turns() -> None:
+    assert spatial.rotvec_to_quat([0, 0, 0]).tolist() == [1, 0, 0, 0]
+    assert spatial.rotvec_to_quat([4, 0, 0])[0] < 0
+    assert spatial.rotvec_to_quat([7, 0, 0])[0] < 0
+    assert spatial.rotvec_to_quat([10, 0, 0])[0] > 0
+
+
+@pytest.mark.parametrize("angle", [1e-12, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0])
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_log_to_four_ulp_of_each_component(axis: tuple[float, ...], angle: float) -> None:
+    for size in hp.SIZES:
+        quat = spatial.axis_angle_to_quat(axis, angle) * size
+        assert hp.own_ulps(spatial.quat_to_rotvec(quat), hp.log(hp.exact(quat))) <= 4
+
+
+@pytest.mark.parametrize("angle", hp.SMALL_ANGLES)
+@pytest.mark.parametrize("axis", hp.AXES)
+def test_log_keeps_the_digits_of_the_smallest_angles(axis: tuple[float, ...], angle: float) -> None:
+    rotvec = rotvec_of(axis, angle)
+    quat = spatial.rotvec_to_quat(rotvec)
+    assert hp.own_ulps(spatial.quat_to_rotvec(quat), hp.log(hp.exact(quat))) <= 4
+    if angle > 1e-300:
+        assert hp.own_ulps(spatial.quat_to_rotvec(quat), hp.exact(rotvec)) <= 4
+
+
+def test_log_at_exactly_half_a_turn() -> None:
+    for w in (0.0, -0.0):
+        assert spatial.quat_to_rotvec([w, 0, -2, 0]).tolist() == [0, np.pi, 0]
+        assert spatial.quat_to_rotvec([w, 0, 2, 0]).tolist() == [0, np.pi, 0]
+    got = spatial.quat_to_rotvec([0, -1, 1, 0])
+    assert got[0] > 0 > got[1]
+    assert np.linalg.norm(got) == pytest.approx(np.pi, rel=1e-15)
+
+
+def test_log_takes_the_shorter_way_round() -> None:
+    quat = np.array([np.cos(2.5), np.sin(2.5), 0, 0])
+    assert spatial.quat_to_rotvec(quat)[0] == pytest.approx(5 - 2 * np.pi, rel=1e-15)
+    assert spatial.quat_to_rotvec(-quat)[0] == spatial.quat_to_rotvec(quat)[0]
+    assert not np.signbit(spatial.quat_to_rotvec([-1, 0, 0, 0])).any()
+
+
+@pytest.mark.parametrize("apart", [1e-16, 3e-16, 1e-15, 1e-12, 1e-8, 1e-4, 0.5, 3.0, *hp.NEAR_PI])
+def test_difference_of_rotations_keeps_its_digits(apart: float) -> None:
+    rng = np.random.default_rng(round(apart * 1e3))
+    for size_a, size_b in ((1.0, 1.0), (1.0, 0.7), (3e-310, 1e300), (1e-200, 5.0)):
+        for _ in range(5):
+            axis = rng.normal(size=3)
+            a = spatial.quat_normalize(rng.normal(size=4))
+            turn = spatial.rotvec_to_quat(axis / np.linalg.norm(axis) * apart)
+            b = spatial.quat_mul(a, turn) * size_b
+            a = a * size_a
+            want = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
+            size = hp.length(want)
+            # Below 1e-16 rad the rounding of the quaternions themselves decides.
+            if size < 1e-16:
+                continue
+            assert hp.ulps_of(size, spatial.quat_sub(b, a), want) <= 4
+            assert hp.ulps_of(size, [spatial.angular_distance(a, b)], [size]) <= 4
+
+
+def test_distance_of_one_bit() -> None:
+    quat = np.array([0.5, 0.5, 0.5, 0.5])
+    other = quat.copy()
+    other[2] = np.nextafter(0.5, 1)
+    want = hp.length(hp.log(hp.mul(hp.conj(hp.exact(quat)), hp.exact(other))))
+    assert hp.own_ulps(spatial.angular_distance(quat, other), [want]) <= 4
+    assert 1e-16 < want < 2e-16
+
+
+def test_distance_of_equal_and_opposite_rotations() -> None:
+    rng = np.random.default_rng(1)
+    quats = rng.normal(size=(50, 4))
+    assert (spatial.angular_distance(quats, quats) == 0).all()
+    assert (spatial.angular_distance(quats, -4 * quats) == 0).all()
+    assert (spatial.quat_sub(quats, -quats) == 0).all()
+    assert spatial.angular_distance([1, 0, 0, 0], [0, 0, 0, 1e-310]) == np.pi
+    assert spatial.angular_distance([1, 0, 0, 0], [1, 1e-300, 0, 0]) == 2e-300
+    assert isinstance(spatial.angular_distance([1, 0, 0, 0], [1, 0, 0, 0]), float)
+
+
+@pytest.mark.parametrize("t", [0.0, 1e-300, 1e-9, 0.25, 0.5, 1.0 - 1e-16, 1.0])
+@pytest.mark.parametrize("apart", [1e-300, 1e-12, 0.3, 2.0, 3.1, hp.PI - 1e-9])
+def test_slerp_to_four_ulp(apart: float, t: float) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        axis = rng.normal(size=3)
+        a = rng.normal(size=4)
+        b = spatial.quat_integrate(a, axis / np.linalg.norm(axis), apart) * -3.0
+        rotvec = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
+        want = hp.mul(hp.unit(hp.exact(a)), hp.exp([mpmath.mpf(t) * entry for entry in rotvec]))
+        assert hp.ulps_of(ONE, spatial.quat_slerp(a, b, t), want) <= 4
+
+
+def test_slerp_at_its_ends_and_beyond() -> None:
+    a, b = spatial.rotvec_to_quat([0, 0, 0.3]), spatial.rotvec_to_quat([0, 0, 0.5])
+    assert (spatial.quat_slerp(a, b, 0) == spatial.quat_normalize(a)).all()
+    got = spatial.quat_to_rotvec(spatial.quat_slerp(a, b, [-1.0, 0.5, 1.0, 2.0]))
+    np.testing.assert_allclose(got[:, 2], [0.1, 0.4, 0.5, 0.7], rtol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [1e-300, 1e-12, 1e-3, 1.0, 3.0, hp.PI])
+def test_integrate_to_four_ulp(angle: float) -> None:
+    rng = np.random.default_rng(3)
+    for dt in (1.0, -0.25, 1e-3, 1e150):
+        for _ in range(4):
+            quat, axis = rng.normal(size=4), rng.normal(size=3)
+            angvel = axis / np.linalg.norm(axis) * (angle / abs(dt))
+            turn = [mpmath.mpf(dt) * entry for entry in hp.exact(angvel)]
+            want = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
+            assert hp.ulps_of(ONE, spatial.quat_integrate(quat, angvel, dt), want) <= 4
+
+
+def test_integrate_does_not_drift_in_length() -> None:
+    quat = np.array([1.0, 0.0, 0.0, 0.0])
+    for _ in range(5000):
+        quat = spatial.quat_integrate(quat, [1.0, 2.0, -3.0], 0.01)
+    assert abs(np.linalg.norm(quat) - 1) < 4e-16
+    want = spatial.rotvec_to_quat([50.0, 100.0, -150.0])
+    assert spatial.angular_distance(quat, want) < 1e-13
+
+
+def test_nan_in_a_rotation_vector_stays_in_its_entry() -> None:
+    got = spatial.rotvec_to_quat([[0, np.nan, 0], [0, 0, 0], [np.inf, 0, 0], [7, 0, 0]])
+    assert np.isnan(got[[0, 2]]).all()
+    assert np.isfinite(got[[1, 3]]).all()
+    slid = spatial.quat_slerp([1, 0, 0, 0], [0, 1, 0, 0], [np.nan, 0.5])
+    assert np.isnan(slid[0]).all()
+    assert np.isfinite(slid[1]).all()
