@@ -24,13 +24,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the arguments name; gives the exit status."""
     _utf8_streams()
     options = _parser().parse_args(arguments)
+    from coursebuild.effects.errors import EffectError, PublishRefusedError
     from coursebuild.pipeline.options import UsageError
 
     try:
         command: Callable[[argparse.Namespace], int] = options.command
         return command(options)
     except UsageError as error:
-        return _usage(str(error))
+        return _fail(USAGE, str(error))
+    except PublishRefusedError as error:
+        return _fail(USAGE, error.message, error.help)
+    except EffectError as error:
+        return _fail(WRONG, error.message, error.help)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -40,9 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return WRONG
 
 
-def _usage(message: str) -> int:
+def _fail(status: int, message: str, help: str = "") -> int:
     print(f"coursebuild: {message}", file=sys.stderr)
-    return USAGE
+    if help:
+        print(f"  help: {help}", file=sys.stderr)
+    return status
 
 
 def _utf8_streams() -> None:
@@ -164,10 +171,10 @@ def _port(text: str) -> int:
 
 
 def _options(arguments: argparse.Namespace) -> Options:
-    from coursebuild.pipeline.options import Options, find_root
+    from coursebuild.pipeline.options import Options, find_course
 
     jobs = getattr(arguments, "jobs", None) or available_cores()
-    return Options(find_root(arguments.root), jobs, arguments.quiet)
+    return Options(find_course(arguments.root), jobs, arguments.quiet)
 
 
 def available_cores() -> int:
@@ -217,7 +224,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 def _schema(arguments: argparse.Namespace) -> int:
     from coursebuild.syntax.schemas import json_schema
 
-    sys.stdout.write(json_schema(arguments.name))
+    sys.stdout.write(json_schema(arguments.name).decode())
     return CLEAN
 
 

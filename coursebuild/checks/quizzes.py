@@ -5,10 +5,11 @@ Entry point: `check_quizzes(course)`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Course, OutputQuestion, Quiz, Script, document_blocks
+from coursebuild.results import Outcome, ScriptRun
 
 
 def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
@@ -52,3 +53,21 @@ def _output_questions(quiz: Quiz, scripts: dict[str, Script]) -> Iterator[Diagno
                 question.script_span,
                 f"`{question.script}` is marked `norun`, so it has no output",
             )
+
+
+def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:
+    """`output` questions about a line that the script, run to its end, did not print."""
+    printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
+    found: list[Diagnostic] = []
+    for document in course.documents:
+        for quiz in document_blocks(document):
+            if not isinstance(quiz, Quiz):
+                continue
+            for question in quiz.questions:
+                if not isinstance(question, OutputQuestion) or question.script not in printed:
+                    continue
+                count = len(printed[question.script].rstrip().split("\n"))
+                if question.line > count:
+                    message = f"`{question.script}` has no line {question.line}: it prints {count}"
+                    found.append(diagnose("quiz-output", question.line_span, message))
+    return tuple(found)

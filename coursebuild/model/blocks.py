@@ -160,6 +160,8 @@ class Script:
     """Modules without which the script is skipped."""
     args: tuple[str, ...]
     norun: bool
+    body_span: Span
+    """The lines between the fences, to the start of the closing one."""
 
 
 class Mode(enum.Enum):

@@ -128,16 +128,17 @@ class Lab:
     seed: int | None
     verify_seconds: float | None
     verify_rtol: float | None
+    trail_span: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class LabCamera:
-    """MuJoCo's free camera: degrees and metres."""
+    """MuJoCo's free camera: degrees and metres; `None` is the engine's default for the model."""
 
-    azimuth: float
-    elevation: float
-    distance: float
-    target: tuple[float, float, float]
+    azimuth: float | None
+    elevation: float | None
+    distance: float | None
+    target: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, slots=True)

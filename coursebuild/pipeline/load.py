@@ -2,23 +2,24 @@
 
 Entry point: `load(root)`.
 
-1. Read and parse `content/course.toml`. Where it is broken the lessons are parsed all the same, so
-   that all mistakes are told.
-2. Read each lesson and page that the map names; compare with what lies in the folders.
-3. Read `models/` and list the other files that pages may use.
+1. Read everything (`effects.read`), parse `content/course.toml`. Where the map is broken the
+   lessons are parsed all the same, so that all mistakes are told in one run.
+2. Attach its document to each lesson and page; compare what the map names with what is there.
+3. Check the course as a whole.
 """
 
 from __future__ import annotations
 
 import posixpath
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from coursebuild.checks import check_course
 from coursebuild.diagnostics import Diagnostic, diagnose, nearest
-from coursebuild.effects.read import list_course, read_source
+from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
-from coursebuild.model import Course, Document, Lesson, Level, MjcfModel, Page, Status
+from coursebuild.model import Course, Document, Lesson, Level, Page, Status
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
 from coursebuild.syntax.document import parse_document
@@ -37,116 +38,116 @@ class Loaded:
 
 def load(root: Path) -> Loaded:
     """Read and parse everything below `root`."""
-    return _Loader(root).load()
+    read = read_course(root)
+    loader = _Loader(root, read.value, list(read.diagnostics))
+    course = loader.course()
+    return Loaded(course, tuple(loader.found))
 
 
 class _Loader:
-    """The state of one loading: what was read and what was found wrong."""
+    """The state of one loading: what was read, and what was found wrong."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, files: CourseFiles, found: list[Diagnostic]) -> None:
         self.root = root
-        self.found: list[Diagnostic] = []
+        self.files = files
+        self.found = found
+        self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
 
-    def load(self) -> Loaded:
-        listing = list_course(self.root)
-        if MAP not in listing.others:
-            span = Source(MAP, "").span()
-            help = "a course is a folder with content/course.toml; name it with -C DIR"
-            self.found.append(diagnose("map-missing", span, f"there is no {MAP}", help=help))
-            return Loaded(None, tuple(self.found))
+    def course(self) -> Course | None:
+        """The whole course, or `None` where there is no usable map."""
         course = self._map()
         if course is None:
-            for path in listing.lessons:
-                self._document(path, lesson=True)
-            return Loaded(None, tuple(self.found))
+            if self.files.map is not None:
+                for source in self.files.lessons:
+                    self._document(source, lesson=True)
+            return None
         self.callouts = frozenset(kind.name for kind in course.callouts)
-        lessons = frozenset(listing.lessons)
-        levels = tuple(self._level(level, lessons) for level in course.levels)
-        self._unlisted(course, listing.lessons)
-        pages = tuple(self._page(page) for page in course.pages)
-        models = tuple(self._models(listing.models))
-        mapped = {MAP, *lessons, *(page.path for page in pages)}
-        files = tuple(path for path in listing.others if path not in mapped)
-        course = replace(course, levels=levels, pages=pages, models=models, files=files)
+        levels = tuple(self._level(level) for level in course.levels)
+        self._unlisted(course)
+        pages = self._pages(course.pages)
+        course = replace(
+            course, levels=levels, pages=pages, models=self.files.models, files=self._others(course)
+        )
         self.found += check_course(course)
         self.found += _check_engine(course)
-        return Loaded(course, tuple(self.found))
-
-    def _read(self, path: str) -> Source | None:
-        parsed = read_source(self.root, path)
-        self.found += parsed.diagnostics
-        return parsed.value
+        return course
 
     def _map(self) -> Course | None:
-        source = self._read(MAP)
-        if source is None:
+        if self.files.map is None:
             return None
-        parsed = parse_course_map(source)
+        parsed = parse_course_map(self.files.map)
         self.found += parsed.diagnostics
         return parsed.value
 
-    def _document(self, path: str, *, lesson: bool) -> Document | None:
-        source = self._read(path)
-        if source is None:
-            return None
+    def _document(self, source: Source, *, lesson: bool) -> Document:
         parsed = parse_document(source, self.callouts, lesson=lesson)
         self.found += parsed.diagnostics
         return parsed.value
 
-    def _level(self, level: Level, present: frozenset[str]) -> Level:
-        return replace(level, lessons=tuple(self._lesson(x, present) for x in level.lessons))
+    def _level(self, level: Level) -> Level:
+        return replace(level, lessons=tuple(self._lesson(lesson) for lesson in level.lessons))
 
-    def _lesson(self, lesson: Lesson, present: frozenset[str]) -> Lesson:
+    def _lesson(self, lesson: Lesson) -> Lesson:
+        source = self.sources.get(lesson.path)
         if lesson.status is Status.PLANNED:
-            if lesson.path in present:
+            if source is not None:
                 message = f"lesson {lesson.id} is planned, and there is a file {lesson.path}"
-                help = 'say `status = "draft"` or `"complete"`'
-                self.found.append(diagnose("lesson-planned-file", lesson.span, message, help=help))
+                help = 'say `status = "draft"` or `"complete"`, or move the file away'
+                self._report("lesson-planned-file", lesson, message, help)
             return lesson
-        if lesson.path not in present:
-            near = nearest(lesson.path, present)
+        if source is not None:
+            return replace(lesson, document=self._document(source, lesson=True))
+        if lesson.path not in self.files.unreadable:
+            near = nearest(lesson.path, self._unnamed_files())
             help = f"is it `{near}`?" if near else 'write it, or say `status = "planned"`'
-            message = f"there is no file {lesson.path}"
-            self.found.append(diagnose("lesson-missing", lesson.span, message, help=help))
-            return lesson
-        return replace(lesson, document=self._document(lesson.path, lesson=True))
+            self._report("lesson-missing", lesson, f"there is no file {lesson.path}", help)
+        return lesson
 
-    def _unlisted(self, course: Course, present: tuple[str, ...]) -> None:
+    def _report(self, rule: str, entry: Lesson | Page, message: str, help: str) -> None:
+        self.found.append(diagnose(rule, entry.span.first_line(), message, help=help))
+
+    def _unnamed_files(self) -> list[str]:
+        return [source.path for source in self.files.lessons]
+
+    def _unlisted(self, course: Course) -> None:
         named = {lesson.path for lesson in course.lessons}
-        wanted = {
-            x.path
-            for x in course.lessons
-            if x.path not in present and x.status is not Status.PLANNED
-        }
-        for path in present:
-            if path in named:
+        present = {source.path for source in self.files.lessons}
+        written = (lesson for lesson in course.lessons if lesson.status is not Status.PLANNED)
+        wanted = {lesson.path for lesson in written} - present
+        for source in self.files.lessons:
+            if source.path in named:
                 continue
-            near = nearest(path, wanted)
-            help = (
-                f"rename it to `{posixpath.basename(near)}`"
-                if near
-                else f"add a [[level.lesson]] to {MAP}, or move the file away"
-            )
-            span = Source(path, "").span()
-            self.found.append(
-                diagnose("lesson-unlisted", span, f"the course map does not name {path}", help=help)
-            )
-            self._document(path, lesson=True)
+            near = nearest(source.path, wanted)
+            help = f"add a [[level.lesson]] to {MAP}, or move the file away"
+            if near is not None:
+                help = f"is it `{posixpath.basename(near)}`, which the map names?"
+            message = f"the course map does not name {source.path}"
+            self.found.append(diagnose("lesson-unlisted", source.span(0, 0), message, help=help))
+            self._document(source, lesson=True)
+
+    def _pages(self, pages: tuple[Page, ...]) -> tuple[Page, ...]:
+        return tuple(self._page(page) for page in pages)
 
     def _page(self, page: Page) -> Page:
-        if not (self.root / page.path).is_file():
-            self.found.append(diagnose("page-missing", page.span, f"there is no file {page.path}"))
+        source = self.sources.get(page.path)
+        if source is None and page.path not in self.files.unreadable:
+            if not (self.root / page.path).exists():
+                message = f"there is no file {page.path}"
+                help = "write it, or take the page out of the map"
+                self._report("page-missing", page, message, help)
+                return page
+            read = read_sources(self.root, [page.path])
+            self.found += read.diagnostics
+            source = next(iter(read.value), None)
+        if source is None:
             return page
-        return replace(page, document=self._document(page.path, lesson=False))
+        return replace(page, document=self._document(source, lesson=False))
 
-    def _models(self, paths: tuple[str, ...]) -> list[MjcfModel]:
-        models = []
-        for path in paths:
-            source = self._read(path)
-            if source is not None:
-                models.append(MjcfModel(path.removeprefix("models/").removesuffix(".xml"), source))
-        return models
+    def _others(self, course: Course) -> tuple[str, ...]:
+        """The files that a page may show or link to: all but the map, the lessons and the pages."""
+        taken = {MAP, *self.sources, *(page.path for page in course.pages)}
+        return tuple(path for path in self.files.files if path not in taken)
 
 
 def _check_engine(course: Course) -> list[Diagnostic]:

@@ -1,6 +1,6 @@
 """What every command needs to know, and the wrong usage that is no mistake of the course.
 
-Entry points: `Options`, `find_root(directory)`, `select(course, names)`.
+Entry points: `Options`, `find_course(directory)`, `select`.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.diagnostics import did_you_mean
-from coursebuild.model import Course, Lesson
-
-MARKER = Path("content") / "course.toml"
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.read import find_root
+from coursebuild.model import Course, Lesson, Status
 
 
 class UsageError(Exception):
@@ -29,31 +29,35 @@ class Options:
     quiet: bool
 
 
-def find_root(directory: str | None) -> Path:
+def find_course(directory: str | None) -> Path:
     """The course's folder: the one named, or the nearest above that holds `content/course.toml`.
 
     A named folder without a map is taken all the same: that the map is missing is then a mistake of
     the course.
     """
-    if directory is not None:
-        root = Path(directory)
-        if not root.is_dir():
-            raise UsageError(f"-C {directory}: there is no such folder")
-        return root.resolve()
-    here = Path.cwd()
-    for folder in (here, *here.parents):
-        if (folder / MARKER).is_file():
-            return folder.resolve()
-    return here.resolve()
+    try:
+        return find_root(None if directory is None else Path(directory), Path.cwd())
+    except EffectError as error:
+        raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
 
 
-def select(course: Course, names: tuple[str, ...]) -> tuple[Lesson, ...]:
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The lessons that a command is about."""
+
+    lessons: tuple[Lesson, ...]
+    documents: frozenset[str] | None
+    """Paths of their files; `None`: everything, pages included."""
+
+
+def select(course: Course, names: tuple[str, ...]) -> Selection:
     """The lessons that the names mean (id, slug, `id-slug`, or path); all where there are none.
 
-    Raises `UsageError` for a name that means no lesson.
+    Raises `UsageError` for a name that means no lesson, or one that is not written yet.
     """
     if not names:
-        return course.lessons
+        written = tuple(lesson for lesson in course.lessons if lesson.document is not None)
+        return Selection(written, None)
     by_name: dict[str, Lesson] = {}
     for lesson in course.lessons:
         file = f"{lesson.id}-{lesson.slug}"
@@ -63,9 +67,11 @@ def select(course: Course, names: tuple[str, ...]) -> tuple[Lesson, ...]:
     for name in names:
         found = by_name.get(name) or by_name.get(Path(name).name)
         if found is None:
-            help = did_you_mean(
-                name, [lesson.id for lesson in course.lessons] + [x.slug for x in course.lessons]
-            )
+            slugs = [lesson.slug for lesson in course.lessons]
+            help = did_you_mean(name, [lesson.id for lesson in course.lessons] + slugs)
             raise UsageError(f"no lesson is called `{name}`" + (f"; {help}" if help else ""))
+        if found.status is Status.PLANNED:
+            raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
         chosen[found.id] = found
-    return tuple(lesson for lesson in course.lessons if lesson.id in chosen)
+    lessons = tuple(lesson for lesson in course.lessons if lesson.id in chosen)
+    return Selection(lessons, frozenset(lesson.path for lesson in lessons))

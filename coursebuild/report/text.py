@@ -40,6 +40,8 @@ def to_text(report: Report, style: Style) -> str:
     parts = [diagnostic_text(d, style) + "\n" for d in report.diagnostics]
     if report.scripts:
         parts.append("".join(script_line(line, style) + "\n" for line in report.scripts))
+    if report.remarks:
+        parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
     colour = _GREEN if report.ok else _RED
     parts.append(style.paint(summary_line(report), colour) + "\n")
     return "\n".join(parts)
@@ -100,6 +102,11 @@ def _remark(kind: str, message: str, pad: str, style: Style) -> list[str]:
 def visible(text: str) -> str:
     """Text with control characters shown as symbols, so that it cannot change the terminal."""
     return "".join(_cell(ch) for ch in text)
+
+
+def visible_lines(text: str) -> str:
+    """The same for a text of several lines."""
+    return "\n".join(visible(line) for line in text.split("\n"))
 
 
 def _cell(ch: str) -> str:

@@ -46,6 +46,8 @@ class Report:
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
     summary: Summary
+    remarks: tuple[str, ...] = ()
+    """What was done, a line each, such as the files written."""
 
     @property
     def ok(self) -> bool:

@@ -1,0 +1,128 @@
+"""One writer at a time: locks that vanish with the process that holds them.
+
+Entry points: `project_lock`, held by a command that writes into a course; `try_lock` and
+`is_abandoned`, by which a temporary file or folder shows whether whoever made it is alive.
+
+A lock is an flock, so that killing its holder frees it at once and nothing can be stale. Where a
+file system knows no locks, or the project cannot be written, the work goes on alone: every write of
+the tool is whole by itself, the lock only keeps two runs from doing the same work twice.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system
+    fcntl = None  # type: ignore[assignment]
+
+_BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
+_LONG_AGO = 3600.0
+"""Seconds after which a temporary file is abandoned where there are no locks."""
+_held: dict[Path, int] = {}
+"""Lock files that this process holds, and the thread that took them."""
+
+
+def try_lock(fd: int) -> bool | None:
+    """Lock an open file or folder if nobody else has; `None` where there are no locks."""
+    if fcntl is None:
+        return None
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return False if error.errno in _BUSY else None
+    return True
+
+
+def is_abandoned(fd: int) -> bool:
+    """Whether a temporary file or folder has lost its writer, who would hold it locked."""
+    locked = try_lock(fd)
+    if locked is None:
+        return time.time() - os.fstat(fd).st_mtime > _LONG_AGO
+    return locked
+
+
+@contextlib.contextmanager
+def project_lock(root: Path, on_wait: Callable[[str], None] | None = None) -> Iterator[None]:
+    """Hold the lock of a course folder.
+
+    Args:
+        root: the course folder; the lock is `.coursebuild/lock` in it.
+        on_wait: is called once with a message, in the case that another run has the lock.
+
+    Raises:
+        RuntimeError: this thread holds it already and would wait for itself.
+    """
+    path = root.resolve() / ".coursebuild" / "lock"
+    if _held.get(path) == threading.get_ident():
+        raise RuntimeError(f"{path} is already locked by this thread")
+    fd = _take(path, on_wait)
+    if fd is None:
+        yield
+        return
+    _held[path] = threading.get_ident()
+    try:
+        yield
+    finally:
+        _held.pop(path, None)
+        os.close(fd)
+
+
+def _take(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
+    """The locked file; `None` where there can be no lock."""
+    said = False
+    while True:
+        try:
+            make_private_folder(path.parent)
+            fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError:
+            return None
+        try:
+            locked = try_lock(fd)
+            if locked is False:
+                if on_wait is not None and not said:
+                    on_wait(_waiting(fd))
+                    said = True
+                fcntl.flock(fd, fcntl.LOCK_EX)
+            elif locked is None:
+                os.close(fd)
+                return None
+            if _is_at(fd, path):
+                os.ftruncate(fd, 0)
+                os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
+                return fd
+        except OSError:
+            os.close(fd)
+            return None
+        except BaseException:
+            os.close(fd)
+            raise
+        os.close(fd)  # somebody deleted .coursebuild while we waited
+
+
+def make_private_folder(folder: Path) -> None:
+    """Make the tool's own folder in a course, which git ignores whatever the course says."""
+    folder.mkdir(exist_ok=True)
+    ignore = folder / ".gitignore"
+    if not ignore.exists():
+        ignore.write_bytes(b"*\n")
+
+
+def _waiting(fd: int) -> str:
+    holder = os.pread(fd, 32, 0).decode("ascii", "replace").strip()
+    who = f" (process {holder})" if holder.isdigit() else ""
+    return f"another coursebuild{who} is at work on this course; waiting for it"
+
+
+def _is_at(fd: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(fd), path.stat())
+    except OSError:
+        return False

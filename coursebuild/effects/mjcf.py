@@ -1,0 +1,258 @@
+"""Compiling MJCF with MuJoCo itself, in a child process.
+
+Entry points: `compile_models`, `compile_texts`, and `readable_error` for what is shown to people.
+
+1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
+2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
+3. The messages are MuJoCo's own and whole, but for the paths of this machine; the line is taken out
+   of them where it is one of the compiled text, and not of a file that it includes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from coursebuild.effects import mjcf_worker
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.runner import clean_environment
+from coursebuild.model import MjcfModel
+from coursebuild.results import CompileResult, ModelFacts
+
+TIMEOUT = 60.0
+"""Seconds that one model may take; large meshes take some."""
+_TEXT_NAME = ".coursebuild-text.xml"
+"""What a text would be called in `models/`; no file has this name."""
+
+
+def compile_models(
+    root: Path, models: Sequence[MjcfModel], *, timeout: float = TIMEOUT
+) -> tuple[CompileResult, ...]:
+    """Compile models of the course, in their order.
+
+    Raises:
+        EffectError: MuJoCo cannot be loaded.
+    """
+    root = root.resolve()
+    jobs = [(root / model.source.path, model.source.text, True) for model in models]
+    return _compile(root, jobs, timeout)
+
+
+def compile_texts(
+    root: Path, texts: Sequence[str], *, timeout: float = TIMEOUT
+) -> tuple[CompileResult, ...]:
+    """Compile MJCF texts as if they stood in `models/`; their facts list no includes.
+
+    Raises:
+        EffectError: MuJoCo cannot be loaded.
+    """
+    root = root.resolve()
+    jobs = [(root / "models" / _TEXT_NAME, text, False) for text in texts]
+    return _compile(root, jobs, timeout)
+
+
+def _compile(
+    root: Path, jobs: Sequence[tuple[Path, str, bool]], timeout: float
+) -> tuple[CompileResult, ...]:
+    if not jobs:
+        return ()
+    with _Compiler(root, timeout) as compiler:
+        return tuple(compiler.compile(*job) for job in jobs)
+
+
+class _Compiler:
+    """The child, started when it is needed and again when it died."""
+
+    def __init__(self, root: Path, timeout: float) -> None:
+        self.root = root
+        self.timeout = timeout
+        self.folder = tempfile.TemporaryDirectory(prefix="coursebuild-mjcf-")
+        self.process: subprocess.Popen[bytes] | None = None
+        self.buffer = b""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+        self.folder.cleanup()
+
+    def compile(self, path: Path, text: str, on_disk: bool) -> CompileResult:
+        process = self.process or self._start()
+        request: mjcf_worker.Request = {
+            "path": str(path),
+            "text": text,
+            "limit": self.timeout,
+            "on_disk": on_disk,
+        }
+        assert process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()
+        # The child stops itself; the margin is for one that cannot.
+        line = self._read_line(self.timeout + 10.0)
+        if line is None:
+            return CompileResult(f"MuJoCo's compiler {self._death()}")
+        reply: mjcf_worker.Reply = json.loads(line)
+        facts = reply["facts"]
+        if facts is not None:
+            return CompileResult("", facts=self._facts(facts))
+        message = self._without_paths(reply["error"].strip())
+        return CompileResult(message, error_line(message, text))
+
+    def stop(self) -> None:
+        """End the child, whatever it does."""
+        process, self.process, self.buffer = self.process, None, b""
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with tempfile.TemporaryFile() as errors:
+            self.process = process = subprocess.Popen(
+                [sys.executable, "-E", "-P", mjcf_worker.__file__],
+                cwd=self.folder.name,
+                env=clean_environment(os.environ),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,
+            )
+            if self._read_line(120.0) != b"ready":
+                self.stop()
+                errors.seek(0)
+                said = errors.read().decode("utf-8", "replace").strip().splitlines()
+                raise EffectError(
+                    f"MuJoCo cannot be loaded: {said[-1] if said else 'the import crashed'}"
+                )
+        return process
+
+    def _read_line(self, seconds: float) -> bytes | None:
+        """The next line of the child; `None` if it died, or said nothing for so long."""
+        assert self.process is not None and self.process.stdout is not None
+        until = time.monotonic() + seconds
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            while b"\n" not in self.buffer:
+                if not selector.select(max(0.0, until - time.monotonic())):
+                    return None
+                data = os.read(self.process.stdout.fileno(), 1 << 16)
+                if not data:
+                    return None
+                self.buffer += data
+        line, _, self.buffer = self.buffer.partition(b"\n")
+        return line
+
+    def _death(self) -> str:
+        """What ended the child."""
+        assert self.process is not None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.wait(1.0)
+        status = self.process.returncode
+        self.stop()
+        if status is None or status == -signal.SIGALRM:
+            return f"took longer than {self.timeout:g} s"
+        if status < 0:
+            return f"crashed ({signal.Signals(-status).name})"
+        return f"ended with status {status}"
+
+    def _without_paths(self, message: str) -> str:
+        """The message as it would be on any machine."""
+        message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
+        return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
+
+    def _facts(self, facts: mjcf_worker.Facts) -> ModelFacts:
+        root = os.path.realpath(self.root)
+        includes = sorted({Path(os.path.realpath(f)) for f in facts["files"]})
+        return ModelFacts(
+            bodies=facts["bodies"],
+            geoms=facts["geoms"],
+            joints=facts["joints"],
+            nq=facts["nq"],
+            nv=facts["nv"],
+            nu=facts["nu"],
+            timestep=facts["timestep"],
+            integrator=facts["integrator"],
+            total_mass=facts["total_mass"],
+            keyframes=tuple(facts["keyframes"]),
+            sites=tuple(facts["sites"]),
+            body_names=tuple(facts["body_names"]),
+            includes=tuple(
+                f.relative_to(root).as_posix() if f.is_relative_to(root) else f.as_posix()
+                for f in includes
+            ),
+        )
+
+
+_LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)
+_NAMED = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
+
+
+def error_line(message: str, text: str) -> int | None:
+    """The line of `text`, from 1, that a message of MuJoCo's speaks of; `None` if of none.
+
+    MuJoCo gives line 0 for what comes from an included file. It gives no hint for what comes from
+    an attached model: there the line counts only if the name of the element stands on it or below
+    it.
+    """
+    numbers = [int(a or b) for a, b in _LINE.findall(message)]
+    lines = text.splitlines()
+    # A message about an inner file is quoted before the place of the element that pulls it in.
+    if not numbers or not 1 <= numbers[-1] <= max(len(lines), 1):
+        return None
+    line = numbers[-1]
+    named = _NAMED.search(message)
+    if named and "<attach" in text:
+        name = named.group(1)
+        if not name or name not in "\n".join(lines[line - 1 : line + 3]):
+            return None
+    return line
+
+
+_NOISE = re.compile(r"^(?:XML Error|Error|ParseXML)\s*[:=]\s*")
+_PLACE = re.compile(r"\n?Element name '([^']*)', id -?\d+(?:, line \d+)?\s*$")
+_ELEMENT = re.compile(r"\n?Element '([^']*)', line \d+\s*")
+_CAPITAL = re.compile(r"^[A-Z](?=[a-z]*\b)")
+_PARSER = re.compile(
+    r"XML parse error \d+:\s*Error=(?:XML_)?(?:ERROR_)?(\w+) ErrorID=\d+ \(0x[0-9a-f]+\)"
+    r" Line number=\d+(?:: )?(?:XMLElement name=(\S+))?"
+)
+
+
+def readable_error(error: str) -> str:
+    """A message of MuJoCo's as one line in our style: no prefixes, no line numbers."""
+    text = _PARSER.sub(_parser_words, error)
+    while (shorter := _NOISE.sub("", text)) != text:
+        text = shorter
+    text = _PLACE.sub(lambda m: f" (element `{m.group(1)}`)" if m.group(1) else "", text)
+    text = _ELEMENT.sub(lambda m: f" in <{m.group(1)}> ", text)
+    text = " ".join(text.split()).rstrip(". ")
+    return _CAPITAL.sub(lambda m: m.group().lower(), text)
+
+
+def _parser_words(match: re.Match[str]) -> str:
+    kind = match.group(1).removeprefix("PARSING_").replace("_", " ").lower()
+    where = f" <{match.group(2)}>" if match.group(2) else ""
+    return f"not well-formed XML ({kind}{where})"

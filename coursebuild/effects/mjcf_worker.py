@@ -1,0 +1,124 @@
+"""The child process that compiles MJCF for `mjcf`: a crash or a hang takes nothing else along.
+
+Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
+
+The protocol: JSON lines. First this process says that it is ready; then, for each `Request` on
+standard input, it writes one `Reply`. A request that takes longer than its limit ends this process
+by SIGALRM.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from typing import Any, TypedDict
+
+_MEMORY = 8 << 30
+"""Bytes of address space: a model that asks for more fails, and the machine does not."""
+_INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
+"""In the order of mjtIntegrator, by their names in MJCF."""
+
+
+class Request(TypedDict):
+    """What to compile."""
+
+    path: str
+    """Where the text stands, or would: includes and assets are relative to it."""
+    text: str
+    limit: float
+    """Seconds."""
+    on_disk: bool
+    """Whether there is a file at the path, so that its dependencies can be listed."""
+
+
+class Facts(TypedDict):
+    """What a compiled model holds; see `results.ModelFacts`."""
+
+    bodies: int
+    geoms: int
+    joints: int
+    nq: int
+    nv: int
+    nu: int
+    timestep: float
+    integrator: str
+    total_mass: float
+    keyframes: list[str]
+    sites: list[str]
+    body_names: list[str]
+    files: list[str]
+    """Absolute paths of the other files that it consists of."""
+
+
+class Reply(TypedDict):
+    """What became of it: a message, or facts."""
+
+    error: str
+    facts: Facts | None
+
+
+def main() -> None:
+    """Serve until the input closes."""
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)  # MuJoCo prints its warnings
+    _limit_memory()
+    import mujoco
+
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    print("ready", file=replies, flush=True)
+    for line in sys.stdin:
+        request: Request = json.loads(line)
+        signal.setitimer(signal.ITIMER_REAL, request["limit"])
+        reply = _compile(mujoco, request)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        print(json.dumps(reply), file=replies, flush=True)
+
+
+def _limit_memory() -> None:
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    limit = _MEMORY if hard == resource.RLIM_INFINITY else min(_MEMORY, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _compile(mujoco: Any, request: Request) -> Reply:
+    path = request["path"]
+    try:
+        model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
+    except (ValueError, mujoco.FatalError, MemoryError) as error:
+        return {"error": str(error) or type(error).__name__, "facts": None}
+    return {"error": "", "facts": _facts(mujoco, model, path if request["on_disk"] else None)}
+
+
+def _facts(mujoco: Any, model: Any, path: str | None) -> Facts:
+    def names(addresses: Any) -> list[str]:
+        blob: bytes = model.names
+        return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]
+
+    files: list[str] = []
+    if path is not None:
+        files = [f for f in mujoco.mju_getXMLDependencies(path) if f != path]
+    return {
+        "bodies": model.nbody - 1,
+        "geoms": model.ngeom,
+        "joints": model.njnt,
+        "nq": model.nq,
+        "nv": model.nv,
+        "nu": model.nu,
+        "timestep": float(model.opt.timestep),
+        "integrator": _INTEGRATORS[model.opt.integrator],
+        "total_mass": float(model.body_mass.sum()),
+        "keyframes": names(model.name_keyadr),
+        "sites": names(model.name_siteadr),
+        "body_names": names(model.name_bodyadr[1:]),
+        "files": files,
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,283 @@
+"""Publishing a site whole: written beside the old one, then swapped in, or not at all.
+
+Entry points: `check_out`, which says early whether a site may go somewhere; `publish`; `recover`,
+for those who serve.
+
+1. The place is checked: never the project or what its author wrote, never a folder with files that
+   we did not put there.
+2. What killed builds left beside it is removed; what a running build has there is not.
+3. Every file is written into a fresh folder beside the place, on the same file system.
+4. The two folders are exchanged in one step. Where the system cannot, the old one is renamed away
+   and the new one renamed in; a build that was killed between the two is mended by `recover`.
+5. The old site is removed.
+
+A site is derived and can be built again, so it is not forced to the disk: after a power cut, build
+again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+import shutil
+import stat
+import unicodedata
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
+from coursebuild.effects.exchange import exchange
+from coursebuild.effects.locks import is_abandoned, try_lock
+from coursebuild.results import OutputFile
+
+MARKER = ".coursebuild-site"
+"""A file in every site: a line that says what it is, then the path of every file of the site."""
+_HEADER = "site built by coursebuild; every file listed here may be replaced"
+_JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+"""What file managers strew about."""
+_AUTHORED = ("content", "models", "examples", ".coursebuild", ".git")
+
+
+def check_out(root: Path, out: Path) -> Path:
+    """Where the site goes: `out`, or the folder it links to.
+
+    Raises:
+        PublishRefusedError: a site must not go there.
+    """
+    place = Path(os.path.realpath(out))
+    root = Path(os.path.realpath(root))
+    if root.is_relative_to(place):
+        what = "is the project itself" if place == root else "holds the project"
+        raise PublishRefusedError(
+            f"{out} {what}", help="publish to a folder of its own, such as `public`"
+        )
+    for name in _AUTHORED:
+        if place.is_relative_to(os.path.realpath(root / name)):
+            raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no site may go")
+    if place.exists() and not place.is_dir():
+        raise PublishRefusedError(f"{out} is not a folder")
+    if place.is_mount():
+        raise PublishRefusedError(
+            f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
+        )
+    try:
+        foreign = _foreign(place)
+    except OSError as error:
+        raise EffectError(f"{out} cannot be read: {reason(error)}") from None
+    if foreign:
+        named = ", ".join(foreign[:3]) + (
+            f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
+        )
+        raise PublishRefusedError(
+            f"{out} holds files that coursebuild did not put there: {named}",
+            help="move them away, or publish to another folder",
+        )
+    return place
+
+
+def publish(root: Path, out: Path, files: Iterable[OutputFile]) -> None:
+    """Replace the site at `out` by these files.
+
+    Args:
+        root: the course folder.
+        out: where the site goes; a link to a folder stays one.
+        files: each path once; POSIX, relative, without `..`.
+
+    Raises:
+        PublishRefusedError: a site must not go there.
+        EffectError: it cannot be written; the old site is still there.
+        ValueError: a path is none that a site may have (a bug of the caller).
+    """
+    recover(out)
+    place = check_out(root, out)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        _clean(place)
+        staging = _Staging.make(place)
+        try:
+            _write_site(staging.path, files, _mode(place))
+            _swap(staging.path, place)
+        finally:
+            os.close(staging.fd)
+            recover(out)
+            _remove(staging.path)
+        _clean(place)
+    except OSError as error:
+        raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
+
+
+def recover(out: Path) -> None:
+    """Put the last good site back, if a build was killed after renaming it away."""
+    place = Path(os.path.realpath(out))
+    if os.path.lexists(place) or any(_is_alive(path) for path in _beside(place, "new")):
+        return
+    whole = [path for path in _beside(place, "old") if (path / MARKER).is_file()]
+    if whole:
+        with contextlib.suppress(OSError):  # another build was faster
+            max(whole, key=lambda path: path.stat().st_mtime_ns).rename(place)
+
+
+@dataclass(frozen=True, slots=True)
+class _Staging:
+    """A fresh folder beside the place; open and locked as long as its builder lives."""
+
+    path: Path
+    fd: int
+
+    @classmethod
+    def make(cls, place: Path) -> _Staging:
+        while True:
+            path = place.with_name(f".{place.name}.new-{secrets.token_hex(4)}")
+            path.mkdir(0o700)
+            try:
+                fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+                try_lock(fd)
+            except FileNotFoundError:  # another build took it for abandoned before it was locked
+                continue
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(fd), path.stat()):
+                    return cls(path, fd)
+            os.close(fd)
+
+
+def _write_site(folder: Path, files: Iterable[OutputFile], mode: int) -> None:
+    made = {""}
+    written: set[str] = set()
+    for file in files:
+        _check_path(file.path, written)
+        written.add(file.path)
+        parent = file.path.rpartition("/")[0]
+        if parent not in made:
+            _make_folders(folder, parent, made)
+        _write_file(folder / file.path, file.data)
+    _write_file(folder / MARKER, "\n".join([_HEADER, *sorted(written), ""]).encode())
+    folder.chmod(mode)
+
+
+def _check_path(path: str, written: set[str]) -> None:
+    parts = path.split("/")
+    if (
+        any(part in ("", ".", "..") for part in parts)
+        or any(c < " " or c == "\\" for c in path)
+        or path == MARKER
+    ):
+        raise ValueError(f"{path!r} is no path that a site may have")
+    if path in written:
+        raise ValueError(f"the site has two files {path}")
+
+
+def _make_folders(folder: Path, path: str, made: set[str]) -> None:
+    parent = path.rpartition("/")[0]
+    if parent not in made:
+        _make_folders(folder, parent, made)
+    (folder / path).mkdir()
+    (folder / path).chmod(0o755)
+    made.add(path)
+
+
+def _write_file(path: Path, data: bytes) -> None:
+    fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+    try:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(fd, rest) :]
+        os.fchmod(fd, 0o644)  # whatever the umask is
+    finally:
+        os.close(fd)
+
+
+def _swap(staging: Path, place: Path) -> None:
+    """Put the new site at the place; the old one is then where that was, or is named old."""
+    for _ in range(100):
+        if os.path.lexists(place):
+            if exchange(staging, place):
+                return
+            old = place.with_name(f".{place.name}.old-{secrets.token_hex(4)}")
+            with contextlib.suppress(FileNotFoundError):  # another build is between its two renames
+                place.rename(old)
+        try:
+            staging.rename(place)
+            return
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                raise
+        # Another build put its site there just now; ours replaces it.
+    raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+
+
+def _mode(place: Path) -> int:
+    """The permissions of the site's folder: those that it has, else the usual ones."""
+    with contextlib.suppress(FileNotFoundError):
+        return stat.S_IMODE(place.stat().st_mode)
+    return 0o755
+
+
+def _foreign(place: Path) -> list[str]:
+    """Files at the place that no build of ours put there; sorted."""
+    if not place.is_dir():
+        return []
+    try:
+        header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
+    except (OSError, ValueError):
+        header, listed = "", []
+    ours = {MARKER, *map(_normal, listed)} if header == _HEADER else set[str]()
+    return sorted(path for path in _files(place) if _normal(path) not in ours)
+
+
+def _normal(path: str) -> str:
+    """The path with its letters composed: some file systems of macOS take them apart."""
+    return path if path.isascii() else unicodedata.normalize("NFC", path)
+
+
+def _files(folder: Path, prefix: str = "") -> Iterator[str]:
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _files(Path(entry.path), f"{prefix}{entry.name}/")
+            elif entry.name not in _JUNK:
+                yield f"{prefix}{entry.name}"
+
+
+def _beside(place: Path, kind: str) -> list[Path]:
+    """Folders beside the place that a build made: `new` being written, `old` replaced."""
+    start = f".{place.name}.{kind}-"
+    try:
+        with os.scandir(place.parent) as entries:
+            return sorted(
+                Path(entry.path)
+                for entry in entries
+                if entry.name.startswith(start)
+                and len(entry.name) == len(start) + 8
+                and entry.is_dir(follow_symlinks=False)
+            )
+    except OSError:
+        return []
+
+
+def _is_alive(staging: Path) -> bool:
+    """Whether the build that writes this folder still runs."""
+    try:
+        fd = os.open(staging, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        return not is_abandoned(fd)
+    finally:
+        os.close(fd)
+
+
+def _clean(place: Path) -> None:
+    """Remove what builds that are no more left beside the place."""
+    for path in _beside(place, "new"):
+        if not _is_alive(path):
+            _remove(path)
+    if place.exists():  # else the old site may be all there is
+        for path in _beside(place, "old"):
+            _remove(path)
+
+
+def _remove(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)

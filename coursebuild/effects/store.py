@@ -1,0 +1,47 @@
+"""Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
+
+Entry point: `kept(root, kind, key, make)`.
+
+An entry begins with the hash of what follows, so that one which was cut or flipped is made again
+instead of served. Nothing is lost when the folder is deleted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from coursebuild.effects.locks import make_private_folder
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+def kept(root: Path, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
+    """The result of this kind and key: from the store, or made now and kept."""
+    path = root / ".coursebuild" / kind / key
+    with contextlib.suppress(OSError):
+        data = path.read_bytes()
+        if data[:_DIGEST] == hashlib.sha256(data[_DIGEST:]).digest():
+            return data[_DIGEST:]
+    made = make()
+    with contextlib.suppress(OSError):  # a store that cannot be written only costs time
+        make_private_folder(root / ".coursebuild")
+        path.parent.mkdir(exist_ok=True)
+        _write(path, hashlib.sha256(made).digest() + made)
+    return made
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Whole or not at all: readers in other processes see the old entry or the new one."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,144 @@
+/**
+ * Typesets formulas with Temml, whose global `temml` is loaded before this script.
+ *
+ *   typeset(json)   json: [{tex, display}, …]; returns as JSON, for each, its MathML (a string) or
+ *                   {message, position}, position being an offset in UTF-16 units into tex, or null
+ *
+ * 1. Temml makes a tree of MathML nodes, or throws.
+ * 2. The tree is mended where Temml's output is not valid HTML, and refused where it cannot be right:
+ *    references that a script in the page would have to fill, colours and lengths that do not exist.
+ * 3. The tree becomes text.
+ */
+
+'use strict'
+
+const typeset = (() => {
+  const MAX_SOURCE = 20_000 // UTF-16 units of TeX
+  const MAX_MARKUP = 1_000_000 // UTF-16 units of MathML
+  const MAX_DEPTH = 150 // nested elements; browsers flatten what is deeper than a few hundred
+
+  const OPTIONS = { throwOnError: true, trust: false, strict: false, annotate: true, maxExpand: 1000 }
+
+  // Temml lets any word pass as a colour. These are the names of CSS Color Module Level 4.
+  const COLOURS = new Set(
+    (
+      'aliceblue antiquewhite aqua aquamarine azure beige bisque black blanchedalmond blue blueviolet brown ' +
+      'burlywood cadetblue chartreuse chocolate coral cornflowerblue cornsilk crimson cyan darkblue darkcyan ' +
+      'darkgoldenrod darkgray darkgreen darkgrey darkkhaki darkmagenta darkolivegreen darkorange darkorchid ' +
+      'darkred darksalmon darkseagreen darkslateblue darkslategray darkslategrey darkturquoise darkviolet ' +
+      'deeppink deepskyblue dimgray dimgrey dodgerblue firebrick floralwhite forestgreen fuchsia gainsboro ' +
+      'ghostwhite gold goldenrod gray green greenyellow grey honeydew hotpink indianred indigo ivory khaki ' +
+      'lavender lavenderblush lawngreen lemonchiffon lightblue lightcoral lightcyan lightgoldenrodyellow ' +
+      'lightgray lightgreen lightgrey lightpink lightsalmon lightseagreen lightskyblue lightslategray ' +
+      'lightslategrey lightsteelblue lightyellow lime limegreen linen magenta maroon mediumaquamarine ' +
+      'mediumblue mediumorchid mediumpurple mediumseagreen mediumslateblue mediumspringgreen ' +
+      'mediumturquoise mediumvioletred midnightblue mintcream mistyrose moccasin navajowhite navy oldlace ' +
+      'olive olivedrab orange orangered orchid palegoldenrod palegreen paleturquoise palevioletred ' +
+      'papayawhip peachpuff peru pink plum powderblue purple rebeccapurple red rosybrown royalblue ' +
+      'saddlebrown salmon sandybrown seagreen seashell sienna silver skyblue slateblue slategray slategrey ' +
+      'snow springgreen steelblue tan teal thistle tomato transparent turquoise violet wheat white ' +
+      'whitesmoke yellow yellowgreen currentcolor'
+    ).split(' '),
+  )
+
+  // Characters that an HTML page must not hold: controls but for white space, and what Unicode keeps unassigned for good.
+  const FORBIDDEN = /(?![\t\n\f\r])[\p{Cc}\p{Noncharacter_Code_Point}\p{Cs}]/u
+
+  /** A formula that Temml takes and we do not. */
+  class Refusal extends Error {}
+
+  function checkValue(name, value) {
+    if (/Infinity|NaN/.test(value)) throw new Refusal('a length is not a number')
+    if (!/^[\w\s.,%#()+-]*$/.test(value)) throw new Refusal(`\`${value}\` is not a value of ${name}`)
+    if (/colou?r|background/i.test(name) && !/^#[0-9a-f]{3,8}$/i.test(value) && !COLOURS.has(value.toLowerCase())) {
+      throw new Refusal(`there is no colour \`${value}\``)
+    }
+  }
+
+  function checkAttributes(node) {
+    for (const [name, value] of Object.entries(node.style ?? {})) checkValue(name, String(value))
+    for (const [name, value] of Object.entries(node.attributes ?? {})) {
+      if (/^(width|height|depth|voffset|[lr]space|mathsize|mathcolor|mathbackground)$/.test(name)) {
+        checkValue(name, String(value))
+      }
+    }
+  }
+
+  /** MathML Core allows these two on every element, and the HTML checker only on mstyle. */
+  function mendStyleAttributes(node) {
+    const { displaystyle, scriptlevel, ...others } = node.attributes
+    if ((displaystyle === undefined && scriptlevel === undefined) || /^(mstyle|mtable|math)$/.test(node.type)) return
+    if (node.type === 'mrow') {
+      node.type = 'mstyle'
+      return
+    }
+    const inner = new node.constructor('mstyle', node.children)
+    if (scriptlevel !== undefined) inner.setAttribute('scriptlevel', scriptlevel)
+    if (displaystyle !== undefined) inner.setAttribute('displaystyle', displaystyle)
+    node.attributes = others
+    node.children = [inner]
+  }
+
+  /** Whether a node becomes no markup at all: a fragment of nothing. */
+  function isNothing(node) {
+    return node.type === undefined && !node.text && (node.children ?? []).every(isNothing)
+  }
+
+  function mend(node, depth) {
+    if (depth > MAX_DEPTH) throw new Refusal('it is nested too deeply')
+    if (node.text !== undefined) {
+      // A negated relation is one character where Unicode has one.
+      if (node.text.includes('\u0338')) node.text = node.text.normalize('NFC')
+      if (FORBIDDEN.test(node.text)) throw new Refusal('it makes a character that a page must not hold')
+      return
+    }
+    if (node.href !== undefined) throw new Refusal('references to equations cannot be resolved; link to a heading instead')
+    checkAttributes(node)
+    if (node.attributes !== undefined) {
+      delete node.attributes.id // a label: nothing may refer to it, and it could be the id of a heading
+      if (node.type !== undefined) mendStyleAttributes(node)
+    }
+    if (!Array.isArray(node.children)) node.children = [] // as Temml's own toMarkup takes it
+    for (const child of node.children) mend(child, depth + 1)
+    if (node.type === 'semantics' && node.children.slice(0, -1).every(isNothing)) throw new Refusal('it is empty')
+  }
+
+  /** Temml's message without the position and the excerpt that follow it; the position, if it is one in `tex`. */
+  function explain(error, tex) {
+    const start = error.position
+    if (start === undefined) return { message: error.message, position: null }
+    const marks = [` at position ${start + 1}: \n`, ' at end of input: ']
+    const found = marks.map((mark) => [error.message.lastIndexOf(mark), mark]).find(([at]) => at >= 0)
+    if (found === undefined) return { message: error.message, position: null }
+    const [at, mark] = found
+    const plain = (text) => text.replaceAll('\u0332', '')
+    const excerpt = plain(error.message.slice(at + mark.length))
+    const left = plain(start > 15 ? '…' + tex.slice(start - 15, start) : tex.slice(0, start))
+    const right = excerpt.slice(left.length).replace(/…$/, '')
+    // In a macro that Temml defines, the position is one in that macro's own text.
+    const isHere = excerpt.startsWith(left) && plain(tex.slice(start)).startsWith(right)
+    return { message: error.message.slice(0, at), position: isHere ? start : null }
+  }
+
+  function one({ tex, display }) {
+    if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
+    const forbidden = tex.search(FORBIDDEN)
+    if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
+    try {
+      const tree = temml.__renderToMathMLTree(tex, { ...OPTIONS, displayMode: display })
+      mend(tree, 0)
+      const markup = tree.toMarkup()
+      if (markup.length > MAX_MARKUP) throw new Refusal('it becomes too long')
+      return markup
+    } catch (error) {
+      if (error instanceof temml.ParseError) return explain(error, tex)
+      if (error instanceof Refusal) return { message: error.message, position: null }
+      if (error instanceof RangeError && /call stack/.test(error.message)) {
+        return { message: 'it is nested too deeply', position: null }
+      }
+      return { message: `it cannot be typeset (${error.message})`, position: null }
+    }
+  }
+
+  return (json) => JSON.stringify(JSON.parse(json).map(one))
+})()

@@ -1,0 +1,67 @@
+"""`coursebuild check`: verify the course, or some lessons of it; publish nothing.
+
+Entry point: `check(options, names)`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.locks import project_lock
+from coursebuild.model import Course, Status
+from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options, Selection, select
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.verify import verify
+from coursebuild.report import Report, ScriptLine
+
+
+def check(options: Options, names: tuple[str, ...] = ()) -> Report:
+    """Verify the lessons that the names mean; all, and the pages, where there are none."""
+    progress = Progress(quiet=options.quiet)
+    with project_lock(options.root, progress.say):
+        return _check(options, names, progress)
+
+
+def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Report:
+    began = time.monotonic()
+    loaded = load(options.root)
+    course = loaded.course
+    if course is None:
+        return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
+    chosen = select(course, names)
+    verified = verify(course, options, progress, chosen.documents)
+    found = [*loaded.diagnostics, *verified.diagnostics]
+    found += no_lessons(course)
+    found += _no_scripts(course, chosen, verified.scripts)
+    return judge(
+        course,
+        found,
+        verified.scripts,
+        time.monotonic() - began,
+        lessons=len(chosen.lessons),
+        documents=chosen.documents,
+    )
+
+
+def no_lessons(course: Course) -> list[Diagnostic]:
+    """A course with nothing to publish is a mistake, not a success."""
+    if any(lesson.status is not Status.PLANNED for lesson in course.lessons):
+        return []
+    message = "no lesson of the course is written"
+    help = "write a file in content/lessons, and give its entry in the map a `status`"
+    return [diagnose("no-lessons", course.map.span(0, 0), message, help=help)]
+
+
+def _no_scripts(
+    course: Course, chosen: Selection, scripts: Sequence[ScriptLine]
+) -> list[Diagnostic]:
+    if any(line.status not in ("skipped", "norun") for line in scripts):
+        return []
+    where = "the course" if chosen.documents is None else " and ".join(x.id for x in chosen.lessons)
+    why = "has none" if not scripts else "has none that can run here"
+    message = f"no script was run: {where} {why}, so that nothing was verified"
+    return [diagnose("no-scripts", course.map.span(0, 0), message)]

@@ -1,0 +1,55 @@
+"""From findings to a report: silenced warnings are left out, the rest is sorted and counted.
+
+Entry point: `judge`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from fnmatch import fnmatchcase
+
+from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
+from coursebuild.model import Course, Silence
+from coursebuild.report import Report, ScriptLine, Summary
+
+_NOT_RUN = ("skipped", "norun")
+
+
+def judge(
+    course: Course | None,
+    diagnostics: Iterable[Diagnostic],
+    scripts: Sequence[ScriptLine],
+    seconds: float,
+    *,
+    lessons: int,
+    documents: Collection[str] | None = None,
+    remarks: tuple[str, ...] = (),
+) -> Report:
+    """The report of a command; `documents` limits it to mistakes in these files and in the map."""
+    told = sort_diagnostics(diagnostics)
+    if documents is not None and course is not None:
+        wanted = {*documents, course.map.path}
+        told = tuple(d for d in told if d.span.path in wanted)
+    silences = course.silences if course is not None else ()
+    kept = tuple(d for d in told if not _silenced(d, silences))
+    errors = sum(d.severity is Severity.ERROR for d in kept)
+    summary = Summary(
+        lessons=lessons,
+        scripts=len(scripts),
+        ran=sum(line.status not in _NOT_RUN for line in scripts),
+        skipped=sum(line.status == "skipped" for line in scripts),
+        errors=errors,
+        warnings=len(kept) - errors,
+        silenced=len(told) - len(kept),
+        seconds=seconds,
+    )
+    return Report(kept, tuple(scripts), summary, remarks)
+
+
+def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
+    """Errors cannot be silenced."""
+    return diagnostic.severity is Severity.WARNING and any(
+        silence.rule == diagnostic.rule
+        and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
+        for silence in silences
+    )

@@ -1,0 +1,148 @@
+"""`coursebuild update`: bring recorded outputs up to date, by span.
+
+Entry point: `update(options, names, dry_run=…)`.
+
+1. Every chosen script runs twice. What differs between the two runs cannot be recorded.
+2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
+   changed it meanwhile.
+3. The bound numbers of the lessons as they are now are checked, so that prose which a new output
+   makes false is told.
+"""
+
+from __future__ import annotations
+
+import difflib
+import time
+from collections.abc import Mapping, Sequence
+
+from coursebuild.diagnostics import Diagnostic, Edit
+from coursebuild.effects.locks import project_lock
+from coursebuild.effects.write import write_atomic
+from coursebuild.model import Course, Recording, document_blocks
+from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options, Selection, select
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.verify import extract_scripts, run, script_lines
+from coursebuild.report import Report
+from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.compare import verify as compare_all
+from coursebuild.scripts.edit import apply_edits, updated_body
+from coursebuild.scripts.extract import Extraction
+from coursebuild.scripts.findings import script_findings
+from coursebuild.source import Source
+
+
+def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
+    """Record anew what the chosen lessons' scripts print."""
+    progress = Progress(quiet=options.quiet)
+    with project_lock(options.root, progress.say):
+        return _update(options, names, progress, dry_run=dry_run)
+
+
+def _update(
+    options: Options, names: tuple[str, ...], progress: Progress, *, dry_run: bool
+) -> Report:
+    began = time.monotonic()
+    loaded = load(options.root)
+    course = loaded.course
+    if course is None:
+        return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
+    chosen = select(course, names)
+    extracted = extract_scripts(course, options)
+    scripts = _with_recordings(course, chosen, extracted.runnable)
+    first = run(scripts, options, progress)
+    again = run(scripts, options, progress)
+    edits, refused = _edits(course, chosen, first, again)
+    remarks = _write(options, course, edits, dry_run=dry_run)
+    found = [*extracted.diagnostics, *refused]
+    found += _afterwards(options, course, scripts, first, dry_run=dry_run)
+    found += loaded.diagnostics if dry_run or not edits else load(options.root).diagnostics
+    lines = script_lines(scripts, first, ())
+    seconds = time.monotonic() - began
+    return judge(
+        course,
+        found,
+        lines,
+        seconds,
+        lessons=len(chosen.lessons),
+        documents=chosen.documents,
+        remarks=remarks,
+    )
+
+
+def _recordings(course: Course, chosen: Selection) -> list[Recording]:
+    return [
+        block
+        for document in course.documents
+        if chosen.documents is None or document.source.path in chosen.documents
+        for block in document_blocks(document)
+        if isinstance(block, Recording) and block.script is not None
+    ]
+
+
+def _with_recordings(
+    course: Course, chosen: Selection, runnable: Sequence[Extraction]
+) -> tuple[Extraction, ...]:
+    """The scripts that have an output to bring up to date."""
+    wanted = {recording.script for recording in _recordings(course, chosen)}
+    return tuple(e for e in runnable if e.path in wanted)
+
+
+def _edits(
+    course: Course, chosen: Selection, first: Sequence[ScriptRun], again: Sequence[ScriptRun]
+) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
+    """What to write, by lesson, and what cannot be written."""
+    good = {
+        one.path: (one.stdout, two.stdout)
+        for one, two in zip(first, again, strict=True)
+        if one.outcome is Outcome.OK and two.outcome is Outcome.OK
+    }
+    edits: dict[Source, list[Edit]] = {}
+    refused: list[Diagnostic] = []
+    for recording in _recordings(course, chosen):
+        if recording.script not in good:
+            continue
+        comparison = recording.comparison or course.comparison
+        made = updated_body(recording, comparison, course.filters, *good[recording.script])
+        if isinstance(made, Edit):
+            edits.setdefault(recording.span.source, []).append(made)
+        elif made is not None:
+            refused.append(made)
+    return edits, refused
+
+
+def _write(
+    options: Options, course: Course, edits: Mapping[Source, list[Edit]], *, dry_run: bool
+) -> tuple[str, ...]:
+    """Write the lessons; gives a remark for each."""
+    remarks: list[str] = []
+    for source, changes in edits.items():
+        new = apply_edits(source.text, changes)
+        if not dry_run:
+            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+        what = "would update" if dry_run else "updated"
+        diff = difflib.unified_diff(
+            source.text.splitlines(), new.splitlines(), source.path, source.path, n=1, lineterm=""
+        )
+        remarks.append("\n".join([f"{what} {source.path}", *diff]))
+    if not remarks:
+        remarks.append("every recorded output is up to date")
+    return tuple(remarks)
+
+
+def _afterwards(
+    options: Options,
+    course: Course,
+    scripts: Sequence[Extraction],
+    runs: Sequence[ScriptRun],
+    *,
+    dry_run: bool,
+) -> list[Diagnostic]:
+    """What is wrong with the lessons as they are now."""
+    now = course if dry_run else (load(options.root).course or course)
+    verdicts = compare_all(now, runs)
+    ran = {run.path for run in runs}
+    found = script_findings(now, scripts, runs, [v for v in verdicts if v.recording.script in ran])
+    # What update just refused is told by the refusal; a dry run leaves the drift as it is.
+    return [d for d in found if d.rule != "output-drift"]

@@ -1,0 +1,185 @@
+"""Course → Results: extract and run the scripts, compare, compile the models, typeset the formulas.
+
+Entry point: `verify(course, options, progress, lessons)`.
+
+1. Scripts are written to `examples/`; one that was edited there by hand is reported and not run.
+2. The scripts of the chosen lessons run, `options.jobs` at a time.
+3. Recorded outputs and bound numbers are held against the runs.
+4. Models and MJCF blocks are compiled in a child process, formulas are typeset in V8; neither is
+   started for a course that has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import assert_never
+
+from coursebuild.checks import check_compiled, check_formulas, course_formulas, mjcf_texts
+from coursebuild.checks.quizzes import check_output_lines
+from coursebuild.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.effects import mjcf
+from coursebuild.effects.examples import Blocked, Obstacle, write_examples
+from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
+from coursebuild.effects.versions import engine_version, python_version
+from coursebuild.model import Course
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.report import ScriptLine
+from coursebuild.results import (
+    CompileResult,
+    Formula,
+    MathError,
+    Outcome,
+    Results,
+    ScriptRun,
+    Verdict,
+)
+from coursebuild.scripts.compare import verify as compare_all
+from coursebuild.scripts.extract import Extraction, extract, jobs
+from coursebuild.scripts.findings import script_findings
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """What verification found."""
+
+    results: Results
+    diagnostics: tuple[Diagnostic, ...]
+    scripts: tuple[ScriptLine, ...]
+
+
+def verify(
+    course: Course, options: Options, progress: Progress, documents: frozenset[str] | None = None
+) -> Verified:
+    """Verify a course, or only what stands in the documents with these paths."""
+    extracted = extract_scripts(course, options)
+    chosen = [e for e in extracted.runnable if documents is None or e.document in documents]
+    runs = run(chosen, options, progress)
+    verdicts = compare_all(course, runs)
+    found = [*extracted.diagnostics, *script_findings(course, chosen, runs, verdicts)]
+    found += check_output_lines(course, runs)
+    with progress.stage("compiling models"):
+        models, compiled = _compile(course, options)
+    found += compiled
+    with progress.stage("typesetting formulas"):
+        formulas = _typeset(course)
+    found += check_formulas(course, dict(formulas))
+    results = Results(runs, verdicts, formulas, models, python_version(), engine_version())
+    return Verified(results, tuple(found), script_lines(chosen, runs, verdicts))
+
+
+# --- scripts
+
+
+@dataclass(frozen=True, slots=True)
+class ExtractedScripts:
+    """The scripts as they are in `examples/` now."""
+
+    all: tuple[Extraction, ...]
+    runnable: tuple[Extraction, ...]
+    """Those whose file is what the lesson says."""
+    diagnostics: tuple[Diagnostic, ...]
+    written: tuple[str, ...]
+    removed: tuple[str, ...]
+    blocked: tuple[Blocked, ...]
+
+
+def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
+    """Bring `examples/` up to date, as far as nobody's edits are lost."""
+    parsed = extract(course)
+    report = write_examples(options.root, [(e.path, e.data) for e in parsed.value])
+    by_path = {e.path: e for e in parsed.value}
+    blocked = {example.path for example in report.blocked}
+    found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
+    runnable = tuple(e for e in parsed.value if e.path not in blocked)
+    return ExtractedScripts(
+        parsed.value, runnable, tuple(found), report.written, report.removed, report.blocked
+    )
+
+
+_LEFT = {
+    Obstacle.EDITED: "{path} was edited by hand since it was extracted, so it is left as it is",
+    Obstacle.FOREIGN: "{path} holds something else than this block, which was not extracted there",
+    Obstacle.ORPHAN: "{path} was edited by hand, and no lesson has this script any more",
+    Obstacle.LINK: "{path} cannot be written: a link stands in its way",
+    Obstacle.FOLDER: "{path} cannot be written: a folder and a file would have the same name",
+}
+
+
+def _left(blocked: Blocked, extraction: Extraction | None, course: Course) -> Diagnostic:
+    """Why a file in `examples/` was left alone, and how to go on."""
+    message = _LEFT[blocked.obstacle].format(path=blocked.path)
+    if extraction is None:
+        help = "move the file away, or bring it back into a lesson"
+        return diagnose("example-edited", course.map.span(0, 0), message, help=help)
+    if blocked.obstacle in (Obstacle.LINK, Obstacle.FOLDER):
+        help = "move what is there away, or extract the script to another path"
+    else:
+        help = (
+            "`coursebuild extract --adopt` brings what the file holds into the lesson; "
+            "to drop it instead, delete the file"
+        )
+    notes = [Note("from the block to the file:\n" + blocked.diff.rstrip())] if blocked.diff else []
+    return diagnose("example-edited", extraction.script.path_span, message, help=help, notes=notes)
+
+
+def run(
+    chosen: Iterable[Extraction], options: Options, progress: Progress
+) -> tuple[ScriptRun, ...]:
+    """Run the chosen scripts, telling of each when it begins and ends."""
+    todo = jobs(chosen)
+
+    def told(event: RunEvent) -> None:
+        match event:
+            case RunStarted():
+                progress.started(event.path)
+            case RunFinished():
+                done = event.run
+                progress.finished(done.path, done.outcome.value, done.seconds)
+            case _:
+                assert_never(event)
+
+    with progress.stage("running scripts", len(todo)):
+        return run_scripts(options.root, todo, parallel=options.jobs, on_event=told)
+
+
+def script_lines(
+    chosen: Sequence[Extraction], runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
+) -> tuple[ScriptLine, ...]:
+    """How each script did, as a report lists it."""
+    drifted = {v.recording.script for v in verdicts if v.status == "drift"}
+    lines = []
+    for extraction, done in zip(chosen, runs, strict=True):
+        drift = done.outcome is Outcome.OK and done.path in drifted
+        status = "drift" if drift else done.outcome.value
+        lines.append(
+            ScriptLine(done.path, extraction.owner, status, done.seconds, done.cached, done.missing)
+        )
+    return tuple(lines)
+
+
+# --- models and formulas
+
+
+def _compile(
+    course: Course, options: Options
+) -> tuple[tuple[tuple[str, CompileResult], ...], tuple[Diagnostic, ...]]:
+    texts = mjcf_texts(course)
+    compiled = mjcf.compile_models(options.root, course.models) if course.models else ()
+    parts = mjcf.compile_texts(options.root, [text.text for text in texts]) if texts else ()
+    models = tuple(
+        (model.name, result) for model, result in zip(course.models, compiled, strict=True)
+    )
+    found = check_compiled(course, dict(models), tuple(zip(texts, parts, strict=True)))
+    return models, found
+
+
+def _typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
+    formulas = course_formulas(course)
+    if not formulas:
+        return ()
+    from coursebuild.effects.v8 import MathEngine
+
+    with MathEngine() as engine:
+        return tuple(zip(formulas, engine.typeset(formulas), strict=True))

@@ -1,0 +1,84 @@
+"""The tool's own files: templates, interface texts, and the browser's half as it was bundled.
+
+Entry points: `Assets`, a value that whoever reads the disk makes; `template_environment`;
+`hashed_name`.
+
+1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
+   by path relative to their folder.
+2. A file that a page refers to is published under a name that has a hash of its content in it, so
+   that a browser may keep it for ever.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from dataclasses import dataclass
+
+from jinja2 import DictLoader, Environment, StrictUndefined
+
+from coursebuild.render.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+
+
+@dataclass(frozen=True, slots=True)
+class Assets:
+    """Templates and bundled files, sorted by path."""
+
+    templates: tuple[tuple[str, str], ...]
+    """Path relative to `templates/`, and text."""
+    dist: tuple[tuple[str, bytes], ...]
+    """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
+    bytes."""
+
+    def template(self, path: str) -> str:
+        """The text of a file of `templates/` (`KeyError` where there is none)."""
+        return dict(self.templates)[path]
+
+    def file(self, path: str) -> bytes:
+        """The bytes of a bundled file (`KeyError` where there is none)."""
+        return dict(self.dist)[path]
+
+    def files(self, folder: str) -> tuple[tuple[str, bytes], ...]:
+        """The bundled files of a folder."""
+        return tuple((path, data) for path, data in self.dist if path.startswith(f"{folder}/"))
+
+
+def hashed_name(path: str, data: bytes) -> str:
+    """`assets/site.css` with eight digits of its content's hash: `assets/site.1b4f0e98.css`."""
+    stem, dot, suffix = path.rpartition(".")
+    digest = hashlib.sha256(data).hexdigest()[:8]
+    return f"{stem}.{digest}.{suffix}" if dot else f"{path}.{digest}"
+
+
+def page_script(code: bytes) -> bytes:
+    """A bundled module without imports or exports as a plain script in a scope of its own.
+
+    Browsers refuse to load modules from a disk, and plain scripts of one page share their top-level
+    names.
+    """
+    return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
+
+
+@functools.lru_cache(maxsize=8)
+def template_environment(templates: tuple[tuple[str, str], ...]) -> Environment:
+    """The template engine: it escapes all that is not `Markup`, and refuses undefined names."""
+    environment = Environment(
+        loader=DictLoader({path: text for path, text in templates if path.endswith(".html")}),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=False,
+    )
+    return environment
+
+
+@functools.lru_cache(maxsize=8)
+def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
+    """The interface texts of a language (`pt-BR`): its file over `pt` over English."""
+    texts = dict(templates)
+    strings = parse_strings(texts[f"strings/{DEFAULT_LANGUAGE}.toml"])
+    for name in (language.split("-")[0].lower(), language):
+        if name != DEFAULT_LANGUAGE and f"strings/{name}.toml" in texts:
+            strings = parse_strings(texts[f"strings/{name}.toml"], strings)
+    return strings

@@ -1,0 +1,231 @@
+"""The blocks that carry code and what the build knows of it; callouts and io cards.
+
+Entry points: one function for each block, from the page's context and the block to HTML. What is
+shown is worked out here as values; templates in `blocks/` say how it looks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import TYPE_CHECKING, assert_never
+
+from markupsafe import Markup
+
+from coursebuild.model import (
+    Callout,
+    Comparison,
+    Io,
+    Mjcf,
+    Mode,
+    NumberBinding,
+    PlainCode,
+    Recording,
+    Script,
+    Table,
+)
+from coursebuild.render.folding import Part, fold
+from coursebuild.render.highlight import highlight_lines, visible
+from coursebuild.render.strings import Strings
+from coursebuild.results import Outcome, ScriptRun, Verdict
+
+if TYPE_CHECKING:
+    from coursebuild.render.context import PageContext
+
+
+@dataclass(frozen=True, slots=True)
+class CodePart:
+    """A stretch of a script's lines, as HTML."""
+
+    html: Markup
+    folded: bool
+    label: str
+    """What a fold holds, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What the build can say for an output or a script."""
+
+    kind: str
+    """`verified`, `volatile`, `unverified`: also a class of the style sheet."""
+    text: str
+
+
+def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
+    """A script and the outputs that belong to it, as one object."""
+    run = page.library.runs.get(block.path)
+    return page.template(
+        "blocks/script.html",
+        script=block,
+        parts=_parts(page.library.words, block.code.text),
+        href=page.place.href(block.path),
+        command=" ".join(("python", block.path, *block.args)),
+        outputs=tuple(_output(page, recording) for recording in recordings),
+        receipt=None if recordings else _script_receipt(page, run),
+    )
+
+
+def recording(page: PageContext, block: Recording) -> Markup:
+    """A recorded output that stands apart from its script."""
+    return page.template("blocks/recording.html", output=_output(page, block))
+
+
+def code(page: PageContext, language: str, text: str) -> Markup:
+    """Code that is only shown."""
+    return page.template("blocks/code.html", language=language, html=page.highlight(language, text))
+
+
+def plain_code(page: PageContext, block: PlainCode) -> Markup:
+    """Python that is shown and not run."""
+    return code(page, "python", block.code.text)
+
+
+def callout(page: PageContext, block: Callout) -> Markup:
+    """A callout, folded where the author says so."""
+    kind = page.library.callouts.get(block.kind)
+    return page.template(
+        "blocks/callout.html",
+        callout=block,
+        label=page.library.callout_label(block.kind),
+        promise=kind.promise if kind is not None else "",
+        title=page.inlines(block.title),
+        body=page.blocks(block.blocks),
+    )
+
+
+def io(page: PageContext, block: Io) -> Markup:
+    """What a script takes, does and gives."""
+    words = page.library.words
+    rows = (
+        (words("io.input"), page.inlines(block.input)),
+        (words("io.process"), page.inlines(block.process)),
+        (words("io.output"), page.inlines(block.output)),
+    )
+    return page.template("blocks/io.html", rows=rows)
+
+
+def mjcf(page: PageContext, block: Mjcf) -> Markup:
+    """A model or a fragment, and that it compiles, or the message it fails with."""
+    return page.template(
+        "blocks/mjcf.html",
+        mjcf=block,
+        html=page.highlight("xml", block.code.text.rstrip("\n")),
+        engine=page.library.results.engine,
+    )
+
+
+def binding(page: PageContext, node: NumberBinding) -> Markup:
+    """A number that a script printed; the mark names the script."""
+    return page.template("blocks/binding.html", text=node.text, path=node.script)
+
+
+# --- outputs
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A recorded output, ready for its template."""
+
+    caption: Markup
+    path: str
+    text: str | None
+    """The recorded text; `None` where it is a table."""
+    table: Markup | None
+    receipt: Receipt
+
+
+def _output(page: PageContext, block: Recording) -> Output:
+    verdict = page.library.verdict(block)
+    run = page.library.runs.get(block.script) if block.script is not None else None
+    table = isinstance(block.body, Table)
+    return Output(
+        caption=page.inlines(block.caption),
+        path=block.script or "",
+        text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),
+        table=page.blocks((block.body,)) if isinstance(block.body, Table) else None,
+        receipt=_output_receipt(page, verdict, run, table),
+    )
+
+
+def _output_receipt(
+    page: PageContext, verdict: Verdict | None, run: ScriptRun | None, table: bool
+) -> Receipt:
+    words, results = page.library.words, page.library.results
+    versions = {"engine": results.engine, "python": results.python}
+    if verdict is None or verdict.status == "unchecked":
+        return _not_run(words, run)
+    match verdict.status:
+        case "verified":
+            how = compared(words, verdict.comparison)
+            return Receipt("verified", f"{words('receipt.verified', **versions)} {how}.")
+        case "volatile":
+            return Receipt("volatile", words("receipt.volatile", **versions))
+        case "drift":
+            return Receipt("unverified", words("receipt.drift", **versions))
+        case _:
+            assert_never(verdict.status)
+
+
+def compared(words: Strings, comparison: Comparison) -> str:
+    """How an output was compared, in words."""
+    match comparison.mode:
+        case Mode.EXACT | Mode.VOLATILE:
+            how = words("receipt.exact")
+        case Mode.DIGITS:
+            how = words("receipt.digits")
+        case Mode.TOLERANCE:
+            how = _tolerance(words, comparison.rtol, comparison.atol)
+        case _:
+            assert_never(comparison.mode)
+    return f"{how}; {words('receipt.ellipsis')}" if comparison.ellipsis else how
+
+
+def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
+    if rtol and atol:
+        return words("receipt.rtol_atol", rtol=f"{rtol:g}", atol=f"{atol:g}")
+    return (
+        words("receipt.rtol", rtol=f"{rtol:g}") if rtol else words("receipt.atol", atol=f"{atol:g}")
+    )
+
+
+def _script_receipt(page: PageContext, run: ScriptRun | None) -> Receipt:
+    """What can be said for a script without a recorded output."""
+    words, results = page.library.words, page.library.results
+    if run is not None and run.outcome is Outcome.OK:
+        text = words("receipt.ran", engine=results.engine, python=results.python)
+        return Receipt("verified", text)
+    return _not_run(words, run)
+
+
+def _not_run(words: Strings, run: ScriptRun | None) -> Receipt:
+    if run is not None and run.outcome is Outcome.SKIPPED:
+        return Receipt("unverified", words("receipt.skipped", modules=", ".join(run.missing)))
+    if run is not None and run.outcome is Outcome.NORUN:
+        return Receipt("unverified", words("receipt.norun"))
+    return Receipt("unverified", words("receipt.unchecked"))
+
+
+# --- code
+
+
+def _parts(words: Strings, text: str) -> tuple[CodePart, ...]:
+    lines = highlight_lines("python", text.rstrip("\n"))
+    return tuple(
+        CodePart(
+            Markup("\n").join(lines[part.first - 1 : part.last]),
+            part.folded,
+            _fold_label(words, part),
+        )
+        for part in fold(text.rstrip("\n"))
+    )
+
+
+def _fold_label(words: Strings, part: Part) -> str:
+    where = words(
+        "code.lines" if part.first < part.last else "code.line", first=part.first, last=part.last
+    )
+    holds = [words("code.docstring")] if part.docstring else []
+    holds += [words("code.imports")] if part.imports else []
+    holds += part.names
+    return f"{where}: {', '.join(holds)}" if holds else where

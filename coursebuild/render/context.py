@@ -1,0 +1,199 @@
+"""What the Markdown renderer asks about a page: addresses, formulas, code, our own blocks.
+
+Entry point: `PageContext`, the renderer's context for one document on one page.
+
+A recorded output that directly follows its script is drawn as one object with it; `joined` says
+which recordings those are, and such a recording gives nothing where it stands by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import assert_never
+from urllib.parse import urlsplit
+
+from markupsafe import Markup
+
+from coursebuild.model import (
+    Block,
+    Callout,
+    Document,
+    ExampleTarget,
+    Inline,
+    Io,
+    Lab,
+    LessonTarget,
+    LevelTarget,
+    ListBlock,
+    Mjcf,
+    ModelTarget,
+    NumberBinding,
+    PageTarget,
+    PlainCode,
+    Quiz,
+    Recording,
+    Script,
+    Target,
+    UrlTarget,
+    child_blocks,
+)
+from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
+from coursebuild.render.highlight import highlight
+from coursebuild.render.library import Library
+from coursebuild.render.strings import Strings
+
+
+@dataclass(frozen=True, slots=True)
+class PageContext:
+    """One document on one page."""
+
+    library: Library
+    place: urls.Place
+    document: Document
+    joined: Mapping[int, tuple[Recording, ...]]
+    """The recordings drawn with a script, by the offset at which the script begins."""
+    look: markup.Look
+    """The words that Markdown's own elements need."""
+
+    @classmethod
+    def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
+        """The context of a document, once it is known which outputs belong to which scripts."""
+        look = markup.Look(words=_markup_words(library.words))
+        return cls(library, place, document, dict(_joined(document)), look)
+
+    # what the Markdown renderer asks
+
+    def href(self, target: Target) -> str:
+        """The address of a link's target."""
+        library, place = self.library, self.place
+        match target:
+            case LessonTarget():
+                return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
+            case LevelTarget():
+                return place.href(urls.level_path(library.levels[target.id]))
+            case ModelTarget():
+                return place.href(urls.model_page_path(target.name))
+            case PageTarget():
+                return place.href(urls.page_path(library.pages[target.id]), target.anchor)
+            case ExampleTarget():
+                return place.href(target.path)
+            case UrlTarget():
+                return self.url(target.url)
+            case _:
+                assert_never(target)
+
+    def url(self, url: str) -> str:
+        """An address as written, but a file of the course becomes its place in the site."""
+        parts = urlsplit(url)
+        if parts.scheme or parts.netloc or not parts.path:
+            return url
+        path = urls.file_path(urls.local_file(url, self.document.source.path))
+        return self.place.href(path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
+
+    def math(self, tex: str, display: bool) -> Markup:
+        """A formula; one on a line of its own scrolls inside itself where it is too wide."""
+        mathml = self.library.mathml(tex, display)
+        if display:
+            return self.template("blocks/formula.html", mathml=mathml)
+        return Markup(formulas.breakable(mathml))
+
+    def code(self, language: str, text: str) -> Markup:
+        """A code block that is only shown."""
+        return blocks.code(self, language, text.rstrip("\n")) + Markup("\n")
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        """A number that the build has compared with what a script printed."""
+        return blocks.binding(self, binding)
+
+    def block(self, block: markup.OwnBlock) -> Markup:
+        """A block that is ours, with its line end."""
+        html = self._block(block)
+        return html + Markup("\n") if html else html
+
+    def _block(self, block: markup.OwnBlock) -> Markup:
+        match block:
+            case Callout():
+                return blocks.callout(self, block)
+            case Script():
+                return blocks.script(self, block, self.joined.get(block.span.start, ()))
+            case Recording():
+                joined = any(block in recordings for recordings in self.joined.values())
+                return Markup() if joined else blocks.recording(self, block)
+            case Io():
+                return blocks.io(self, block)
+            case Mjcf():
+                return blocks.mjcf(self, block)
+            case PlainCode():
+                return blocks.plain_code(self, block)
+            case Lab():
+                return labs.lab(self, block)
+            case Quiz():
+                return quizzes.quiz(self, block)
+            case _:
+                assert_never(block)
+
+    # what the blocks ask
+
+    def blocks(self, content: tuple[Block, ...]) -> Markup:
+        """Blocks as HTML."""
+        return markup.render_blocks(content, self, self.look)
+
+    def inlines(self, content: tuple[Inline, ...]) -> Markup:
+        """Inlines as HTML."""
+        return markup.render_inlines(content, self, self.look)
+
+    def footnotes(self) -> Markup:
+        """The document's footnotes."""
+        return markup.render_footnotes(self.document.footnotes, self, self.look)
+
+    def highlight(self, language: str, text: str) -> Markup:
+        """Code with its tokens marked."""
+        return highlight(language, text)
+
+    def template(self, name: str, **values: object) -> Markup:
+        """A filled-in template; besides its values it sees `t`, the interface's words."""
+        text = self.library.templates.get_template(name).render(
+            t=self.library.words, page=self, **values
+        )
+        return Markup(text)
+
+
+def _markup_words(words: Strings) -> markup.Words:
+    return markup.Words(
+        anchor=words("markup.anchor"),
+        footnotes=words("markup.footnotes"),
+        footnote=words("markup.footnote"),
+        back=words("markup.back"),
+        back_again=words("markup.back_again"),
+        table=words("markup.table"),
+        done=words("markup.done"),
+        not_done=words("markup.not_done"),
+    )
+
+
+def _joined(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
+    yield from _joined_in(document.blocks)
+    for footnote in document.footnotes:
+        yield from _joined_in(footnote.blocks)
+
+
+def _joined_in(siblings: tuple[Block, ...]) -> Iterator[tuple[int, tuple[Recording, ...]]]:
+    """The scripts among siblings, each with the recordings that follow it at once."""
+    for number, block in enumerate(siblings):
+        if isinstance(block, Script):
+            following: list[Recording] = []
+            for sibling in siblings[number + 1 :]:
+                if not isinstance(sibling, Recording) or sibling.script != block.path:
+                    break
+                following.append(sibling)
+            yield block.span.start, tuple(following)
+        for children in _sibling_groups(block):
+            yield from _joined_in(children)
+
+
+def _sibling_groups(block: Block) -> tuple[tuple[Block, ...], ...]:
+    """The blocks inside a block; those of different list items are no siblings."""
+    if isinstance(block, ListBlock):
+        return tuple(item.blocks for item in block.items)
+    return (child_blocks(block),)

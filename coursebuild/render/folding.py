@@ -1,0 +1,144 @@
+"""Which parts of a long script a reader sees at first, and which are folded.
+
+Entry point: `fold(code)`.
+
+1. The code is cut at its top-level statements: a fold never begins or ends inside one.
+2. The head (docstring, imports, constants) is folded when it is long: the page around the script
+   has said what it is for.
+3. Of the rest as much is shown as fits `SHOWN` lines, from its start; what follows is folded, but
+   the `__main__` guard at the end is kept in sight, because it tells the story.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+
+LONG = 48
+"""Lines; a script up to this length is shown whole."""
+HEAD = 8
+"""Lines; a head shorter than this is not worth folding."""
+SHOWN = 44
+"""Lines of the rest that are shown, about."""
+TAIL = 12
+"""Lines; a `__main__` guard up to this length stays in sight, and a fold shorter than this is not
+made."""
+
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Whole lines of a script, from `first` to `last` (from 1, both included)."""
+
+    first: int
+    last: int
+    folded: bool
+    docstring: bool = False
+    """Whether it holds the script's docstring."""
+    imports: bool = False
+    """Whether it holds imports."""
+    names: tuple[str, ...] = ()
+    """Names that are defined in it."""
+
+
+def fold(code: str) -> tuple[Part, ...]:
+    """The parts of a script; a short one, and one that does not parse, is one part in sight."""
+    lines = code.removesuffix("\n").split("\n")
+    whole = (Part(1, len(lines), folded=False),)
+    if len(lines) <= LONG:
+        return whole
+    try:
+        body = ast.parse(code).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return whole
+    starts = [_start(statement) for statement in body]
+    if not body or len(set(starts)) != len(starts):
+        return whole
+    cuts = [*(_with_comments(lines, start) for start in starts), len(lines) + 1]
+    head = _head_length(body)
+    if head == len(body) or cuts[head] - 1 < HEAD:
+        return _rest(body, [1, *cuts[1:]], lines)
+    return (_folded(1, cuts[head] - 1, body[:head]), *_rest(body[head:], cuts[head:], lines))
+
+
+def _rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
+    """The parts after the head: shown, perhaps folded, perhaps the guard.
+
+    Statement `i` has the lines from `cuts[i]` to before `cuts[i + 1]`. Blank lines at the border of
+    a fold belong to the fold.
+    """
+    first, total = cuts[0], len(lines)
+    shown = 1
+    while shown < len(body) and cuts[shown + 1] - first <= SHOWN:
+        shown += 1
+    guarded = shown < len(body) and _is_guard(body[-1]) and total - cuts[-2] < TAIL
+    stop = len(body) - 1 if guarded else len(body)
+    end = cuts[shown] - 1
+    while end > first and not lines[end - 1].strip():
+        end -= 1
+    if cuts[stop] - 1 - end < TAIL:
+        return (Part(first, total, folded=False),)
+    guard = (Part(cuts[stop], total, folded=False),) if guarded else ()
+    return (
+        Part(first, end, folded=False),
+        _folded(end + 1, cuts[stop] - 1, body[shown:stop]),
+        *guard,
+    )
+
+
+def _folded(first: int, last: int, body: list[ast.stmt]) -> Part:
+    docstring = _is_docstring(body[0]) if first == 1 else False
+    imports = any(isinstance(statement, ast.Import | ast.ImportFrom) for statement in body)
+    return Part(first, last, True, docstring, imports, _names(body))
+
+
+def _start(statement: ast.stmt) -> int:
+    """The first line of a statement, its decorators included."""
+    if isinstance(statement, _DEFINITIONS):
+        return min([statement.lineno, *(d.lineno for d in statement.decorator_list)])
+    return statement.lineno
+
+
+def _with_comments(lines: list[str], start: int) -> int:
+    """The line from which a statement's own comments begin."""
+    while start > 1 and lines[start - 2].startswith("#"):
+        start -= 1
+    return start
+
+
+def _head_length(body: list[ast.stmt]) -> int:
+    """How many statements stand before the script's own: docstring, imports, constants.
+
+    Assignments are constants where they stand before the first definition and nothing is done yet.
+    """
+    count = int(_is_docstring(body[0]))
+    while count < len(body) and isinstance(body[count], ast.Import | ast.ImportFrom):
+        count += 1
+    first = count
+    while first < len(body) and isinstance(body[first], ast.Assign | ast.AnnAssign):
+        first += 1
+    defines = first < len(body) and isinstance(body[first], _DEFINITIONS)
+    return first if defines else count
+
+
+def _is_docstring(statement: ast.stmt) -> bool:
+    if not isinstance(statement, ast.Expr) or not isinstance(statement.value, ast.Constant):
+        return False
+    return isinstance(statement.value.value, str)
+
+
+def _is_guard(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.If) and "__name__" in ast.dump(statement.test)
+
+
+def _names(body: list[ast.stmt]) -> tuple[str, ...]:
+    names: list[str] = []
+    for statement in body:
+        if isinstance(statement, _DEFINITIONS):
+            names.append(statement.name)
+        elif isinstance(statement, ast.Assign):
+            names += [target.id for target in statement.targets if isinstance(target, ast.Name)]
+        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            names.append(statement.target.id)
+    return tuple(names)

@@ -1,0 +1,127 @@
+"""A page without its frame, and the frame: head, site navigation, foot.
+
+Entry points: `Draft`, what the modules of the single kinds of page make; `frame(library, draft,
+names)`, the finished text.
+
+Pages are drawn in two steps because a page's head names the style sheet by its content, and the
+style sheet holds the fonts' names, which depend on every character of every page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from coursebuild.render import meta, urls
+from coursebuild.render.highlight import visible
+from coursebuild.render.library import Library
+
+POLICY = "; ".join(
+    (
+        "default-src 'self'",
+        "script-src 'self' 'wasm-unsafe-eval'",
+        "style-src 'self'",
+        "img-src 'self' data: blob:",
+        "worker-src 'self' blob:",
+        "object-src 'none'",
+        "base-uri 'none'",
+        "form-action 'none'",
+    )
+)
+"""Content-Security-Policy of every page: nothing from elsewhere, no code and no style in the page
+itself."""
+
+
+PAGE_WORDS = (
+    "theme.label",
+    "theme.auto",
+    "theme.light",
+    "theme.dark",
+    "code.copy",
+    "code.copied",
+    "code.failed",
+)
+"""Interface texts that the page's script shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A page without its frame."""
+
+    path: str
+    """Its site path."""
+    kind: str
+    """`home`, `lesson`, `stub`, `level`, `model`, `page`, `notfound`: also a class of the style
+    sheet."""
+    title: str
+    description: str
+    body: Markup
+    """What stands between the site's head and foot."""
+    json_ld: Markup = Markup()
+    og_type: str = "website"
+    indexed: bool = True
+    """Whether search engines should list it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Site paths of the files that every page refers to."""
+
+    style: str
+    theme_script: str
+    script: str
+    icon: str
+    credits: str
+
+
+@dataclass(frozen=True, slots=True)
+class NavLink:
+    """An entry of the site's navigation."""
+
+    href: str
+    text: str
+    current: bool
+
+
+def place_of(library: Library, path: str) -> urls.Place:
+    """The place of a page: the page for missing addresses is served at any depth."""
+    return urls.Place(path, urls.base_path(library.course) if path == urls.NOT_FOUND else None)
+
+
+def frame(library: Library, draft: Draft, names: Names) -> str:
+    """The finished text of a page."""
+    course = library.course
+    place = place_of(library, draft.path)
+    values: Mapping[str, object] = {
+        "t": library.words,
+        "kind": draft.kind,
+        "body": draft.body,
+        "language": course.language or "en",
+        "policy": POLICY,
+        "head_title": meta.head_title(course, draft.title, draft.kind),
+        "description": draft.description,
+        "robots": "" if draft.indexed else "noindex",
+        "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
+        "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
+        "json_ld": draft.json_ld,
+        "icon": place.href(names.icon),
+        "style": place.href(names.style),
+        "theme_script": place.href(names.theme_script),
+        "script": place.href(names.script),
+        "home": place.href(urls.HOME),
+        "credits": place.href(names.credits),
+        "pages": _navigation(library, place),
+        "course": course,
+        "source": course.repository if "{path}" not in course.repository else "",
+        "results": library.results,
+        "page_words": PAGE_WORDS,
+    }
+    text = library.templates.get_template("base.html").render(values)
+    return visible(text) + "\n"
+
+
+def _navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
+    pages = ((urls.page_path(page), page.title) for page in library.course.pages)
+    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)

@@ -1,0 +1,112 @@
+"""Labs as a page shows them before they run: what they are, what can be changed, what is shown.
+
+Entry point: `lab(page, block)`. Nothing in it is a control that does nothing: the page's script
+puts the live instrument into `data-lab` when it starts, and reads its configuration there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from coursebuild.model import Lab, LabControl, ModelTarget
+from coursebuild.render.strings import Strings
+
+if TYPE_CHECKING:
+    from coursebuild.render.context import PageContext
+
+
+@dataclass(frozen=True, slots=True)
+class ControlView:
+    """A row of the table of controls."""
+
+    label: str
+    values: str
+    """Range or options, and what it is at first, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlotView:
+    """A plot: its axes and the lines in it."""
+
+    title: str
+    traces: tuple[str, ...]
+    marks: tuple[str, ...]
+    """Reference lines."""
+
+
+def lab(page: PageContext, block: Lab) -> Markup:
+    """A lab in its static form."""
+    words = page.library.words
+    return page.template(
+        "blocks/lab.html",
+        lab=block,
+        title=block.title or words("lab.untitled"),
+        note=page.blocks(block.note),
+        model_href=page.href(ModelTarget(block.model)) if block.model is not None else None,
+        start=_start(page, block),
+        controls=tuple(_control(words, control) for control in block.controls),
+        plots=tuple(_plot(words, block, index) for index in range(len(block.plots))),
+        overlays=tuple(_overlay(words, name) for name in block.toggles),
+    )
+
+
+def number(value: float, digits: int | None = None) -> str:
+    """A number as a reader writes it: no trailing zeros, a real minus sign."""
+    text = f"{value:.{digits}f}" if digits is not None else f"{value:.12g}"
+    return text.replace("-", "\u2212")
+
+
+def _start(page: PageContext, block: Lab) -> str | None:
+    """The name of the keyframe that the lab starts from."""
+    if block.key is None or isinstance(block.key, str):
+        return block.key
+    compiled = page.library.models.get(block.model or "")
+    names = compiled.facts.keyframes if compiled is not None and compiled.facts is not None else ()
+    return (names[block.key] if 0 <= block.key < len(names) else "") or str(block.key)
+
+
+def _control(words: Strings, control: LabControl) -> ControlView:
+    match control.kind:
+        case "slider":
+            values, initial = _range(words, control), _initial(control)
+        case "select":
+            values = ", ".join(label for label, _ in control.options)
+            chosen = (label for label, value in control.options if value == control.value)
+            initial = next(chosen, "")
+        case "button":
+            values, initial = words("lab.button"), ""
+    if initial:
+        values = words("lab.initial", values=values, initial=initial)
+    return ControlView(control.label, values)
+
+
+def _initial(control: LabControl) -> str:
+    if not isinstance(control.value, int | float):
+        return ""
+    return f"{number(control.value, control.digits)} {control.unit}".rstrip()
+
+
+def _range(words: Strings, control: LabControl) -> str:
+    if control.minimum is None or control.maximum is None:
+        return control.unit
+    ends = words("lab.between", min=number(control.minimum), max=number(control.maximum))
+    ends = f"{ends} {control.unit}".rstrip()
+    return words("lab.step", range=ends, step=number(control.step)) if control.step else ends
+
+
+def _plot(words: Strings, block: Lab, index: int) -> PlotView:
+    plot = block.plots[index]
+    title = words(
+        "lab.plot",
+        ylabel=plot.ylabel or words("lab.value"),
+        xlabel=plot.xlabel or words("lab.time"),
+    )
+    marks = tuple(f"{label} ({number(y)})" if label else number(y) for y, label in plot.ref_lines)
+    return PlotView(title, tuple(trace.label for trace in plot.traces), marks)
+
+
+def _overlay(words: Strings, name: str) -> str:
+    return words(f"overlay.{name}") if words.has(f"overlay.{name}") else name

@@ -1,0 +1,335 @@
+"""Blocks and inlines into HTML.
+
+Entry points: `render_blocks`, `render_inlines`, `render_footnotes`; `Context` (what a page decides), `Look` (details of the HTML).
+
+What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like) is asked of the context, which
+may call back for what its blocks hold. All else is Markdown, and is written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias, assert_never
+from urllib.parse import quote
+
+from markupsafe import Markup
+
+from coursebuild.model import (
+    Block,
+    BlockQuote,
+    Callout,
+    Cell,
+    CodeBlock,
+    CodeSpan,
+    Emphasis,
+    Footnote,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Io,
+    Lab,
+    Link,
+    ListBlock,
+    ListItem,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    Quiz,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Target,
+    Text,
+    ThematicBreak,
+)
+
+OwnBlock: TypeAlias = Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
+"""The blocks that are more than Markdown."""
+
+
+class Context(Protocol):
+    """What a page decides. A `Markup` that it gives is HTML already, a string is not."""
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+        ...
+
+    def url(self, url: str) -> str:
+        """The address of an image that is written as `url`."""
+        ...
+
+    def math(self, tex: str, display: bool) -> Markup:
+        """A formula, set."""
+        ...
+
+    def code(self, language: str, text: str) -> Markup:
+        """A whole block of code that is only shown."""
+        ...
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        """A number that is bound to an output."""
+        ...
+
+    def block(self, block: OwnBlock) -> Markup:
+        """A block of ours."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """The words that Markdown's own elements need; `{number}` and `{occurrence}` are filled in."""
+
+    anchor: str = "Link to this section"
+    footnotes: str = "Footnotes"
+    footnote: str = "Footnote {number}"
+    back: str = "Back to reference {number}"
+    back_again: str = "Back to reference {number}, place {occurrence}"
+    table: str = "Table"
+    done: str = "Done"
+    not_done: str = "Not done"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Details of the HTML."""
+
+    words: Words = field(default_factory=Words)
+    anchors: bool = True
+    """Whether headings have their ids, and links to themselves."""
+    frames: bool = True
+    """Whether tables stand in a box of their own, that can be scrolled."""
+    void_end: str = ">"
+    """How a tag without content ends."""
+
+
+_LOOK = Look()
+_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+
+
+def escape(text: str) -> Markup:
+    """Text as HTML, also for attributes in double quotes."""
+    return Markup(text.translate(_ESCAPES))
+
+
+def render_blocks(blocks: Iterable[Block], context: Context, look: Look = _LOOK) -> Markup:
+    """Blocks one after the other, each with its line end."""
+    return Markup(_Writer(context, look).blocks(blocks))
+
+
+def render_inlines(inlines: Iterable[Inline], context: Context, look: Look = _LOOK) -> Markup:
+    """Inlines one after the other."""
+    return Markup(_Writer(context, look).inlines(inlines))
+
+
+def render_table(table: Table, context: Context, look: Look = _LOOK) -> Markup:
+    """A table."""
+    return Markup(_Writer(context, look).table(table))
+
+
+def render_footnotes(footnotes: Iterable[Footnote], context: Context, look: Look = _LOOK) -> Markup:
+    """The footnotes of a document in a section at its end; empty where there are none."""
+    return Markup(_Writer(context, look).footnotes(footnotes))
+
+
+def reference_id(number: int, occurrence: int) -> str:
+    """The id of a reference to a footnote; no anchor made from a heading's text has a colon."""
+    return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
+
+
+def _is_tight(block: Block) -> bool:
+    return isinstance(block, Paragraph) and block.tight
+
+
+class _Writer:
+    """Writes in a context; every string that it gives is HTML."""
+
+    def __init__(self, context: Context, look: Look) -> None:
+        self.context, self.look = context, look
+
+    def blocks(self, blocks: Iterable[Block]) -> str:
+        return "".join(map(self.block, blocks))
+
+    def inlines(self, inlines: Iterable[Inline]) -> str:
+        return "".join(map(self.inline, inlines))
+
+    # -- blocks
+
+    def block(self, block: Block) -> str:
+        """One block, with its line end unless it is a paragraph of a tight list."""
+        match block:
+            case Paragraph():
+                inner = self.inlines(block.children)
+                return inner if block.tight else f"<p>{inner}</p>\n"
+            case Heading():
+                return self._heading(block)
+            case ListBlock():
+                return self._list(block)
+            case BlockQuote():
+                return f"<blockquote>\n{self.blocks(block.blocks)}</blockquote>\n"
+            case CodeBlock():
+                return self.context.code(block.language, block.code.text)
+            case HtmlBlock():
+                return block.html
+            case HtmlFlow():
+                return f"{self.inlines(block.children)}\n"
+            case ThematicBreak():
+                return f"<hr{self.look.void_end}\n"
+            case MathBlock():
+                return f"{self.context.math(block.tex.text, True)}\n"
+            case Table():
+                return self.table(block)
+            case Callout() | Io() | Lab() | Mjcf() | PlainCode() | Quiz() | Recording() | Script():
+                return self.context.block(block)
+            case _:
+                assert_never(block)
+
+    def _heading(self, heading: Heading) -> str:
+        inner, name = self.inlines(heading.children), f"h{heading.level}"
+        if not self.look.anchors:
+            return f"<{name}>{inner}</{name}>\n"
+        anchor = escape(heading.anchor)
+        kinds = f' class="{escape(" ".join(heading.classes))}"' if heading.classes else ""
+        label = escape(self.look.words.anchor)
+        link = f'<a class="anchor" href="#{quote(heading.anchor)}" aria-label="{label}">#</a>'
+        return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
+
+    def _list(self, block: ListBlock) -> str:
+        start = "" if block.start is None or block.start == 1 else f' start="{block.start}"'
+        name = "ul" if block.start is None else "ol"
+        tasks = any(item.checked is not None for item in block.items)
+        mark = ' class="task-list"' if tasks else ""
+        return f"<{name}{start}{mark}>\n{''.join(map(self._item, block.items))}</{name}>\n"
+
+    def _item(self, item: ListItem) -> str:
+        """An item; a tight paragraph stands on the line of what is before it."""
+        parts = ["<li>"]
+        if item.checked is not None:
+            parts.append(self._box(item.checked))
+        line_end = False
+        for block in item.blocks:
+            if not (
+                line_end or (_is_tight(block) and len(parts) == 1 + (item.checked is not None))
+            ):
+                parts.append("\n")
+            parts.append(self.block(block))
+            line_end = not _is_tight(block)
+        return "".join([*parts, "</li>\n"])
+
+    def _box(self, checked: bool) -> str:
+        words = self.look.words
+        label = escape(words.done if checked else words.not_done)
+        state = " checked" if checked else ""
+        return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.look.void_end} '
+
+    def table(self, table: Table) -> str:
+        """A table; its columns are aligned by class."""
+        head = self._row(table.header, table, 'th scope="col"')
+        rows = "".join(self._row(row, table, "td") for row in table.rows)
+        body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
+        html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
+        if not self.look.frames:
+            return html
+        label = escape(self.look.words.table)
+        return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
+
+    def _row(self, cells: tuple[Cell, ...], table: Table, tag: str) -> str:
+        parts = ["<tr>\n"]
+        for cell, align in zip(cells, table.align, strict=True):
+            mark = f' class="align-{align}"' if align else ""
+            parts.append(f"<{tag}{mark}>{self.inlines(cell.children)}</{tag[:2]}>\n")
+        return "".join([*parts, "</tr>\n"])
+
+    # -- inlines
+
+    def inline(self, inline: Inline) -> str:
+        """One inline."""
+        match inline:
+            case Text():
+                return inline.text.translate(_ESCAPES)
+            case SoftBreak():
+                return "\n"
+            case CodeSpan():
+                return f"<code>{inline.text.translate(_ESCAPES)}</code>"
+            case Math():
+                return self.context.math(inline.tex.text, inline.display)
+            case Emphasis():
+                return f"<em>{self.inlines(inline.children)}</em>"
+            case Strong():
+                return f"<strong>{self.inlines(inline.children)}</strong>"
+            case Strikethrough():
+                return f"<del>{self.inlines(inline.children)}</del>"
+            case Link():
+                return self._link(inline)
+            case Image():
+                return self._image(inline)
+            case RawInline():
+                return inline.html
+            case HardBreak():
+                return f"<br{self.look.void_end}\n"
+            case NumberBinding():
+                return self.context.binding(inline)
+            case FootnoteRef():
+                return self._reference(inline)
+            case _:
+                assert_never(inline)
+
+    def _link(self, link: Link) -> str:
+        title = f' title="{escape(link.title)}"' if link.title else ""
+        href = escape(self.context.href(link.target))
+        return f'<a href="{href}"{title}>{self.inlines(link.children)}</a>'
+
+    def _image(self, image: Image) -> str:
+        title = f' title="{escape(image.title)}"' if image.title else ""
+        url = escape(self.context.url(image.url))
+        return f'<img src="{url}" alt="{escape(image.alt)}"{title}{self.look.void_end}'
+
+    # -- footnotes
+
+    def _reference(self, reference: FootnoteRef) -> str:
+        number = reference.number
+        label = escape(self.look.words.footnote.format(number=number))
+        name = reference_id(number, reference.occurrence)
+        return (
+            f'<sup class="footnote-ref"><a href="#fn:{number}" id="{name}" role="doc-noteref"'
+            f' aria-label="{label}">{number}</a></sup>'
+        )
+
+    def footnotes(self, footnotes: Iterable[Footnote]) -> str:
+        items = "".join(map(self._footnote, footnotes))
+        if not items:
+            return ""
+        label = escape(self.look.words.footnotes)
+        start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
+        return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
+
+    def _footnote(self, footnote: Footnote) -> str:
+        """A footnote; the ways back stand at the end of its last paragraph."""
+        back = " ".join(self._back(footnote.number, k + 1) for k in range(footnote.references))
+        last = footnote.blocks[-1] if footnote.blocks else None
+        inner = self.blocks(footnote.blocks[:-1])
+        if isinstance(last, Paragraph):
+            inner += f"<p>{self.inlines(last.children)} {back}</p>\n"
+        else:
+            inner += f"{'' if last is None else self.block(last)}<p>{back}</p>\n"
+        return f'<li id="fn:{footnote.number}">\n{inner}</li>\n'
+
+    def _back(self, number: int, occurrence: int) -> str:
+        words = self.look.words.back if occurrence == 1 else self.look.words.back_again
+        label = escape(words.format(number=number, occurrence=occurrence))
+        mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
+        return (
+            f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
+            f' role="doc-backlink" aria-label="{label}">↩{mark}</a>'
+        )

@@ -1,0 +1,119 @@
+"""Markdown without a course: CommonMark's own HTML.
+
+Entry points: `PlainContext`, `plain_html` (a document on its own). Headings have no ids, code has no colours, formulas stay TeX, and a
+block of ours is shown as Markdown alone would show what it holds.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never
+
+from markupsafe import Markup
+
+from coursebuild.model import (
+    Callout,
+    Document,
+    ExampleTarget,
+    Io,
+    Lab,
+    LessonTarget,
+    LevelTarget,
+    Mjcf,
+    ModelTarget,
+    NumberBinding,
+    PageTarget,
+    PlainCode,
+    Quiz,
+    Recording,
+    Script,
+    Table,
+    Target,
+    UrlTarget,
+)
+from coursebuild.render.markup import (
+    Look,
+    OwnBlock,
+    escape,
+    render_blocks,
+    render_footnotes,
+    render_inlines,
+    render_table,
+)
+
+PLAIN = Look(anchors=False, frames=False, void_end=" />")
+
+
+def plain_html(document: Document) -> Markup:
+    """A document as plain HTML, its footnotes last."""
+    context = PlainContext()
+    blocks = render_blocks(document.blocks, context, PLAIN)
+    return blocks + render_footnotes(document.footnotes, context, PLAIN)
+
+
+class PlainContext:
+    """A context that knows no course."""
+
+    def href(self, target: Target) -> str:
+        """The destination as an author writes it."""
+        match target:
+            case LessonTarget():
+                return f"lesson:{target.id}" + (f"#{target.anchor}" if target.anchor else "")
+            case PageTarget():
+                return f"page:{target.id}" + (f"#{target.anchor}" if target.anchor else "")
+            case LevelTarget():
+                return f"level:{target.id}"
+            case ModelTarget():
+                return f"model:{target.name}"
+            case ExampleTarget():
+                return target.path
+            case UrlTarget():
+                return target.url
+            case _:
+                assert_never(target)
+
+    def url(self, url: str) -> str:
+        """The address as written."""
+        return url
+
+    def math(self, tex: str, display: bool) -> Markup:
+        """The TeX between its delimiters."""
+        start, end = (r"\[", r"\]") if display else (r"\(", r"\)")
+        return Markup(f'<span class="math">{start}{escape(tex)}{end}</span>')
+
+    def code(self, language: str, text: str) -> Markup:
+        """The code as text."""
+        name = f' class="language-{escape(language)}"' if language else ""
+        return Markup(f"<pre><code{name}>{escape(text)}</code></pre>\n")
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        """The number as a code span."""
+        return Markup(f"<code>{escape(binding.text)}</code>")
+
+    def block(self, block: OwnBlock) -> Markup:
+        """What a block of ours holds, as Markdown alone would show it."""
+        match block:
+            case Callout():
+                title = (
+                    f"<p>{render_inlines(block.title, self, PLAIN)}</p>\n" if block.title else ""
+                )
+                return Markup(
+                    f"<blockquote>\n{title}{render_blocks(block.blocks, self, PLAIN)}</blockquote>\n"
+                )
+            case Script() | PlainCode():
+                return self.code("python", block.code.text)
+            case Mjcf():
+                return self.code("mjcf", block.code.text)
+            case Recording():
+                caption = f"<p>{render_inlines(block.caption, self, PLAIN)}</p>\n"
+                if isinstance(block.body, Table):
+                    return Markup(caption + render_table(block.body, self, PLAIN))
+                return Markup(caption + self.code("text", block.body.text))
+            case Io():
+                parts = (block.input, block.process, block.output)
+                return Markup(
+                    "".join(f"<p>{render_inlines(part, self, PLAIN)}</p>\n" for part in parts)
+                )
+            case Lab() | Quiz():
+                return Markup(f"<p>{escape(block.title)}</p>\n")
+            case _:
+                assert_never(block)

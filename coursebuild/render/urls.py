@@ -1,0 +1,104 @@
+"""Where each thing of the course stands in the site, and how one page refers to another.
+
+Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the site's root), and
+`Place`, the point from which a page refers to others.
+
+1. A site path is plain text, as the file is named on disk; it is percent-encoded only when it
+   becomes part of an address.
+2. Every address is relative, so that the site works in any folder, from a disk and under any base.
+   The page for missing addresses is served at every depth, so its addresses begin with the path of
+   the course's base address instead.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass
+from urllib.parse import quote, unquote, urlsplit
+
+from coursebuild.model import Course, Lesson, Level, Page
+
+HOME = "index.html"
+NOT_FOUND = "404.html"
+EXAMPLES_ZIP = "examples.zip"
+SITEMAP = "sitemap.xml"
+ROBOTS = "robots.txt"
+
+
+def lesson_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.html`."""
+    return f"lessons/{lesson.id}-{lesson.slug}.html"
+
+
+def lesson_zip_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.zip`: the scripts of one lesson."""
+    return f"lessons/{lesson.id}-{lesson.slug}.zip"
+
+
+def level_path(level: Level) -> str:
+    """`levels/4.html`."""
+    return f"levels/{level.id}.html"
+
+
+def model_page_path(name: str) -> str:
+    """`models/tumbling_box.html`."""
+    return f"models/{name}.html"
+
+
+def model_file_path(name: str) -> str:
+    """`models/tumbling_box.xml`: the model itself."""
+    return f"models/{name}.xml"
+
+
+def page_path(page: Page) -> str:
+    """`about.html`."""
+    return f"{page.id}.html"
+
+
+def file_path(path: str) -> str:
+    """`files/lessons/sketch.svg`: a file of `content/` that pages show or link to."""
+    return "files/" + path.removeprefix("content/")
+
+
+def local_file(url: str, document_path: str) -> str:
+    """The path, from the project root, of the file that a relative address in a document names."""
+    path = unquote(url.split("#", 1)[0].split("?", 1)[0])
+    base = "" if path.startswith("/") else posixpath.dirname(document_path)
+    return posixpath.normpath(posixpath.join(base, path.lstrip("/")))
+
+
+def absolute(course: Course, path: str) -> str:
+    """The full address of a site path, or the empty text where the course has no base address."""
+    if not course.base_url:
+        return ""
+    return course.base_url.rstrip("/") + "/" + encode("" if path == HOME else path)
+
+
+def base_path(course: Course) -> str:
+    """The path of the course's base address, with a slash at both ends."""
+    path = urlsplit(course.base_url).path.strip("/")
+    return f"/{path}/" if path else "/"
+
+
+def encode(path: str) -> str:
+    """A site path as part of an address; colons are encoded, since one may read as a scheme."""
+    return quote(path, safe="/~-._+@,")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """The page that addresses are written for."""
+
+    path: str
+    """Its site path."""
+    root: str | None = None
+    """What every address begins with; `None`: addresses are relative to `path`."""
+
+    def href(self, path: str, anchor: str | None = None) -> str:
+        """The address of a site path, and of an anchor there."""
+        fragment = f"#{quote(anchor, safe='')}" if anchor else ""
+        if self.root is not None:
+            return self.root + encode("" if path == HOME else path) + fragment
+        if path == self.path:
+            return fragment or encode(posixpath.basename(path))
+        return encode(posixpath.relpath(path, posixpath.dirname(self.path) or ".")) + fragment

@@ -1,0 +1,136 @@
+"""Which recorded line corresponds to which line that ran.
+
+Entry points: `same_lines` (do they match?) and `align` (where do they differ?).
+
+`align` pairs lines by weight: lines that match, lines that differ only in their numbers, lines that
+share at least half of their words. Lines in between that found no partner are taken as changed,
+one for one, and the rest as missing or extra; beside a recorded `...` line, lines that ran are
+elided instead.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from coursebuild.model import Comparison
+from coursebuild.scripts.ellipsis import blocks_match
+from coursebuild.scripts.lines import LineMatcher
+from coursebuild.scripts.pairing import MATCH, Keys, pair
+from coursebuild.scripts.traced import Side
+
+_ALIKE = 6
+_WORD = re.compile(r"[^\W\d]+")
+
+
+class StepKind(enum.Enum):
+    """What happens at one step through both sides."""
+
+    SAME = "same"
+    DIFFERS = "differs"
+    MISSING = "missing"
+    EXTRA = "extra"
+    ELLIPSIS = "ellipsis"
+    """A recorded `...` line."""
+    ELIDED = "elided"
+    """A line that ran and that a `...` line stands for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step; the indices count lines from 0.
+
+    For `EXTRA` and `ELIDED`, `recorded` is the line before which the line stands; for `MISSING` and
+    `ELLIPSIS`, `ran` is the line that comes next.
+    """
+
+    kind: StepKind
+    recorded: int
+    ran: int
+
+
+def same_lines(recorded: Side, ran: Side, comparison: Comparison) -> bool:
+    """Whether what ran is what was recorded."""
+    if recorded.texts == ran.texts:
+        return True
+    matcher = LineMatcher(comparison)
+    if not comparison.ellipsis:
+        return len(recorded.lines) == len(ran.lines) and all(
+            matcher.matches(a.text, b.text) for a, b in zip(recorded.lines, ran.lines, strict=True)
+        )
+    return blocks_match(recorded.texts, ran.texts, matcher)
+
+
+def align(recorded: Side, ran: Side, matcher: LineMatcher) -> tuple[Step, ...]:
+    """The steps that lead through both sides, in order."""
+    literal = [i for i, line in enumerate(recorded.lines) if not matcher.elides_lines(line.text)]
+    pairs = _line_pairs([recorded.lines[i].text for i in literal], literal, ran, recorded, matcher)
+    steps: list[Step] = []
+    i = j = 0
+    for literal_index, ran_index in (*pairs, (len(literal), len(ran.lines))):
+        stop = literal[literal_index] if literal_index < len(literal) else len(recorded.lines)
+        steps += _gap(i, stop, j, ran_index, recorded, matcher)
+        if stop < len(recorded.lines):
+            same = matcher.matches(recorded.lines[stop].text, ran.lines[ran_index].text)
+            steps.append(Step(StepKind.SAME if same else StepKind.DIFFERS, stop, ran_index))
+        i, j = stop + 1, ran_index + 1
+    return tuple(steps)
+
+
+def _line_pairs(
+    lines: Sequence[str], literal: Sequence[int], ran: Side, recorded: Side, matcher: LineMatcher
+) -> tuple[tuple[int, int], ...]:
+    texts = ran.texts
+    # A `...` line stands just before line `k` of those that are none.
+    following = [*literal, len(recorded.lines)]
+    free = [before != after - 1 for before, after in zip([-1, *literal], following, strict=True)]
+    words: dict[str, Counter[str]] = {}
+
+    def words_of(line: str) -> Counter[str]:
+        if line not in words:
+            words[line] = Counter(_WORD.findall(line))
+        return words[line]
+
+    def weight(i: int, j: int) -> int:
+        if matcher.matches(lines[i], texts[j]):
+            return MATCH
+        if matcher.alike(lines[i], texts[j]):
+            return _ALIKE
+        return _likeness(words_of(lines[i]), words_of(texts[j]))
+
+    return pair(
+        Keys(lines, [matcher.canon(line).skeleton for line in lines]),
+        Keys(texts, [matcher.canon(line).skeleton for line in texts]),
+        weight,
+        free,
+    )
+
+
+def _likeness(a: Counter[str], b: Counter[str]) -> int:
+    """From 1 to 4 for lines that share half to all of their words, else 0."""
+    most = max(a.total(), b.total())
+    shared = (a & b).total()
+    return 1 + 3 * (2 * shared - most) // most if shared and 2 * shared >= most else 0
+
+
+def _gap(
+    i: int, i_stop: int, j: int, j_stop: int, recorded: Side, matcher: LineMatcher
+) -> list[Step]:
+    """The steps between two pairs: recorded lines `[i, i_stop)`, lines that ran `[j, j_stop)`."""
+    elliptic = [matcher.elides_lines(recorded.lines[k].text) for k in range(i, i_stop)]
+    steps: list[Step] = []
+    if any(elliptic):
+        for k, elides in enumerate(elliptic, start=i):
+            steps.append(Step(StepKind.ELLIPSIS if elides else StepKind.MISSING, k, j))
+            if elides:
+                steps += (Step(StepKind.ELIDED, k + 1, line) for line in range(j, j_stop))
+                j = j_stop
+        return steps
+    both = min(i_stop - i, j_stop - j)
+    steps += (Step(StepKind.DIFFERS, i + k, j + k) for k in range(both))
+    steps += (Step(StepKind.MISSING, k, j_stop) for k in range(i + both, i_stop))
+    steps += (Step(StepKind.EXTRA, i_stop, k) for k in range(j + both, j_stop))
+    return steps

@@ -1,0 +1,241 @@
+"""Numbers in prose that must be what a script printed: `` `+6.6 %`{out} ``.
+
+Entry points: `check_bindings` (a document), `leaning_on` (who leans on what has changed).
+
+1. A binding leans on the nearest recorded output above it, or on the script that `{out=…}` names:
+   on its recorded outputs anywhere in the course, else on what it printed in this run.
+2. The numbers of a binding must be numbers of one printed line, one after the other, each rounded
+   to the digits shown: within half a unit of the last place shown. Integers must be equal.
+3. Text beside the numbers (a unit, a name) chooses: where it stands beside printed numbers as well,
+   only those count. A binding without a number must stand in the output as text.
+4. Recorded text decides, whatever this run printed: drift is reported by itself, with the bindings
+   that lean on it. Only where recorded text leaves things out (`...`, tables) does the run count.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
+from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
+from coursebuild.scripts.printed import PrintedLine, lines_of_run, printed_lines
+from coursebuild.scripts.shown import Shown, text_places
+from coursebuild.source import Span
+
+_FAILED = (
+    Outcome.FAILED,
+    Outcome.TIMEOUT,
+    Outcome.KILLED,
+    Outcome.OUTPUT_LIMIT,
+    Outcome.ENCODING,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Leaning:
+    """A binding, and the change of a recorded value that it leans on."""
+
+    binding: NumberBinding
+    change: Change
+
+
+class Printed:
+    """What a binding can lean on: the recorded outputs of a course and the runs of its scripts."""
+
+    def __init__(self, verdicts: Iterable[Verdict], runs: Iterable[ScriptRun]) -> None:
+        self._runs = {run.path: run for run in runs}
+        self._by_script: dict[str, list[Verdict]] = {}
+        self._by_document: dict[str, list[Verdict]] = {}
+        self._lines: dict[tuple[str, int], tuple[PrintedLine, ...]] = {}
+        for verdict in verdicts:
+            recording = verdict.recording
+            if recording.script is not None:
+                self._by_script.setdefault(recording.script, []).append(verdict)
+                self._by_document.setdefault(recording.span.path, []).append(verdict)
+        for found in self._by_document.values():
+            found.sort(key=lambda verdict: verdict.recording.body_span.end)
+
+    def scripts(self) -> set[str]:
+        """The paths of all scripts that were to be run or that have a recorded output."""
+        return {*self._runs, *self._by_script}
+
+    def run(self, path: str) -> ScriptRun | None:
+        """The run of a script."""
+        return self._runs.get(path)
+
+    def recorded(self, binding: NumberBinding) -> list[Verdict]:
+        """The recorded outputs that a binding leans on."""
+        if binding.script is not None:
+            return self._by_script.get(binding.script, [])
+        found = self._by_document.get(binding.span.path, [])
+        after = bisect_left(
+            found, binding.span.start + 1, key=lambda verdict: verdict.recording.body_span.end
+        )
+        return found[after - 1 : after] if after else []
+
+    def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
+        """The lines of a recorded output."""
+        key = (verdict.recording.span.path, verdict.recording.body_span.start)
+        if key not in self._lines:
+            self._lines[key] = printed_lines(verdict.recording)
+        return self._lines[key]
+
+
+def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
+    """The bindings of a document, in order: footnotes, tables, callouts and quizzes as well."""
+    return tuple(i for i in document_inlines(document) if isinstance(i, NumberBinding))
+
+
+def check_bindings(document: Document, printed: Printed) -> tuple[Diagnostic, ...]:
+    """What is wrong with the bindings of a document.
+
+    Nothing is said of bindings that lean on a script that failed: its failure is reported.
+    """
+    found = (_check(binding, printed) for binding in document_bindings(document))
+    return tuple(diagnostic for diagnostic in found if diagnostic is not None)
+
+
+def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
+    verdicts = printed.recorded(binding)
+    path = binding.script or (verdicts[0].recording.script if verdicts else None)
+    run = printed.run(path) if path is not None else None
+    if path is None or (not verdicts and run is None):
+        return _orphan(binding, printed)
+    if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
+        return None
+    if not verdicts:
+        return _unrecorded(binding, path, run)
+    steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
+    if not steady:
+        return diagnose(
+            "binding-volatile",
+            binding.text_span,
+            f"`{binding.text}` is bound to an output that differs by machine",
+            help="take `{out}` away, or compare the output by another key than `volatile`",
+        )
+    lines = [line for verdict in steady for line in printed.lines(verdict)]
+    if _holds(binding, lines):
+        return None
+    partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
+    if partial and run is not None and run.outcome is Outcome.OK:
+        lines += lines_of_run(run.stdout)
+        if _holds(binding, lines):
+            return None
+    return _mismatch(binding, path, lines)
+
+
+def _silent(run: ScriptRun) -> bool:
+    return run.outcome is Outcome.OK and not run.stdout.strip()
+
+
+def _unrecorded(binding: NumberBinding, path: str, run: ScriptRun | None) -> Diagnostic | None:
+    """A binding to a script without a recorded output: what it printed in this run counts."""
+    if run is None or run.outcome is Outcome.NORUN:
+        return diagnose(
+            "binding-orphan",
+            binding.text_span,
+            f"`{binding.text}` is bound to `{path}`, which has no recorded output and is not run",
+            help="record its output below it",
+        )
+    if run.outcome is not Outcome.OK:
+        return None
+    lines = lines_of_run(run.stdout)
+    return None if _holds(binding, lines) else _mismatch(binding, path, lines)
+
+
+def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
+    shown = Shown.of(binding.text)
+    if not shown.numbers:
+        return bool(shown.before) and any(True for _ in text_places(shown.before, lines))
+    return any(shown.shows(window) for window in shown.windows(lines))
+
+
+def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
+    if binding.script is None:
+        return diagnose(
+            "binding-orphan",
+            binding.text_span,
+            f"`{binding.text}` has no recorded output above it to lean on",
+            help="write it below the output, or name the script: `{out=examples/…}`",
+        )
+    return diagnose(
+        "binding-orphan",
+        binding.text_span,
+        f"`{binding.text}` is bound to `{binding.script}`, which is no script of the course",
+        help=did_you_mean(binding.script, printed.scripts()),
+    )
+
+
+def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -> Diagnostic:
+    shown = Shown.of(binding.text)
+    if not shown.numbers:
+        return diagnose(
+            "binding-mismatch",
+            binding.text_span,
+            f"`{binding.text}` does not stand in the output of `{path}`",
+            help="write it as it is printed, or take `{out}` away",
+        )
+    windows = shown.windows(lines)
+    label, help_text = "", ""
+    if windows:
+        nearest = min(windows, key=shown.distance)
+        several = len(nearest.numbers) > 1
+        label = f"the nearest printed value{'s are' if several else ' is'} {nearest.text}"
+        better = shown.rewritten(binding.text, nearest)
+        help_text = f"write `{better}`" if better else ""
+    elif len(shown.numbers) > 1 and any(line.numbers for line in lines):
+        label = f"no printed line has {len(shown.numbers)} numbers one after the other"
+    else:
+        label = "no number was printed"
+    return diagnose(
+        "binding-mismatch",
+        binding.text_span,
+        f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown",
+        label=label,
+        help=help_text,
+    )
+
+
+def leaning_on(
+    verdict: Verdict, documents: Iterable[Document], printed: Printed
+) -> tuple[Leaning, ...]:
+    """The bindings of the course that lean on a value of a recording that changed, in order."""
+    key = (verdict.recording.span.path, verdict.recording.body_span.start)
+    changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
+    found: list[Leaning] = []
+    for document in documents:
+        for binding in document_bindings(document):
+            for candidate in printed.recorded(binding):
+                recording = candidate.recording
+                if (recording.span.path, recording.body_span.start) == key:
+                    change = _changed(binding, printed.lines(candidate), changes)
+                    if change is not None:
+                        found.append(Leaning(binding, change))
+    return tuple(found)
+
+
+def _changed(
+    binding: NumberBinding, lines: Sequence[PrintedLine], changes: Sequence[Change]
+) -> Change | None:
+    """The first change of a value that a binding leans on."""
+    for span in _leans_at(binding, lines):
+        for change in changes:
+            if span.start < change.span.end and change.span.start < span.end:
+                return change
+    return None
+
+
+def _leans_at(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
+    shown = Shown.of(binding.text)
+    if not shown.numbers:
+        for line, start, end in text_places(shown.before, lines) if shown.before else ():
+            if line.locate is not None:
+                yield line.locate(start, end)
+        return
+    for window in shown.windows(lines):
+        if window.line.locate is not None and shown.shows(window):
+            for number in window.numbers:
+                yield window.line.locate(number.start, number.end)

@@ -1,0 +1,145 @@
+"""The scripts of a course: what is extracted to which path, and which lesson line each line is.
+
+Entry points: `extract` (a course's scripts and what is wrong with their paths), `jobs`.
+
+Two paths clash when they are equal, when they are one file where upper and lower case are not told
+apart, or when one is a folder on the way to the other. The first in the order of the course stays.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.model import Course, Document, Lesson, Page, Script, document_blocks
+from coursebuild.results import ScriptJob
+from coursebuild.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Extraction:
+    """A script and the file that it becomes."""
+
+    path: str
+    """POSIX path relative to the project root."""
+    text: str
+    """LF line ends, ending in exactly one newline."""
+    script: Script
+    owner: str
+    """The id of the lesson or page that it stands in."""
+
+    @property
+    def data(self) -> bytes:
+        """The file's bytes."""
+        return self.text.encode()
+
+    @property
+    def document(self) -> str:
+        """The path of the lesson or page."""
+        return self.script.span.path
+
+    def line_span(self, line: int) -> Span | None:
+        """Where a line of the file (from 1) stands in the lesson; `None` if it has no such line."""
+        code = self.script.code
+        start = 0
+        for _ in range(line - 1):
+            newline = code.text.find("\n", start)
+            if newline < 0:
+                return None
+            start = newline + 1
+        if line < 1 or start >= len(code.text):
+            return None
+        end = code.text.find("\n", start)
+        return code.span(start, len(code.text) if end < 0 else end)
+
+
+def owners(course: Course) -> Iterator[tuple[str, Document]]:
+    """Every document of a course with the id of its lesson or page, in order."""
+    parts: tuple[Lesson | Page, ...] = (*course.lessons, *course.pages)
+    for part in parts:
+        if part.document is not None:
+            yield part.id, part.document
+
+
+def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
+    """The scripts of a course in order, no two of which clash."""
+    kept: list[Extraction] = []
+    found: list[Diagnostic] = []
+    paths = _Paths()
+    for owner, document in owners(course):
+        for block in document_blocks(document):
+            if not isinstance(block, Script):
+                continue
+            text = block.code.text.rstrip("\n") + "\n"
+            extraction = Extraction(block.path, text, block, owner)
+            clash = paths.clash(extraction)
+            if clash is None:
+                paths.add(extraction)
+                kept.append(extraction)
+            else:
+                found.append(clash)
+    return Parsed(tuple(kept), tuple(found))
+
+
+def jobs(extractions: Iterable[Extraction]) -> tuple[ScriptJob, ...]:
+    """What to run."""
+    return tuple(
+        ScriptJob(e.path, e.script.args, e.script.timeout, e.script.requires, e.script.norun)
+        for e in extractions
+    )
+
+
+def _key(path: str) -> str:
+    """The same for paths that some file system takes for one."""
+    return unicodedata.normalize("NFC", path).casefold()
+
+
+def _folders(key: str) -> Iterator[str]:
+    while "/" in key:
+        key = key.rpartition("/")[0]
+        yield key
+
+
+class _Paths:
+    """The paths taken so far."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, Extraction] = {}
+        self._folders: dict[str, Extraction] = {}
+
+    def add(self, extraction: Extraction) -> None:
+        key = _key(extraction.path)
+        self._files[key] = extraction
+        for folder in _folders(key):
+            self._folders.setdefault(folder, extraction)
+
+    def clash(self, new: Extraction) -> Diagnostic | None:
+        key = _key(new.path)
+        same = self._files.get(key)
+        if same is not None and same.path == new.path:
+            return _clash(new, same, f"`{new.path}` is written by two blocks", "written here first")
+        if same is not None:
+            message = f"`{new.path}` and `{same.path}` are one file where case does not count"
+            return _clash(new, same, message, f"`{same.path}` is written here")
+        inside = self._folders.get(key)
+        if inside is not None:
+            message = f"`{new.path}` is a file here and a folder of `{inside.path}`"
+            return _clash(new, inside, message, f"`{inside.path}` is written here")
+        for folder in _folders(key):
+            file = self._files.get(folder)
+            if file is not None:
+                message = f"`{file.path}` is a file and cannot be a folder of `{new.path}`"
+                return _clash(new, file, message, f"`{file.path}` is written here")
+        return None
+
+
+def _clash(new: Extraction, old: Extraction, message: str, note: str) -> Diagnostic:
+    return diagnose(
+        "script-repeated",
+        new.script.path_span,
+        message,
+        help="give one of them another path",
+        notes=[Note(note, old.script.path_span)],
+    )

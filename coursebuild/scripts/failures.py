@@ -1,0 +1,200 @@
+"""What to say about a script that did not run to its end.
+
+Entry points: `failure` (a run), `silence` (an output is recorded and nothing was printed),
+`in_lessons` (a text with the paths of extracted files made places of lessons).
+
+A traceback's frames are read out of the standard error: each line of an extracted file is the line
+of a lesson, and the innermost such line is what the diagnostic points at.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import assert_never
+
+from coursebuild.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.model import Recording
+from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.extract import Extraction
+from coursebuild.source import Span
+
+_FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
+_WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
+_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_CRASH = "most recent call first"
+_LIBRARIES = ("site-packages", "dist-packages")
+
+_SIGNALS = {
+    1: "SIGHUP",
+    2: "SIGINT",
+    3: "SIGQUIT",
+    4: "SIGILL",
+    5: "SIGTRAP",
+    6: "SIGABRT",
+    7: "SIGBUS",
+    8: "SIGFPE",
+    9: "SIGKILL",
+    11: "SIGSEGV",
+    13: "SIGPIPE",
+    14: "SIGALRM",
+    15: "SIGTERM",
+    24: "SIGXCPU",
+    25: "SIGXFSZ",
+    31: "SIGSYS",
+}
+"""As Linux numbers them (signal(7))."""
+
+_TAIL_LINES = 30
+_TAIL_CHARACTERS = 4000
+_LABEL = 120
+
+
+class _Lessons:
+    """Finds the lesson's line for a line of an extracted file, wherever that file lies."""
+
+    def __init__(self, extractions: Iterable[Extraction]) -> None:
+        self._by_path = {extraction.path: extraction for extraction in extractions}
+
+    def place(self, found: re.Match[str]) -> Span | None:
+        parts = found["path"].replace("\\", "/").split("/")
+        if any(library in parts for library in _LIBRARIES):
+            return None
+        for first in range(len(parts)):
+            extraction = self._by_path.get("/".join(parts[first:]))
+            if extraction is not None:
+                return extraction.line_span(int(found["line"]))
+        return None
+
+
+def in_lessons(text: str, extractions: Iterable[Extraction]) -> str:
+    """The text with `File "…/examples/x.py", line 12` made the lesson's path and line."""
+    return _in_lessons(text, _Lessons(extractions))
+
+
+def _in_lessons(text: str, lessons: _Lessons) -> str:
+    def frame(found: re.Match[str]) -> str:
+        span = lessons.place(found)
+        return found.group() if span is None else f'File "{span.path}", line {span.line}'
+
+    def warning(found: re.Match[str]) -> str:
+        span = lessons.place(found)
+        return found.group() if span is None else f"{span.path}:{span.line}"
+
+    return _WARNING.sub(warning, _FRAME.sub(frame, text))
+
+
+def failure(
+    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+) -> Diagnostic | None:
+    """What is wrong with a run; `None` for one that ended well or was not to be made."""
+    path = f"`{extraction.path}`"
+    fence = extraction.script.span.first_line()
+    match run.outcome:
+        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
+            return None
+        case Outcome.FAILED:
+            message = f"{path} exited with status {run.status}"
+            return _crash("script-failed", extraction, run, extractions, message)
+        case Outcome.KILLED:
+            message = f"{path} was ended by {_signal_name(run.status)}"
+            return _crash("script-killed", extraction, run, extractions, message)
+        case Outcome.TIMEOUT:
+            limit = f"{extraction.script.timeout:g}"
+            return diagnose(
+                "script-timeout",
+                fence,
+                f"{path} was stopped after {limit} s, its time limit",
+                help="make it do less, or set `timeout=SECONDS` on its fence to a higher limit",
+                notes=_stderr_notes(run, _Lessons(extractions)),
+            )
+        case Outcome.OUTPUT_LIMIT:
+            return diagnose(
+                "script-output-limit",
+                fence,
+                f"{path} printed more than 1 MiB",
+                help="print less: a recorded output is to be read",
+                notes=_stderr_notes(run, _Lessons(extractions)),
+            )
+        case Outcome.ENCODING:
+            return diagnose(
+                "script-encoding",
+                fence,
+                f"{path} printed bytes that are not UTF-8",
+                help="print text; `sys.stdout.buffer` takes bytes as they are",
+                notes=_stderr_notes(run, _Lessons(extractions)),
+            )
+        case _:
+            assert_never(run.outcome)
+
+
+def silence(recording: Recording, path: str) -> Diagnostic:
+    """An output is recorded, and the script printed no line."""
+    return diagnose(
+        "script-silent",
+        recording.caption_span,
+        f"an output is recorded here and `{path}` printed nothing",
+        help="print what is recorded, or take the recorded output away",
+    )
+
+
+def _signal_name(number: int) -> str:
+    return _SIGNALS.get(number, f"signal {number}")
+
+
+def _crash(
+    rule: str,
+    extraction: Extraction,
+    run: ScriptRun,
+    extractions: Iterable[Extraction],
+    message: str,
+) -> Diagnostic:
+    """A diagnostic at the innermost line of the traceback that lies in a lesson."""
+    lessons = _Lessons(extractions)
+    stderr = _COLOURS.sub("", run.stderr)
+    frames = [(found, span) for found in _FRAME.finditer(stderr) if (span := lessons.place(found))]
+    fence = extraction.script.span.first_line()
+    notes: list[Note] = []
+    span = fence
+    if frames:
+        span = frames[0 if _CRASH in stderr else -1][1]
+        inside = extraction.script.span
+        if span.source is not inside.source or not inside.start <= span.start < inside.end:
+            notes.append(Note(f"`{extraction.path}` was running", fence))
+    return diagnose(
+        rule,
+        span,
+        message,
+        label=_last_words(stderr) if rule == "script-failed" else "",
+        help="the system ends a process that takes too much memory" if _is_kill(rule, run) else "",
+        notes=[*notes, *_stderr_notes(run, lessons)],
+    )
+
+
+def _is_kill(rule: str, run: ScriptRun) -> bool:
+    return rule == "script-killed" and _signal_name(run.status) == "SIGKILL"
+
+
+def _last_words(stderr: str) -> str:
+    """The exception's line of the last traceback, else the last line that was written."""
+    frames = list(_FRAME.finditer(stderr))
+    if frames:
+        after = stderr[frames[-1].end() :].split("\n")[1:]
+        lines = [line for line in after if line and not line[0].isspace()]
+        if lines:
+            return shortened(lines[0].strip(), _LABEL)
+    written = [line.strip() for line in stderr.split("\n") if line.strip()]
+    return shortened(written[-1], _LABEL) if written else ""
+
+
+def _stderr_notes(run: ScriptRun, lessons: _Lessons) -> list[Note]:
+    """The end of the standard error, its paths made places of lessons."""
+    text = _in_lessons(_COLOURS.sub("", run.stderr), lessons).rstrip()
+    if not text.strip():
+        return []
+    lines = text.replace("\r\n", "\n").split("\n")
+    tail = "\n".join(lines[-_TAIL_LINES:])
+    cut = len(lines) > _TAIL_LINES or len(tail) > _TAIL_CHARACTERS
+    lead = "its standard error ended with" if cut else "its standard error"
+    return [Note(f"{lead}:\n{tail[-_TAIL_CHARACTERS:]}")]

@@ -1,0 +1,47 @@
+"""Everything that running the scripts of a course shows to be wrong.
+
+Entry point: `script_findings`. Each script that failed, each recorded output that is not what was
+printed, each bound number that no output bears out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.model import Course
+from coursebuild.results import Outcome, ScriptRun, Verdict
+from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
+from coursebuild.scripts.compare import is_silent
+from coursebuild.scripts.drift import drift_diagnostic
+from coursebuild.scripts.extract import Extraction, owners
+from coursebuild.scripts.failures import failure, silence
+
+
+def script_findings(
+    course: Course,
+    extractions: Sequence[Extraction],
+    runs: Sequence[ScriptRun],
+    verdicts: Sequence[Verdict],
+) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a course whose scripts were run and whose recordings were compared."""
+    by_path = {run.path: run for run in runs}
+    found: list[Diagnostic] = []
+    for extraction in extractions:
+        run = by_path.get(extraction.path)
+        failed = failure(extraction, run, extractions) if run is not None else None
+        if failed is not None:
+            found.append(failed)
+    printed = Printed(verdicts, runs)
+    owner_of = {document.source.path: owner for owner, document in owners(course)}
+    for verdict in verdicts:
+        recording = verdict.recording
+        run = by_path.get(recording.script or "")
+        if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
+            found.append(silence(recording, run.path))
+        elif verdict.status == "drift":
+            leaning = leaning_on(verdict, course.documents, printed)
+            found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
+    for document in course.documents:
+        found += check_bindings(document, printed)
+    return tuple(found)

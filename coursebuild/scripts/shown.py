@@ -1,0 +1,129 @@
+"""What a bound number in prose shows, and which printed numbers it may mean.
+
+Entry points: `Shown.of`, `shows`, `text_places`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+
+from coursebuild.scripts.celltext import plain
+from coursebuild.scripts.numbers import (
+    Number,
+    difference,
+    round_like,
+    scan_prose,
+    within_half_unit,
+)
+from coursebuild.scripts.printed import PrintedLine
+
+
+def shows(shown: Number, printed: Number) -> bool:
+    """Whether a number in prose is a printed one, rounded to the digits shown."""
+    if not (shown.finite and printed.finite):
+        return (shown.value.is_nan() and printed.value.is_nan()) or shown.value == printed.value
+    if shown.integer and printed.integer:
+        return shown.value == printed.value
+    return within_half_unit(shown, printed.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Numbers of one printed line, one after the other."""
+
+    line: PrintedLine
+    numbers: tuple[Number, ...]
+
+    @property
+    def text(self) -> str:
+        """The numbers as printed."""
+        return ", ".join(number.text for number in self.numbers)
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a binding shows: its numbers and the text around them; `before` is all without any."""
+
+    before: str
+    numbers: tuple[Number, ...]
+    after: str
+
+    @classmethod
+    def of(cls, text: str) -> Shown:
+        """The numbers and the plain text of a binding."""
+        numbers = scan_prose(text)
+        if not numbers:
+            return cls(plain(text), (), "")
+        return cls(plain(text[: numbers[0].start]), numbers, plain(text[numbers[-1].end :]))
+
+    def shows(self, window: Window) -> bool:
+        """Whether the printed numbers are those shown, rounded."""
+        pairs = zip(self.numbers, window.numbers, strict=True)
+        return all(shows(shown, printed) for shown, printed in pairs)
+
+    def distance(self, window: Window) -> Decimal:
+        """How far the printed numbers are from those shown: the sum of the absolute differences."""
+        total = Decimal(0)
+        for shown, printed in zip(self.numbers, window.numbers, strict=True):
+            if shown.finite and printed.finite:
+                total += difference(shown.value, printed.value)
+            elif not shows(shown, printed):
+                return Decimal("Infinity")
+        return total
+
+    def rewritten(self, text: str, window: Window) -> str | None:
+        """The binding's text with printed numbers in it, rounded to the digits that it shows.
+
+        `None` where its notation is not that of a printed number.
+        """
+        parts: list[str] = []
+        at = 0
+        for number, printed in zip(self.numbers, window.numbers, strict=True):
+            rounded = round_like(number, printed.value) if printed.finite else None
+            if rounded is None:
+                return None
+            parts += (text[at : number.start], rounded)
+            at = number.end
+        return "".join((*parts, text[at:]))
+
+    def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
+        """The printed numbers that may be meant, by number and by the text around them."""
+        count = len(self.numbers)
+        windows = [
+            Window(line, line.numbers[first : first + count])
+            for line in lines
+            for first in range(len(line.numbers) - count + 1)
+        ]
+        for pattern, side in ((self.after, _followed), (self.before, _preceded)):
+            if pattern:
+                windows = [w for w in windows if side(w, pattern)] or windows
+        return windows
+
+
+def _followed(window: Window, text: str) -> bool:
+    rest = window.line.text[window.numbers[-1].end :].lstrip().replace("\u2212", "-")
+    return re.match(_whole_words(text), rest) is not None
+
+
+def _preceded(window: Window, text: str) -> bool:
+    start = window.numbers[0].start
+    before = plain(window.line.text[max(0, start - 4 * len(text) - 200) : start])
+    return re.search(_whole_words(text) + r"\Z", before) is not None
+
+
+def _whole_words(text: str) -> str:
+    """A pattern for a text, its white space of any width, that does not begin or end in a word."""
+    lead = r"(?<!\w)" if text[:1].isalnum() else ""
+    tail = r"(?!\w)" if text[-1:].isalnum() else ""
+    return lead + r"\s+".join(re.escape(word) for word in text.split()) + tail
+
+
+def text_places(text: str, lines: Iterable[PrintedLine]) -> Iterator[tuple[PrintedLine, int, int]]:
+    """Where a text stands in printed lines: whole words only, white space of any width."""
+    pattern = re.compile(_whole_words(text))
+    for line in lines:
+        for found in pattern.finditer(line.text.replace("\u2212", "-")):
+            yield line, found.start(), found.end()

@@ -1,0 +1,178 @@
+"""Texts to compare: filtered, split into lines, every part with the place that it came from.
+
+Entry points: `Traced.of_text`, `filtered`, `Side.of`.
+
+1. `Traced` is a text with its origin: stretches that are copies know it character by character, a
+   stretch that a filter wrote stands for all that it replaced.
+2. `filtered` applies the course's filters, one after the other, each to the whole text (`^` and `$`
+   match at lines).
+3. A `Side` is what one side of a comparison has: the lines without trailing white space and without
+   trailing empty lines.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from coursebuild.model import Filter
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of a traced text, up to the next piece."""
+
+    at: int
+    """Offset in the text."""
+    start: int
+    """Offset in the origin."""
+    end: int
+    """Offset in the origin."""
+    verbatim: bool
+    """Copied character by character; otherwise all of the stretch stands for `[start, end)`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Traced:
+    """A text whose characters know where they came from; pieces are in order, without gaps."""
+
+    text: str
+    pieces: tuple[Piece, ...]
+
+    @classmethod
+    def of_text(cls, text: str) -> Traced:
+        """A text that is its own origin."""
+        return cls(text, (Piece(0, 0, len(text), True),))
+
+    def _piece(self, at: int) -> Piece:
+        return self.pieces[max(0, bisect_right(self.pieces, at, key=lambda piece: piece.at) - 1)]
+
+    def origin(self, start: int, end: int) -> tuple[int, int]:
+        """The smallest range of the origin that `text[start:end]` came from."""
+        first, last = self._piece(start), self._piece(max(start, end - 1))
+        low = first.start + start - first.at if first.verbatim else first.start
+        high = last.start + end - last.at if last.verbatim else last.end
+        return low, max(low, high)
+
+    def substituted(self, pattern: re.Pattern[str], replacement: str) -> Traced:
+        """`pattern.sub(replacement, text)`, traced."""
+        parts: list[str] = []
+        pieces: list[Piece] = []
+        length = copied = 0
+        for found in pattern.finditer(self.text):
+            self._copy(copied, found.start(), length, pieces)
+            parts.append(self.text[copied : found.start()])
+            length += found.start() - copied
+            copied = found.end()
+            written = found.expand(replacement)
+            if written:
+                pieces.append(Piece(length, *self.origin(found.start(), found.end()), False))
+                parts.append(written)
+                length += len(written)
+        self._copy(copied, len(self.text), length, pieces)
+        parts.append(self.text[copied:])
+        return Traced("".join(parts), tuple(pieces) or (Piece(0, 0, self.pieces[-1].end, False),))
+
+    def _copy(self, start: int, end: int, at: int, into: list[Piece]) -> None:
+        """Append the pieces of `text[start:end]`, which will stand at offset `at`."""
+        if start == end:
+            return
+        index = max(0, bisect_right(self.pieces, start, key=lambda piece: piece.at) - 1)
+        for piece in self.pieces[index:]:
+            if piece.at >= end:
+                break
+            skipped = max(0, start - piece.at)
+            new_at = at + max(piece.at, start) - start
+            if piece.verbatim:
+                stop = min(piece.end, piece.start + end - piece.at)
+                into.append(Piece(new_at, piece.start + skipped, stop, True))
+            else:
+                into.append(Piece(new_at, piece.start, piece.end, False))
+
+
+_CR = re.compile(r"\r\n?")
+_LINE_END = re.compile(r"\r\n?|\n")
+
+
+@lru_cache(maxsize=64)
+def _compiled(pattern: str) -> re.Pattern[str]:
+    return re.compile(pattern, re.MULTILINE)
+
+
+def filtered(traced: Traced, filters: Iterable[Filter]) -> Traced:
+    """The text with its line ends made LF, after the filters."""
+    if "\r" in traced.text:
+        traced = traced.substituted(_CR, "\n")
+    for rule in filters:
+        pattern = _compiled(rule.pattern)
+        if pattern.search(traced.text):
+            traced = traced.substituted(pattern, rule.replacement)
+    return traced
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line: its text without trailing white space, and where it begins in its side's text."""
+
+    at: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One side of a comparison."""
+
+    raw: str
+    """Before the filters, its line ends as they came."""
+    traced: Traced
+    lines: tuple[Line, ...]
+
+    @classmethod
+    def of(cls, text: str, filters: Iterable[Filter] = ()) -> Side:
+        """The lines of a text after the filters."""
+        traced = filtered(Traced.of_text(text), filters)
+        lines: list[Line] = []
+        at = 0
+        for line in traced.text.split("\n"):
+            lines.append(Line(at, line.rstrip()))
+            at += len(line) + 1
+        while lines and not lines[-1].text:
+            lines.pop()
+        return cls(text, traced, tuple(lines))
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The lines' texts."""
+        return tuple(line.text for line in self.lines)
+
+    def origin(self, line: int, start: int, end: int) -> tuple[int, int]:
+        """Where `lines[line].text[start:end]` stands in the raw text."""
+        at = self.lines[line].at
+        return self.traced.origin(at + start, at + end)
+
+    def line_starts(self) -> list[int]:
+        """Offsets in the raw text at which its lines begin."""
+        return [0, *(found.end() for found in _LINE_END.finditer(self.raw))]
+
+    def raw_line(self, line: int, line_starts: Sequence[int]) -> int:
+        """The number, from 1, of the raw line that a line begins on."""
+        return bisect_right(line_starts, self.origin(line, 0, 0)[0])
+
+    def raw_lines(self, line: int) -> tuple[str, ...]:
+        """The lines of raw text that a line came from, without trailing white space.
+
+        There are several where a filter took line ends away. What a filter deleted before a line
+        belongs to the line above it; the first line has all that was deleted before it.
+        """
+        start = 0 if line == 0 else self.origin(line, 0, 0)[0]
+        last = line + 1 == len(self.lines)
+        stop = len(self.raw) if last else max(start, self.origin(line + 1, 0, 0)[0])
+        lines = [text.rstrip() for text in _LINE_END.split(self.raw[start:stop])]
+        while len(lines) > 1 and not lines[-1]:
+            lines.pop()
+            if not last:
+                break
+        return tuple(lines)

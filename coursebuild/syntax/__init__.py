@@ -1,0 +1,1 @@
+"""Text of a course into values, pure: Markdown, fences, quizzes, labs, the course map."""

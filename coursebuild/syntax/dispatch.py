@@ -1,0 +1,93 @@
+"""What a fence becomes, by its kind.
+
+Entry point: `fence_block`.
+"""
+
+from __future__ import annotations
+
+from coursebuild.diagnostics import diagnose
+from coursebuild.model import Block, CodeBlock, Script
+from coursebuild.syntax.fence import Fence, near_kind
+from coursebuild.syntax.info import parse_info, read_keys
+from coursebuild.syntax.io import parse_io
+from coursebuild.syntax.mjcf import parse_mjcf
+from coursebuild.syntax.recording import stray_keys
+from coursebuild.syntax.script import parse_python
+from coursebuild.syntax.session import Session
+from coursebuild.syntax.texts import TextParser
+
+
+def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
+    """The block of a fence that records no output."""
+    if not fence.closed:
+        return _unclosed(fence, session)
+    match fence.kind:
+        case "python":
+            return _python(fence, session)
+        case "text":
+            for wrong in stray_keys(fence):
+                session.report(wrong)
+            return fence.code()
+        case "io":
+            io = parse_io(fence, texts)
+            session.diagnostics += io.diagnostics
+            return io.value
+        case "mjcf":
+            mjcf = parse_mjcf(fence)
+            session.diagnostics += mjcf.diagnostics
+            return mjcf.value
+        case "quiz" | "lab":
+            return _interactive(fence, session, texts)
+        case _:
+            near = near_kind(fence)
+            if near is not None:
+                session.report(near)
+            return fence.code()
+
+
+def _unclosed(fence: Fence, session: Session) -> CodeBlock:
+    """What follows may be anything, so that nothing is said about it."""
+    marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
+    help = f"close it with a line `{marks}` in the same quote or list item"
+    session.report(
+        diagnose("fence-unclosed", fence.head, "this code fence is never closed", help=help)
+    )
+    if fence.kind == "python":
+        session.script, session.script_wrong = None, True
+    return fence.code()
+
+
+def _python(fence: Fence, session: Session) -> Block:
+    parsed = parse_python(fence)
+    session.diagnostics += parsed.diagnostics
+    if isinstance(parsed.value, Script):
+        session.script, session.script_wrong = parsed.value.path, False
+    elif not fence.nested and any(
+        word.key == "file" for word in parse_info(fence.info).value.words
+    ):
+        session.script, session.script_wrong = None, True
+    return parsed.value
+
+
+def _interactive(fence: Fence, session: Session, texts: TextParser) -> Block:
+    from coursebuild.syntax.lab import parse_lab
+    from coursebuild.syntax.quiz import parse_quiz
+
+    info = parse_info(fence.info)
+    session.diagnostics += info.diagnostics
+    words = list(info.value.words)
+    kind, kind_span = "simlab", info.value.kind_span
+    if fence.kind == "lab" and words and words[0].value is None:
+        kind, kind_span = words[0].key, words.pop(0).key_span
+    session.diagnostics += read_keys(fence.kind, words).diagnostics
+    if fence.nested:
+        message = f"a text of a quiz or lab cannot hold a {fence.kind}"
+        session.report(diagnose("fence-info", fence.head, message))
+        return fence.code()
+    if fence.kind == "lab":
+        lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
+        session.diagnostics += lab.diagnostics
+        return lab.value or fence.code()
+    quiz = parse_quiz(fence.span, fence.body, texts)
+    session.diagnostics += quiz.diagnostics
+    return quiz.value or fence.code()

@@ -1,0 +1,49 @@
+"""The entry point of this package: a Markdown file of a course becomes a `Document`.
+
+Entry point: `parse_document`. It never raises, whatever the text:
+
+1. Line ends, NUL and a byte order mark are dealt with; front matter is reported and left out.
+2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own modules.
+3. Footnotes are read last, in the order of their numbers.
+"""
+
+from __future__ import annotations
+
+import re
+
+from coursebuild.diagnostics import Parsed, diagnose, sort_diagnostics
+from coursebuild.model import Document
+from coursebuild.source import Excerpt, Source
+from coursebuild.syntax.session import Session
+from coursebuild.syntax.spans import whole
+from coursebuild.syntax.tree import TextReader
+
+_YAML = re.compile(
+    r"---[ \t]*\n(?:[ \t]*(?:#.*)?\n)*[ \t]*[\w-]+[ \t]*:(?:[ \t].*)?\n(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
+)
+_TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
+
+
+def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
+    """Parse a lesson or a page.
+
+    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. Every mistake is a diagnostic, in the order
+    of its place; the document holds all that could be read.
+    """
+    session = Session(source, callouts, lesson)
+    base = _without_front_matter(whole(source), session)
+    reader = TextReader(base, session, session.definitions, nested=False)
+    blocks = reader.read()
+    footnotes = session.notes.finish()
+    return Parsed(Document(source, blocks, footnotes), sort_diagnostics(session.diagnostics))
+
+
+def _without_front_matter(text: Excerpt, session: Session) -> Excerpt:
+    found = _YAML.match(text.text) or _TOML.match(text.text)
+    if found is None:
+        return text
+    what = "lesson" if session.lesson else "page"
+    message = f"a {what} has no front matter"
+    help = "its title and all else about it stand in content/course.toml; begin with the text"
+    session.report(diagnose("front-matter", text.span(0, 3), message, help=help))
+    return text.slice(found.end())

@@ -1,0 +1,115 @@
+"""Fences: a code block of the text, and what makes one of ours out of it.
+
+Entry points: `read_fence` (a token into a `Fence`), `OURS` (the kinds of fences that are more than code), `near_kind` (a kind that
+looks misspelt).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from markdown_it.common.utils import unescapeAll
+
+from coursebuild.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.model import CodeBlock
+from coursebuild.source import Excerpt, Source, Span
+from coursebuild.syntax.info import kind_of, parse_info
+from coursebuild.syntax.spans import Placed, Row, locate, trimmed
+
+OURS = ("io", "lab", "mjcf", "python", "quiz", "text")
+
+_PYTHON = frozenset({"ipython", "py", "py3", "python2", "python3"})
+
+# Names of languages and file types that highlighters know and that are spelt like kinds of ours.
+_LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """A fenced code block."""
+
+    span: Span
+    """From the opening marks to the end of the closing ones."""
+    head: Span
+    """The opening line, from its marks to the end of the info string."""
+    info: Excerpt
+    """The info string as written, without white space at its ends."""
+    body: Excerpt
+    """The lines inside, each with its line end."""
+    body_span: Span
+    """Those lines in the source, from the start of the first to the start of the line that closes the fence."""
+    prefix: str
+    """What stands before each of those lines in the source."""
+    closed: bool
+    nested: bool
+    """Whether it stands in a text of a quiz or lab, where there are no lines of the lesson to extract or update."""
+
+    @property
+    def kind(self) -> str:
+        """The first word of the info string."""
+        return kind_of(self.info).text
+
+    def code(self) -> CodeBlock:
+        """It as a code block of no special kind."""
+        language = unescaped(self.kind)
+        return CodeBlock(self.span, language, unescaped(self.info.text), self.body)
+
+
+def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
+    """The fence of a `fence` token of the text `base`."""
+    assert token.map is not None
+    info_at = token.start + len(token.markup)
+    info = trimmed(locate(base, [Row(token.info, info_at)]))
+    closed = len(token.rows) == token.map[1] - token.map[0] - 2
+    body = locate(base, token.rows)
+    if not token.rows:
+        body = Excerpt(base.source, "", ((0, base.offset(info_at + len(token.info) + 1)),))
+    elif not body.text.endswith("\n"):
+        body = Excerpt(base.source, body.text + "\n", body.pieces)
+    span = base.span(token.start, token.end)
+    head = base.span(token.start, info_at + len(token.info.rstrip()))
+    body_span, prefix = (body.span(), "") if nested else _lines(span, head, closed)
+    return Fence(span, head, info, body, body_span, prefix, closed, nested)
+
+
+def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
+    """The whole lines between the fences, and what new ones must begin with."""
+    source = span.source
+    first, last = head.line, span.end_line
+    start = _line_start(source, first + 1)
+    end = _line_start(source, last if closed else last + 1)
+    prefix = source.text[_line_start(source, first) : head.start]
+    prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
+    return Span(source, start, max(start, end)), prefix + " " if prefix.endswith(">") else prefix
+
+
+def _line_start(source: Source, line: int) -> int:
+    """Where a line (from 1) begins; the end of the text past the last one."""
+    starts = source.line_starts
+    return starts[line - 1] if line <= len(starts) else len(source.text)
+
+
+def unescaped(info: str) -> str:
+    """An info string with CommonMark's backslash escapes and entities decoded."""
+    return unescapeAll(info)
+
+
+def near_kind(fence: Fence) -> Diagnostic | None:
+    """A warning when the kind of a code block looks like a misspelt kind of ours."""
+    kind = kind_of(fence.info)
+    if not kind.text:
+        return None
+    name = kind.text.lower()
+    if name in _PYTHON:
+        words = parse_info(fence.info).value.words
+        if any(word.key == "file" for word in words):
+            message = f"a block of kind `{kind.text}` is shown and never run"
+            return diagnose("fence-kind-near", kind.span(), message, help="did you mean `python`?")
+    if name in _LANGUAGES:
+        return None
+    near = "lab simlab" if name == "simlab" else nearest(name, OURS, cutoff=0.75)
+    if near is None:
+        return None
+    message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
+    return diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")

@@ -1,0 +1,127 @@
+"""Headings: the attributes after them, and the anchors of a document.
+
+Entry points: `read_attributes` (`## Title {#id .class}`), `Anchors` (unique ids), `slug`,
+`heading_mistakes`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.model import Image, Inline, plain_text, walk_inlines
+from coursebuild.source import Excerpt, Span
+
+_CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
+_ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
+_CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
+_NO_SLUG = re.compile(r"[^\w\s-]")
+_SPACES = re.compile(r"\s")
+_HELP = "write `{#id}`, `{.class}` or `{#id .class}`: letters, digits, `-`, `_`, and in an id also `:` and `.`"
+
+
+@dataclass(frozen=True, slots=True)
+class Attributes:
+    """What stands in braces after a heading, and the heading's text before it."""
+
+    title: Excerpt
+    id: str | None = None
+    id_span: Span | None = None
+    classes: tuple[str, ...] = ()
+
+
+def read_attributes(content: Excerpt) -> Parsed[Attributes]:
+    """Split a heading's content into its text and its attributes."""
+    found = _CANDIDATE.search(content.text)
+    if found is None:
+        return Parsed(Attributes(content))
+    start = found.start()
+    title = content.slice(0, len(content.text[:start].rstrip()))
+    braces = content.span(start, start + len(found[0].rstrip()))
+    if not found[1]:
+        message = "the attributes of this heading are never closed"
+        return Parsed(
+            Attributes(title), (diagnose("heading-attributes", braces, message, help=_HELP),)
+        )
+    inner_start = start + found[0].index("{") + 1
+    inner = content.text[inner_start : start + found[0].rindex("}")]
+    name, name_span, classes = None, None, []
+    for word in re.finditer(r"\S+", inner):
+        span = content.span(inner_start + word.start(), inner_start + word.end())
+        if _ID.fullmatch(word[0]) and name is None:
+            name, name_span = word[0][1:], span
+        elif _CLASS.fullmatch(word[0]):
+            classes.append(word[0][1:])
+        else:
+            second = word[0].startswith("#") and name is not None
+            message = (
+                "a heading has one id" if second else f"`{word[0]}` is neither an id nor a class"
+            )
+            return Parsed(
+                Attributes(title), (diagnose("heading-attributes", span, message, help=_HELP),)
+            )
+    return Parsed(Attributes(title, name, name_span, tuple(classes)))
+
+
+def slug(text: str) -> str:
+    """The anchor that a heading's text gives: lower case, letters and digits of any script, hyphens for spaces."""
+    return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-") or "section"
+
+
+@dataclass(slots=True)
+class Anchors:
+    """The anchors of a document. Explicit ids are known before the first heading is named."""
+
+    report: Callable[[Diagnostic], None]
+    explicit: dict[str, Span | None] = field(default_factory=dict)
+    """Each explicit id; the span of the heading that took it, once one has."""
+    taken: set[str] = field(default_factory=set)
+    """Ids that headings got from their text."""
+
+    def reserve(self, name: str) -> None:
+        """Keep an id for the heading that asks for it."""
+        self.explicit.setdefault(name, None)
+
+    def take(self, name: str, span: Span) -> None:
+        """Use an explicit id."""
+        first = self.explicit.get(name)
+        if first is not None or name in self.taken:
+            notes = [Note("first used here", first)] if first is not None else []
+            self.report(
+                diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
+            )
+        else:
+            self.explicit[name] = span
+
+    def make(self, text: str) -> str:
+        """The anchor of a heading without an id."""
+        base = name = slug(text)
+        count = 1
+        while name in self.explicit or name in self.taken:
+            count += 1
+            name = f"{base}-{count}"
+        self.taken.add(name)
+        return name
+
+
+def heading_mistakes(
+    span: Span, level: int, above: int | None, children: tuple[Inline, ...], *, lesson: bool
+) -> list[Diagnostic]:
+    """What is wrong with a heading; `above` is the level of the one before it, where that counts."""
+    found: list[Diagnostic] = []
+    if not plain_text(children).strip() and not any(
+        isinstance(inline, Image) for inline in walk_inlines(children)
+    ):
+        found.append(diagnose("heading-empty", span, "the heading has no text"))
+    if lesson and level == 1:
+        help = "the title comes from the course map; begin with `## `"
+        message = "a lesson has no heading of level 1"
+        found.append(diagnose("heading-top", span, message, help=help))
+    if above is not None and level > above + 1:
+        message = f"a heading of level {level} follows one of level {above}"
+        if lesson and above == 1:
+            message = f"a heading of level {level} stands before any of level 2"
+        found.append(diagnose("heading-skip", span, message))
+    return found

@@ -1,0 +1,226 @@
+"""The inline parser: markdown-it's rules, chosen by the first character of a piece of text.
+
+Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes and bound
+numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks are text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from markdown_it import MarkdownIt
+from markdown_it.parser_inline import ParserInline
+from markdown_it.rules_inline import (
+    StateInline,
+    autolink,
+    backtick,
+    emphasis,
+    entity,
+    escape,
+    html_inline,
+    image,
+    link,
+    newline,
+    strikethrough,
+)
+from markdown_it.token import Token
+from markdown_it.utils import EnvType
+
+from coursebuild.syntax.math import math_inline
+from coursebuild.syntax.spans import InlineState, Placed
+
+MAX_NESTING = 60
+"""Links and images inside each other."""
+MAX_RUN = 200
+"""Emphasis marks in a row."""
+
+InlineRule = Callable[[StateInline, bool], bool]
+
+
+def _emphasis(state: StateInline, silent: bool) -> bool:
+    """Emphasis marks; an absurd run of them is text."""
+    start, mark = state.pos, state.src[state.pos]
+    if state.src.startswith(mark * MAX_RUN, start):
+        end = start
+        while end < state.posMax and state.src[end] == mark:
+            end += 1
+        if not silent:
+            state.append_pending(state.src[start:end])
+        state.pos = end
+        return True
+    rule = strikethrough.tokenize if mark == "~" else emphasis.tokenize
+    return rule(state, silent)
+
+
+_BINDING = re.compile(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
+
+
+def _code_span(state: StateInline, silent: bool) -> bool:
+    """A code span; with `{out}` after it a bound number (`number_binding`, the script's path in `info`)."""
+    start = state.pos
+    if not backtick(state, silent):
+        return False
+    if not state.src.startswith("{out", state.pos) or not state.src[start : state.pos].strip("`"):
+        return True
+    end = state.pos
+    found = _BINDING.match(state.src, end, state.posMax)
+    if found:
+        state.pos = found.end()
+    if not silent:
+        token = state.tokens[-1]
+        token.type = "number_binding" if found else "number_unbound"
+        token.info = (found[1] or found[2] or "") if found else ""
+        token.map = [start + len(token.markup), end - len(token.markup)]
+    return True
+
+
+_FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
+
+
+def _footnote_reference(state: StateInline, silent: bool) -> bool:
+    """`[^label]`; whether the footnote exists is seen later."""
+    found = _FOOTNOTE.match(state.src, state.pos, state.posMax)
+    if found is None:
+        return False
+    if not silent:
+        token = state.push("footnote_ref", "", 0)
+        token.content = found[1]
+    state.pos = found.end()
+    return True
+
+
+_STOP = re.compile(r"[\n\\`*_~\[\]<&$]|!\[")
+_INLINE: dict[str, tuple[InlineRule, ...]] = {
+    "\n": (newline,),
+    "\\": (escape,),
+    "`": (_code_span,),
+    "*": (_emphasis,),
+    "_": (_emphasis,),
+    "~": (_emphasis,),
+    "[": (link, _footnote_reference),
+    "]": (),
+    "!": (image,),
+    "<": (autolink, html_inline),
+    "&": (entity,),
+    "$": (math_inline,),
+}
+
+
+def _matches(state: InlineState, char: str) -> bool:
+    """Let the rules of a character make their token."""
+    for rule in _INLINE[char]:  # noqa: SIM110 (any() with a generator takes twice the time)
+        if rule(state, False):
+            return True
+    return False
+
+
+class Inlines(ParserInline):
+    """The inline parser."""
+
+    def tokenize(self, state: StateInline) -> None:
+        """Add the tokens up to `state.posMax`; links call it again for their text."""
+        assert isinstance(state, InlineState)
+        src, end = state.src, state.posMax
+        state.mark = state.pos
+        while state.pos < end:
+            stop = _STOP.search(src, state.pos, end)
+            if stop is None:
+                state.append_pending(src[state.pos : end])
+                state.pos = end
+                break
+            at = stop.start()
+            if at > state.pos:
+                state.append_pending(src[state.pos : at])
+                state.pos = at
+            before = len(state.tokens)
+            if state.level < MAX_NESTING and _matches(state, src[at]):
+                if len(state.tokens) > before:
+                    _place_inline(state, before, at)
+            else:
+                state.append_pending(src[at])
+                state.pos = at + 1
+        if state.pending:
+            state.pushPending()
+
+    def skipToken(self, state: StateInline) -> None:
+        """Move past one token without making it."""
+        assert isinstance(state, InlineState)
+        pos = state.pos
+        if pos in state.cache:
+            state.pos = state.cache[pos]
+            return
+        if state.level >= MAX_NESTING:
+            state.pos = state.posMax
+        else:
+            self._skip(state)
+        state.cache[pos] = state.pos
+
+    def _skip(self, state: StateInline) -> None:
+        stop = _STOP.search(state.src, state.pos, state.posMax)
+        at = state.posMax if stop is None else stop.start()
+        if at > state.pos:
+            state.pos = at
+            return
+        for rule in _INLINE[state.src[at]]:
+            state.level += 1
+            found = rule(state, True)
+            state.level -= 1
+            if found:
+                return
+        state.pos = at + 1
+
+    def parse(self, src: str, md: MarkdownIt, env: EnvType, tokens: list[Token]) -> list[Token]:
+        """Add the tokens of a whole text."""
+        state = InlineState(src, md, env)
+        self.tokenize(state)
+        for rule in self.ruler2.getRules(""):
+            rule(state)
+        _order_lone_tildes(state.tokens)
+        tokens.extend(state.tokens)
+        return tokens
+
+
+def _place_inline(state: InlineState, before: int, at: int) -> None:
+    """Say how far the tokens reach that a rule made from position `at` on."""
+    tokens, after = state.tokens, state.pos
+    cursor = at
+    for token in tokens[before:]:
+        assert isinstance(token, Placed)
+        if token.end >= 0:
+            continue
+        if token.markup == "autolink":
+            opens = token.type == "link_open"
+            token.start, token.end = (at, at + 1) if opens else (after - 1, after)
+            cursor = at + 1
+        elif token.type == "link_open":
+            token.start, token.end = at, at + 1
+        elif token.type != "text":
+            token.end = after
+        elif tokens[-1].markup == "autolink":
+            token.start, token.end = at + 1, after - 1
+        else:
+            token.start, token.end = cursor, cursor + len(token.content)
+            cursor = token.end
+    state.mark = after
+
+
+def _order_lone_tildes(tokens: Sequence[Token]) -> None:
+    """Of `~~a~~~` markdown-it makes the last tilde text and moves it behind the closing tag; let places follow."""
+    for i, token in enumerate(tokens):
+        if (
+            token.type != "text"
+            or token.content != "~"
+            or i == 0
+            or tokens[i - 1].type != "s_close"
+        ):
+            continue
+        first = i
+        while first > 0 and tokens[first - 1].type == "s_close":
+            first -= 1
+        moved = [t for t in tokens[first : i + 1] if isinstance(t, Placed)]
+        cursor = min(t.start for t in moved)
+        for t in moved:
+            width = t.end - t.start
+            t.start, t.end = cursor, cursor + width
+            cursor += width

@@ -1,0 +1,294 @@
+"""Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
+
+Entry point: `InlineReader.read`. One pass over the flat tokens with a stack of open emphasis, strong, strikethrough and links:
+
+1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak` and mentions (`mention`).
+2. An opening token puts a frame on the stack, its closing token makes the node from what was gathered since.
+3. Mistakes are reported on the way: bindings, schemes, images without text, footnotes that are not written, open formulas.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from markdown_it.helpers import parseLinkDestination
+from markdown_it.token import Token
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.model import (
+    CodeSpan,
+    Emphasis,
+    FootnoteRef,
+    HardBreak,
+    Image,
+    Inline,
+    Link,
+    Math,
+    NumberBinding,
+    RawInline,
+    Strikethrough,
+    Strong,
+)
+from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.block_parser import Definitions
+from coursebuild.syntax.footnotes import Notes
+from coursebuild.syntax.html import Balance, tags
+from coursebuild.syntax.markdown import definition_label, inline_tokens
+from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
+from coursebuild.syntax.spans import Placed, Placer, locate
+from coursebuild.syntax.targets import check_scheme, classify
+
+MAX_DEPTH = 60
+"""Emphasis inside emphasis; what is deeper loses its marks."""
+
+_BRACES = re.compile(r"\{[^}\n]*\}?")
+_DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+
+
+@dataclass(slots=True)
+class _Frame:
+    """An inline that is open."""
+
+    token: Placed | None
+    nodes: list[Inline] = field(default_factory=list)
+
+
+class InlineReader:
+    """Reads the inline content of one text; `base` is what its block tokens were made from."""
+
+    def __init__(
+        self,
+        base: Excerpt,
+        definitions: Definitions,
+        notes: Notes,
+        balance: Balance,
+        report: Callable[[Diagnostic], None],
+    ) -> None:
+        self.base = base
+        self.definitions = definitions
+        self.environment = definitions.environment()
+        self.notes = notes
+        self.balance = balance
+        self.report = report
+
+    def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
+        """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
+        return _Pass(self, content, mentions).read()
+
+
+class _Pass:
+    """One pass over the tokens of one content."""
+
+    def __init__(self, reader: InlineReader, content: Excerpt, mentions: bool) -> None:
+        self.reader = reader
+        self.content = content
+        self.placer = Placer(content)
+        self.stack = [_Frame(None)]
+        self.run: list[Item] = []
+        self.links = 0 if mentions and may_mention(content.text) else 1
+        """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
+
+    def read(self) -> tuple[Inline, ...]:
+        self.reader.balance.enter()
+        for token in inline_tokens(self.content.text, self.reader.environment):
+            kind = token.type
+            if kind == "text" or kind == "text_special":
+                if token.content:
+                    literal = kind == "text" or token.content == token.markup
+                    self.run.append(Item(token.content, token.start, token.end, literal))
+            elif kind == "softbreak":
+                self.run.append(Item("\n", token.start, token.end, False))
+            elif kind == "math_unclosed":
+                self._unclosed_math(token)
+            elif token.nesting == 1:
+                self._open(token)
+            elif token.nesting == -1:
+                self._close(token)
+            else:
+                self._leaf(token)
+        self._flush()
+        self.reader.balance.leave()
+        return tuple(self.stack[0].nodes)
+
+    # -- texts
+
+    def _flush(self) -> None:
+        if self.run:
+            make = plain if self.links else with_mentions
+            self.stack[-1].nodes += make(self.run, self.placer)
+            self.run = []
+
+    def _unclosed_math(self, token: Placed) -> None:
+        span = self.placer.span(token.start, token.end)
+        help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
+        self.reader.report(
+            diagnose("math-unclosed", span, "display math is never closed", help=help)
+        )
+        self.run.append(Item(token.content, token.start, token.end))
+
+    # -- containers
+
+    def _open(self, token: Placed) -> None:
+        self._flush()
+        self.stack.append(_Frame(token))
+        self.reader.balance.enter()
+        if token.type == "link_open":
+            self.links += 1
+
+    def _close(self, token: Placed) -> None:
+        self._flush()
+        frame = self.stack.pop()
+        self.reader.balance.leave()
+        opened, children = frame.token, tuple(frame.nodes)
+        assert opened is not None
+        into = self.stack[-1].nodes
+        if token.type == "link_close":
+            self.links -= 1
+            link = self._link(opened, token, children)
+            into.extend(children if link is None else (link,))
+        elif len(self.stack) > MAX_DEPTH:
+            into.extend(children)
+        elif token.type == "strong_close":
+            into.append(Strong(self.placer.span(opened.start - 1, token.end + 1), children))
+        else:
+            span = self.placer.span(opened.start, token.end)
+            into.append(
+                Emphasis(span, children)
+                if token.type == "em_close"
+                else Strikethrough(span, children)
+            )
+
+    def _link(self, opened: Placed, closed: Placed, children: tuple[Inline, ...]) -> Link | None:
+        url = str(opened.attrs["href"])
+        span = self.placer.span(opened.start, closed.end)
+        destination = self._destination(opened, closed)
+        wrong = check_scheme(url, destination)
+        if wrong is not None:
+            self.reader.report(wrong)
+            return None
+        title = str(opened.attrs.get("title", ""))
+        return Link(span, classify(url), destination, title, children)
+
+    def _destination(self, opened: Placed, closed: Placed) -> Span:
+        """Where the destination of a link is written: in it, or in the definition that it names."""
+        text, label_end = self.content.text, closed.start
+        if opened.markup == "autolink":
+            return self.placer.span(opened.start + 1, closed.end - 1)
+        return self._written(text, opened.start, label_end, closed.end)
+
+    def _written(self, text: str, start: int, label_end: int, end: int) -> Span:
+        if end > label_end + 1 and text[label_end + 1] == "(":
+            at = label_end + 2
+            while text[at] in " \t\n":
+                at += 1
+            found = parseLinkDestination(text, at, end)
+            if not found.ok:
+                return self.placer.span(start, end)
+            angle = text[at] == "<"
+            return self.placer.span(at + angle, found.pos - angle)
+        label = text[start + 1 : label_end]
+        if end > label_end + 3:
+            label = text[label_end + 2 : end - 1]
+        definition = self.reader.definitions.links.get(definition_label(label))
+        if definition is None or not definition.rows:
+            return self.placer.span(start, end)
+        rows = locate(definition.base, definition.rows)
+        head = _DEFINED.match(rows.text)
+        found = parseLinkDestination(rows.text, head.end() if head else 0, len(rows.text))
+        if head is None or not found.ok:
+            return rows.span()
+        angle = rows.text[head.end()] == "<"
+        return rows.span(head.end() + angle, found.pos - angle)
+
+    # -- leaves
+
+    def _leaf(self, token: Placed) -> None:
+        self._flush()
+        span = self.placer.span(token.start, token.end)
+        node: Inline | None = None
+        match token.type:
+            case "code_inline":
+                node = CodeSpan(span, token.content)
+            case "number_binding" | "number_unbound":
+                node = self._number(token, span)
+            case "math":
+                node = self._math(token, span)
+            case "html_inline":
+                node = self._html(token, span)
+            case "image":
+                node = self._image(token, span)
+            case "hardbreak":
+                node = HardBreak(span)
+            case "footnote_ref":
+                node = self._footnote(token, span)
+            case _:
+                raise AssertionError(f"no inline for token {token.type}")
+        if node is not None:
+            self.stack[-1].nodes.append(node)
+
+    def _math(self, token: Placed, span: Span) -> Math:
+        assert token.map is not None
+        if not token.content.strip():
+            self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
+        return Math(span, self.content.slice(*token.map), token.info == "display")
+
+    def _number(self, token: Placed, span: Span) -> CodeSpan | NumberBinding:
+        assert token.map is not None
+        if token.type == "number_unbound":
+            braces = _BRACES.match(self.content.text, token.end)
+            assert braces is not None
+            place = self.placer.span(braces.start(), braces.end())
+            message = f"`{braces[0]}` does not say what the number is bound to"
+            help = "write `{out}`, or `{out=examples/x.py}` with the path of a script"
+            self.reader.report(diagnose("binding-attribute", place, message, help=help))
+            return CodeSpan(span, token.content)
+        start, end = token.map
+        if end - start == len(token.content) + 2:
+            start, end = start + 1, end - 1
+        return NumberBinding(span, token.content, self.placer.span(start, end), token.info or None)
+
+    def _html(self, token: Placed, span: Span) -> RawInline:
+        for tag in tags(token.content):
+            self.reader.balance.add(tag, span)
+            if tag.name == "a" and not tag.complete:
+                self.links = max(0, self.links + (-1 if tag.closes else 1))
+        return RawInline(span, token.content)
+
+    def _image(self, token: Placed, span: Span) -> Image:
+        url, alt = str(token.attrs["src"]), alt_text(token.children or [])
+        label_end = token.start + 2 + len(token.content)
+        wrong = check_scheme(
+            url, self._written(self.content.text, token.start + 1, label_end, token.end), image=True
+        )
+        if wrong is not None:
+            self.reader.report(wrong)
+            url = ""
+        if not alt.strip():
+            help = "say in the brackets what it shows, for readers who cannot see it"
+            self.reader.report(
+                diagnose("image-alt", span, "the image has no text alternative", help=help)
+            )
+        return Image(span, url, alt, str(token.attrs.get("title", "")))
+
+    def _footnote(self, token: Placed, span: Span) -> FootnoteRef | None:
+        reference = self.reader.notes.refer(token.content, span)
+        if reference is None:
+            self.run.append(Item(f"[^{token.content}]", token.start, token.end))
+        return reference
+
+
+def alt_text(tokens: list[Token]) -> str:
+    """The text of an image's description without marks."""
+    parts: list[str] = []
+    for token in tokens:
+        if token.type == "softbreak" or token.type == "hardbreak":
+            parts.append("\n")
+        elif token.children:
+            parts.append(alt_text(token.children))
+        elif token.type == "footnote_ref":
+            parts.append(f"[^{token.content}]")
+        elif token.type != "image":
+            parts.append(token.content)
+    return "".join(parts)

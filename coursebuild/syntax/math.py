@@ -1,0 +1,135 @@
+"""Formulas: the inline rule for `$…$` and `$$…$$`, and the block rule for `$$` on lines of their own.
+
+Entry points: `math_inline`, `math_block` (rules of the parser in `markdown`), `find_formula` (also for HTML in quiz texts).
+
+A `$` opens a formula when something other than white space follows; the next `$` that no backslash escapes must close it,
+with something other than white space before it and no digit after it. So "costs $5 and $6" holds no formula. Code spans bind
+tighter than formulas, formulas tighter than emphasis and links. A block of math ends at a `$$` with nothing after it; an empty line
+before that means that it was never closed.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from markdown_it.rules_block import StateBlock
+from markdown_it.rules_inline import StateInline
+
+from coursebuild.syntax.spans import BlockState, InlineState, Placed
+
+_STOP = re.compile(r"\\[\s\S]|`+|\$+")
+_BLOCK_STOP = re.compile(r"\\[\s\S]|\$+")
+_BACKTICKS = re.compile(r"`+")
+_DOLLARS = re.compile(r"\$+")
+_SPACE = " \t\n"
+_DIGITS = "0123456789"
+
+
+class Formula(NamedTuple):
+    """A formula found in a text: its TeX reaches from `start` to `end`, and with its dollars up to `after`."""
+
+    start: int
+    end: int
+    after: int
+    display: bool
+
+
+def find_formula(
+    text: str, at: int, limit: int, last_runs: dict[int, int] | None = None
+) -> Formula | None:
+    """The formula that begins with the `$` at `at` and closes before `limit`; none where that dollar is a dollar.
+
+    `last_runs` says where the last run of each number of backticks begins; by it a code span inside is recognised.
+    """
+    width = 2 if text.startswith("$$", at) else 1
+    start = at + width
+    if start >= limit or (width == 1 and text[start] in _SPACE):
+        return None
+    for stop in _STOP.finditer(text, start, limit):
+        mark = stop[0]
+        if mark[0] == "\\":
+            continue
+        if mark[0] == "`":
+            if last_runs is not None and last_runs.get(len(mark), -1) > stop.start():
+                return None
+        elif width == 2:
+            if len(mark) >= 2:
+                return Formula(start, stop.start(), stop.start() + 2, True)
+        else:
+            end = stop.start()
+            after = text[end + 1] if end + 1 < len(text) else ""
+            closes = text[end - 1] not in _SPACE and not (after and after in _DIGITS)
+            return Formula(start, end, end + 1, False) if closes else None
+    return None
+
+
+def math_inline(state: StateInline, silent: bool) -> bool:
+    """The inline rule: a token `math` (its place without dollars in `map`), or `math_unclosed` for a `$$` without end."""
+    assert isinstance(state, InlineState)
+    at = state.pos
+    run = _DOLLARS.match(state.src, at, state.posMax)
+    assert run is not None
+    if len(run[0]) > 2:
+        if not silent:
+            state.append_pending(run[0])
+        state.pos = run.end()
+        return True
+    if state.last_runs is None:
+        state.last_runs = {len(m[0]): m.start() for m in _BACKTICKS.finditer(state.src)}
+    formula = find_formula(state.src, at, state.posMax, state.last_runs)
+    if formula is None:
+        if len(run[0]) == 2:
+            if not silent:
+                token = state.push("math_unclosed", "", 0)
+                token.content = run[0]
+            state.pos = run.end()
+            return True
+        return False
+    if not silent:
+        token = state.push("math", "", 0)
+        token.content = state.src[formula.start : formula.end]
+        token.map = [formula.start, formula.end]
+        token.info = "display" if formula.display else ""
+    state.pos = formula.after
+    return True
+
+
+def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) -> bool:
+    """The block rule: a token `math_block`, with `info` "unclosed" where it has no end."""
+    assert isinstance(state, BlockState)
+    begin = state.bMarks[start_line] + state.tShift[start_line]
+    run = _DOLLARS.match(state.src, begin, state.eMarks[start_line])
+    if run is None or len(run[0]) != 2 or state.is_code_block(start_line):
+        return False
+    line, at, closed = start_line, run.end(), False
+    while True:
+        close = _closing(state.src, at, state.eMarks[line])
+        if close is not None:
+            if state.src[close + 2 : state.eMarks[line]].strip(" \t"):
+                return False
+            closed = True
+            line += 1
+            break
+        line += 1
+        if line >= end_line or state.isEmpty(line) or state.sCount[line] < state.blkIndent:
+            break
+        at = state.bMarks[line] + state.tShift[line]
+    if silent:
+        return True
+    state.line = line
+    token = state.push("math_block", "", 0)
+    assert isinstance(token, Placed)
+    token.content = state.getLines(start_line, line, state.sCount[start_line], False)
+    token.rows = state.rows
+    token.map = [start_line, line]
+    token.info = "" if closed else "unclosed"
+    return True
+
+
+def _closing(src: str, at: int, end: int) -> int | None:
+    """Where the first `$$` between two offsets stands that no backslash escapes."""
+    for stop in _BLOCK_STOP.finditer(src, at, end):
+        if stop[0][0] == "$" and len(stop[0]) >= 2:
+            return stop.start()
+    return None

@@ -1,0 +1,36 @@
+"""MJCF blocks: a model or a fragment of one, or a model that must not compile.
+
+Entry point: `parse_mjcf`. Keys: `fragment="worldbody"` (where the fragment goes), `error="…"` (the message it must fail with).
+"""
+
+from __future__ import annotations
+
+import re
+
+from coursebuild.diagnostics import Parsed, diagnose
+from coursebuild.model import Mjcf
+from coursebuild.syntax.fence import Fence
+from coursebuild.syntax.info import parse_info, read_keys
+
+_ELEMENT = re.compile(r"[A-Za-z_][\w-]*")
+
+
+def parse_mjcf(fence: Fence) -> Parsed[Mjcf]:
+    """An `mjcf` fence."""
+    info = parse_info(fence.info)
+    keys = read_keys("mjcf", info.value.words, values=("fragment", "error"))
+    diagnostics = [*info.diagnostics, *keys.diagnostics]
+    fragment, error = keys.value.get("fragment"), keys.value.get("error")
+    if fragment is not None and not _ELEMENT.fullmatch(fragment.value or ""):
+        message = f"`{fragment.value}` is not the name of an element"
+        help = 'name the element that it goes into, for example `fragment="worldbody"`'
+        diagnostics.append(diagnose("fence-key-value", fragment.value_span, message, help=help))
+        fragment = None
+    mjcf = Mjcf(
+        fence.span,
+        fence.body,
+        None if fragment is None else fragment.value,
+        None if error is None else error.value,
+        None if error is None else error.value_span,
+    )
+    return Parsed(mjcf, tuple(diagnostics))

@@ -1,0 +1,165 @@
+"""`quiz` fences.
+
+Entry point: `parse_quiz`.
+
+1. The JSON is read into nodes, and these into the declared fields.
+2. Each question whose own fields are right is checked for what no type can say: an answer that is
+   one of the options, as many feedbacks as options, a tolerance where the answer is 0.
+3. The Markdown in it is parsed, and all of it becomes a `Quiz`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import assert_never
+
+from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
+from coursebuild.model import (
+    AnyQuestion,
+    Choice,
+    ChoiceQuestion,
+    NumericQuestion,
+    OpenQuestion,
+    OrderQuestion,
+    OutputQuestion,
+    Quiz,
+)
+from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.decode import Decoding, decode
+from coursebuild.syntax.json_text import parse_json
+from coursebuild.syntax.lab import sim_lab
+from coursebuild.syntax.lab_checks import check_lab
+from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.syntax.prose import Prose
+from coursebuild.syntax.quiz_schema import (
+    AnyFields,
+    MultipleChoice,
+    Numeric,
+    Open,
+    Order,
+    Output,
+    Predict,
+    QuizFile,
+)
+from coursebuild.syntax.relations import repeated
+from coursebuild.syntax.texts import TextParser
+from coursebuild.syntax.wording import JSON
+
+TOLERANCE = 0.02
+"""Of the answer's size, where a numeric question gives no tolerance."""
+
+
+def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:
+    """The quiz of a fence; `span` is all of it and `body` the text inside. Never raises."""
+    parsed = parse_json(body, span.first_line())
+    node = parsed.value
+    if node is None:
+        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+    decoding = decode(node, QuizFile, "the quiz", JSON)
+    prose = Prose.read(decoding.texts, texts)
+    found: list[Diagnostic] = [*parsed.diagnostics, *decoding.diagnostics, *prose.diagnostics]
+    questions: list[AnyQuestion] = []
+    for question in node.objects("questions") if isinstance(node, ObjectNode) else ():
+        found += _check(question, decoding)
+        built = _question(question, decoding, prose)
+        questions += [built] if built is not None else []
+    fields = decoding.value
+    if found or fields is None or not isinstance(node, ObjectNode):
+        return Parsed(None, sort_diagnostics(found))
+    return Parsed(Quiz(span, fields.id, node.place("id"), fields.title, tuple(questions)))
+
+
+# ---------------------------------------------------------------------------------------- checks
+
+
+def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
+    sim = node.get("sim")
+    match decoding.structs.get(node):
+        case MultipleChoice() | Predict() as fields:
+            yield from _check_choices(node, fields)
+        case Numeric() as fields:
+            if fields.answer == 0 and fields.tol is None:
+                message = "`tol` is missing: of an answer that is 0 it cannot be a share"
+                yield diagnose("field-missing", node.place("answer"), message)
+        case Order():
+            yield from _check_distinct(node, "items", "two items are the same: `{}`")
+        case _:
+            pass
+    if isinstance(sim, ObjectNode) and sim in decoding.structs:
+        yield from check_lab(sim, decoding.structs)
+
+
+def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterator[Diagnostic]:
+    yield from _check_distinct(node, "options", "two options are the same: `{}`")
+    count = len(fields.options)
+    answer = node.get("answer")
+    several = answer.items if isinstance(answer, ArrayNode) else ()
+    places = several or ((answer,) if answer is not None else ())
+    numbers = fields.answer if isinstance(fields.answer, tuple) else (fields.answer,)
+    for number, place in zip(numbers, places, strict=True):
+        if not 0 <= number < count:
+            message = f"there is no option {number}: they are numbered 0 to {count - 1}"
+            yield diagnose("quiz-answer", place.span, message)
+    spans = [place.span for place in places]
+    yield from repeated(
+        zip(map(str, numbers), spans, strict=True), "quiz-answer", "the option {} is named twice"
+    )
+    if fields.feedback is not None and len(fields.feedback) != count:
+        texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
+        message = f"`feedback` has {texts} for {count} options"
+        help = 'an option without feedback has `""`'
+        yield diagnose("field-value", node.place("feedback"), message, help=help)
+
+
+def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:
+    array = node.get(name)
+    items = array.items if isinstance(array, ArrayNode) else ()
+    named = [(item.value.strip(), item.span) for item in items if isinstance(item, StringNode)]
+    yield from repeated(named, "field-value", message)
+
+
+# ------------------------------------------------------------------------------------- questions
+
+
+def _question(node: ObjectNode, decoding: Decoding[QuizFile], prose: Prose) -> AnyQuestion | None:
+    fields = decoding.structs.get(node)
+    if not isinstance(fields, AnyFields):
+        return None
+    text, explain = prose.blocks(node.get("q")), prose.blocks(node.get("explain"))
+    common = (node.span, fields.label, text, explain, prose.each_blocks(node.get("hints")))
+    match fields:
+        case MultipleChoice() | Predict():
+            several = isinstance(fields.answer, tuple)
+            answers = fields.answer if isinstance(fields.answer, tuple) else (fields.answer,)
+            sim = node.get("sim")
+            lab = None
+            if isinstance(sim, ObjectNode):
+                lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
+            options = _choices(node, prose)
+            predict = isinstance(fields, Predict)
+            return ChoiceQuestion(*common, options, tuple(sorted(answers)), several, lab, predict)
+        case Numeric():
+            answer: Node | None = node.get("answer")
+            written = answer.raw if answer is not None else ""
+            tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
+            return NumericQuestion(*common, fields.answer, written, tolerance, fields.unit)
+        case Open():
+            return OpenQuestion(*common, prose.blocks(node.get("reference")))
+        case Output():
+            script, line = node.place("of"), node.place("line")
+            return OutputQuestion(*common, fields.of, script, fields.line, line)
+        case Order():
+            return OrderQuestion(*common, prose.each_inlines(node.get("items")))
+        case _:
+            assert_never(fields)
+
+
+def _choices(node: ObjectNode, prose: Prose) -> tuple[Choice, ...]:
+    options = node.get("options")
+    items = options.items if isinstance(options, ArrayNode) else ()
+    feedback = prose.each_blocks(node.get("feedback"))
+    padded = feedback + ((),) * (len(items) - len(feedback))
+    return tuple(
+        Choice(item.span, prose.inlines(item), text)
+        for item, text in zip(items, padded, strict=False)
+    )

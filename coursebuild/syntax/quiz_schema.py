@@ -1,0 +1,106 @@
+"""The fields of a `quiz` fence.
+
+Entry point: `QuizFile`. The decoder checks a fence against it, and the JSON Schema for editors is
+made from it; what no declaration of types can say (an answer that is one of the options) is checked
+in `quiz`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from msgspec import Meta, Struct
+
+from coursebuild.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
+from coursebuild.syntax.lab_schema import SimLab
+
+Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
+"""Of an option; that it is one is checked in `quiz`."""
+Options: TypeAlias = Annotated[tuple[Inlines, ...], Meta(min_length=2)]
+Answer: TypeAlias = Index | Annotated[tuple[Index, ...], Meta(min_length=1)]
+
+
+class Common(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What every question has."""
+
+    q: Annotated[Blocks, Meta(description="the question")]
+    label: Annotated[str, Meta(description="a short name, shown instead of the number")] = ""
+    explain: Annotated[OptionalBlocks, Meta(description="shown with the answer")] = ""
+    hints: Annotated[tuple[Blocks, ...], Meta(description="revealed one by one")] = ()
+
+
+class Chosen(Common, frozen=True, kw_only=True):
+    """What every question with options has."""
+
+    options: Annotated[Options, Meta(description="what to choose from")]
+    answer: Annotated[
+        Answer,
+        Meta(description="the index of the right option, or all indices; the first is 0"),
+    ]
+    feedback: Annotated[
+        tuple[OptionalBlocks, ...] | None,
+        Meta(description="one text for each option, said to a learner who takes it"),
+    ] = None
+
+
+class MultipleChoice(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="mcq"):
+    """A question with options; with a list of answers all of them must be chosen."""
+
+
+class Predict(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="predict"):
+    """A prediction: the simulation opens once the learner has committed to an answer."""
+
+    sim: Annotated[SimLab | None, Meta(description="the simulation that shows the answer")] = None
+
+
+class Numeric(Common, frozen=True, kw_only=True, tag_field="kind", tag="numeric"):
+    """A question whose answer is a number."""
+
+    answer: Annotated[float, Meta(description="the number, in `unit`")]
+    tol: Annotated[
+        NotNegative | None,
+        Meta(description="absolute tolerance; without it 2 % of the answer"),
+    ] = None
+    unit: Annotated[str, Meta(description="shown beside the field")] = ""
+
+
+class Open(Common, frozen=True, kw_only=True, tag_field="kind", tag="open"):
+    """A question that the learner answers in words and compares with a reference."""
+
+    reference: Annotated[Blocks, Meta(description="the answer to compare with")]
+
+
+class Output(Common, frozen=True, kw_only=True, tag_field="kind", tag="output"):
+    """What does a script print? The key is its verified output."""
+
+    of: Annotated[Text, Meta(description="the script, as in `examples/x.py`")]
+    line: Annotated[int, Meta(ge=1, description="the line of its output, from 1")]
+
+
+class Order(Common, frozen=True, kw_only=True, tag_field="kind", tag="order"):
+    """Items to be put in order."""
+
+    items: Annotated[
+        tuple[Inlines, ...],
+        Meta(min_length=2, description="the items in the right order; they are shown mixed"),
+    ]
+
+
+AnyFields: TypeAlias = MultipleChoice | Predict | Numeric | Open | Output | Order
+
+
+class QuizFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """A quiz: questions that a learner answers in the page."""
+
+    id: Annotated[
+        str,
+        Meta(
+            pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
+            description="unique in the course, and stable: a learner's progress hangs on it",
+            extra={"expects": "letters, digits, `.`, `_` and `-`, with a letter or digit first"},
+        ),
+    ]
+    questions: Annotated[
+        tuple[AnyFields, ...], Meta(min_length=1, description="in the order of the page")
+    ]
+    title: Annotated[str, Meta(description="the heading; plain text")] = ""

@@ -1,0 +1,49 @@
+"""JSON Schemas of what an author writes in JSON and TOML, for editors.
+
+Entry point: `json_schema(name)`.
+
+They are made from the declarations that the decoder checks against, so that an editor and a build
+say the same; what only checks know (an answer that is one of the options) is not in them.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any, Literal, TypeAlias
+
+import msgspec
+from msgspec import Struct
+
+from coursebuild.syntax.course_schema import CourseFile
+from coursebuild.syntax.lab_schema import SimLab, Slider
+from coursebuild.syntax.quiz_schema import QuizFile
+
+SchemaName: TypeAlias = Literal["quiz", "lab", "course"]
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+_ROOTS: dict[SchemaName, tuple[type[Struct], str]] = {
+    "quiz": (QuizFile, "A quiz fence"),
+    "lab": (SimLab, "A lab fence of the kind simlab"),
+    "course": (CourseFile, "The course map, content/course.toml"),
+}
+
+
+def json_schema(name: SchemaName) -> bytes:
+    """The JSON Schema (draft 2020-12), indented, keys in a fixed order, with a final newline."""
+    root, title = _ROOTS[name]
+    made = copy.deepcopy(msgspec.json.schema(root))
+    definitions: dict[str, Any] = made["$defs"]
+    if Slider.__name__ in definitions:  # the tag that an author may leave out
+        definitions[Slider.__name__]["required"].remove("type")
+    if name == "course":
+        definitions["SilenceTable"]["required"].append("reason")
+    if SimLab.__name__ in definitions:
+        definitions[SimLab.__name__]["oneOf"] = [{"required": ["model"]}, {"required": ["xml"]}]
+    schema = {
+        "$schema": DIALECT,
+        "title": title,
+        "$ref": made["$ref"],
+        "$defs": dict(sorted(definitions.items())),
+    }
+    return msgspec.json.format(msgspec.json.encode(schema), indent=2) + b"\n"

@@ -1,0 +1,54 @@
+"""What the readers of one document share: diagnostics, anchors, footnotes, and the script that an output belongs to.
+
+Entry point: `Session`. A document is read once, from its first line to its last; texts inside quizzes and labs are read where they stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from coursebuild.diagnostics import Diagnostic, Parsed
+from coursebuild.source import Source
+from coursebuild.syntax.block_parser import Definitions
+from coursebuild.syntax.footnotes import Notes
+from coursebuild.syntax.headings import Anchors
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Session:
+    """One reading of one document."""
+
+    source: Source
+    callouts: frozenset[str]
+    lesson: bool
+    definitions: Definitions = field(default_factory=Definitions)
+    """The link definitions of the document, which its inner texts may use."""
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    script: str | None = None
+    """The path of the nearest script above."""
+    script_wrong: bool = False
+    """Whether the nearest script above has no path that it may have."""
+    level: int = 1
+    """Level of the heading above."""
+    notes: Notes = field(init=False)
+    anchors: Anchors = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.notes = Notes(self.report)
+        self.anchors = Anchors(self.report)
+
+    def report(self, diagnostic: Diagnostic) -> None:
+        """Take note of a mistake."""
+        self.diagnostics.append(diagnostic)
+
+    def apart(self, read: Callable[[], T]) -> Parsed[T]:
+        """What `read` gives, with the diagnostics that it raised; they are the caller's to pass on."""
+        before, self.diagnostics = self.diagnostics, []
+        try:
+            return Parsed(read(), tuple(self.diagnostics))
+        finally:
+            self.diagnostics = before

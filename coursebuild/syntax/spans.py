@@ -1,0 +1,235 @@
+"""Where markdown-it's tokens stand: tokens, parser states and excerpts that keep positions.
+
+Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are `Placed`), `locate` (content rows
+into an `Excerpt`), `Placer` (positions in an excerpt into spans).
+
+1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows began.
+2. `locate` joins such rows to an excerpt of the source, through the excerpt that was parsed (a whole file, or a text in JSON).
+3. Inline rules work on one block's content; `InlineState` notes from where to where each token reaches in it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from markdown_it import MarkdownIt
+from markdown_it.common.utils import MD_TRIM_CHARS
+from markdown_it.rules_block import StateBlock
+from markdown_it.rules_inline import StateInline
+from markdown_it.token import Token
+from markdown_it.utils import EnvType
+
+from coursebuild.source import Excerpt, Source, Span
+
+
+class Row(NamedTuple):
+    """A stretch of the parsed text that became part of a block's content."""
+
+    text: str
+    at: int
+    """Offset of the first character that is not padding."""
+    padding: int = 0
+    """Leading spaces of `text` that stand for a part of the tab before `at`."""
+
+
+@dataclass(slots=True)
+class Placed(Token):
+    """A token that knows its place: in the parsed text for block tokens, in the block's content for inline ones."""
+
+    start: int = -1
+    end: int = -1
+    rows: list[Row] = field(default_factory=list)
+    """The rows that a block's content was made of."""
+
+
+class BlockState(StateBlock):
+    """The state of the block rules; notes the rows that the last rule cut out."""
+
+    def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
+        super().__init__(src, md, env, [])
+        self.rows: list[Row] = []
+
+    def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
+        """Add a token; an item of a list notes where its marker stands, as no rule of its own makes it."""
+        token = Placed(ttype, tag, nesting, block=True)
+        if nesting < 0:
+            self.level -= 1
+        token.level = self.level
+        if nesting > 0:
+            self.level += 1
+        if ttype == "list_item_open":
+            token.start = self.bMarks[self.line] + self.tShift[self.line]
+        self.tokens.append(token)
+        return token
+
+    def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:
+        """The lines from `begin` to `end` without `indent` columns of their indentation."""
+        self.rows = [
+            self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
+        ]
+        return "".join(row.text for row in self.rows)
+
+    def _row(self, line: int, indent: int, line_end: bool) -> Row:
+        src, first, shift = self.src, self.bMarks[line], self.tShift[line]
+        last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
+        begin, column = first, 0
+        while column < indent and first < last:
+            char = src[first] if first < len(src) else ""
+            if char == "\t":
+                column += 4 - (column + self.bsCount[line]) % 4
+            elif char == " " or first - begin < shift:
+                column += 1
+            else:
+                break
+            first += 1
+        padding = max(0, column - indent)
+        return Row(" " * padding + src[first:last], first, padding)
+
+
+class InlineState(StateInline):
+    """The state of the inline rules; `mark` is where the text that is not yet a token began."""
+
+    def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
+        super().__init__(src, md, env, [])
+        self.mark = 0
+        self.last_runs: dict[int, int] | None = None
+        """Where the last run of each number of backticks begins, once somebody asked."""
+
+    def pushPending(self) -> Token:
+        """Make the pending text a token."""
+        content = self.pending
+        token = Placed("text", "", 0, content=content, level=self.pendingLevel)
+        token.start, token.end = self.mark, self.mark + len(content)
+        self.tokens.append(token)
+        self.pending = ""
+        return token
+
+    def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
+        """Add a token that begins at the current position; the tokenizer sets its end when the rule is through."""
+        if self.pending:
+            self.pushPending()
+        token = Placed(ttype, tag, nesting)
+        token.start = self.pos
+        meta = None
+        if nesting < 0:
+            self.level -= 1
+            self.delimiters = self._prev_delimiters.pop()
+        token.level = self.level
+        if nesting > 0:
+            self.level += 1
+            self._prev_delimiters.append(self.delimiters)
+            self.delimiters = []
+            meta = {"delimiters": self.delimiters}
+        self.pendingLevel = self.level
+        self.tokens.append(token)
+        self.tokens_meta.append(meta)
+        return token
+
+
+def locate(base: Excerpt, rows: Iterable[Row]) -> Excerpt:
+    """The rows joined, each character with its place in the source of `base`."""
+    texts: list[str] = []
+    pieces: list[tuple[int, int]] = []
+    at, shift = 0, None
+    single = len(base.pieces) == 1
+    for text, offset, padding in rows:
+        for i in range(padding):
+            pieces.append((at + i, base.offset(offset - 1)))
+            shift = None
+        start = at + padding
+        end = offset + len(text) - padding
+        for inner, source_at in base.pieces if single else _pieces(base, offset, end):
+            to = source_at + offset if single else source_at
+            if to - start - inner != shift:
+                shift = to - start - inner
+                pieces.append((start + inner, to))
+        texts.append(text)
+        at += len(text)
+    return Excerpt(base.source, "".join(texts), tuple(pieces) or ((0, 0),))
+
+
+def _pieces(base: Excerpt, start: int, end: int) -> Iterable[tuple[int, int]]:
+    """The pieces of `base` between two of its offsets, counted from the first."""
+    first = bisect_right(base.pieces, start, key=lambda piece: piece[0])
+    last = bisect_right(base.pieces, end - 1, key=lambda piece: piece[0])
+    return ((0, base.offset(start)), *((t - start, s) for t, s in base.pieces[first:last]))
+
+
+def joined(parts: Iterable[Excerpt], between: str = "") -> Excerpt | None:
+    """Excerpts of one source put together; `None` where there are none."""
+    texts: list[str] = []
+    pieces: list[tuple[int, int]] = []
+    source: Source | None = None
+    at = 0
+    for part in parts:
+        source = part.source
+        pieces += [(at + t, s) for t, s in part.pieces]
+        texts.append(part.text)
+        at += len(part.text) + len(between)
+    return None if source is None else Excerpt(source, between.join(texts), tuple(pieces))
+
+
+def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
+    """The excerpt without white space at its ends."""
+    text = excerpt.text.lstrip(chars)
+    if len(text.rstrip(chars)) == len(excerpt.text):
+        return excerpt
+    lead = len(excerpt.text) - len(text)
+    return excerpt.slice(lead, lead + len(text.rstrip(chars)))
+
+
+class Placer:
+    """Spans of positions in one excerpt; the same as `Excerpt.span`, made for many calls."""
+
+    __slots__ = ("_ats", "_deltas", "_single", "source")
+
+    def __init__(self, excerpt: Excerpt) -> None:
+        self.source: Source = excerpt.source
+        self._single = (
+            excerpt.pieces[0][1] - excerpt.pieces[0][0] if len(excerpt.pieces) == 1 else None
+        )
+        self._ats = [at for at, _ in excerpt.pieces]
+        self._deltas = [to - at for at, to in excerpt.pieces]
+
+    def span(self, start: int, end: int) -> Span:
+        """The span of the text from `start` to `end`."""
+        if self._single is not None:
+            return Span(self.source, start + self._single, end + self._single)
+        first = start + self._deltas[max(bisect_right(self._ats, start) - 1, 0)]
+        if end <= start:
+            return Span(self.source, first, first)
+        last = end + self._deltas[max(bisect_right(self._ats, end - 1) - 1, 0)]
+        return Span(self.source, first, max(first, last))
+
+
+def whole(source: Source) -> Excerpt:
+    """All of a file as Markdown sees it: line ends are LF, NUL is U+FFFD, a byte order mark is skipped."""
+    if "\r" in source.text:
+        excerpt = source.excerpt()
+    else:
+        excerpt = Excerpt(source, source.text, ((0, 0),))
+    if excerpt.text.startswith("\ufeff"):
+        excerpt = excerpt.slice(1)
+    return normalized(excerpt)
+
+
+def normalized(excerpt: Excerpt) -> Excerpt:
+    """An excerpt with CommonMark's line ends and without NUL."""
+    if "\r" in excerpt.text:
+        excerpt = _unix(excerpt)
+    if "\0" in excerpt.text:
+        return Excerpt(excerpt.source, excerpt.text.replace("\0", "\ufffd"), excerpt.pieces)
+    return excerpt
+
+
+def _unix(excerpt: Excerpt) -> Excerpt:
+    rows: list[Row] = []
+    at = 0
+    for line in excerpt.text.replace("\r\n", "\r").replace("\n", "\r").split("\r"):
+        rows.append(Row(line + "\n", at))
+        at += len(line) + (2 if excerpt.text.startswith("\r\n", at + len(line)) else 1)
+    rows[-1] = Row(rows[-1].text[:-1], rows[-1].at)
+    return locate(excerpt, rows)

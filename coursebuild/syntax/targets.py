@@ -1,0 +1,65 @@
+"""Where links lead: a destination as written becomes a `Target`, or a diagnostic where a page must not link there.
+
+Entry points: `classify`, `check_scheme`.
+"""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import unquote
+
+from coursebuild.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.model import (
+    ExampleTarget,
+    LessonTarget,
+    ModelTarget,
+    PageTarget,
+    Target,
+    UrlTarget,
+)
+from coursebuild.source import Span
+
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
+_FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
+_PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
+_OURS = ("lesson", "model", "page")
+
+
+def classify(url: str) -> Target:
+    """The target of a destination as markdown-it normalises it (percent-encoded)."""
+    found = _SCHEME.match(url)
+    scheme = found[1] if found else ""
+    if scheme in _OURS:
+        name, mark, anchor = url[len(scheme) + 1 :].partition("#")
+        place = unquote(anchor) if mark and anchor else None
+        if scheme == "lesson":
+            return LessonTarget(unquote(name), place)
+        if scheme == "page":
+            return PageTarget(unquote(name), place)
+        return ModelTarget(unquote(url[len(scheme) + 1 :]))
+    if url.startswith("examples/"):
+        return ExampleTarget(unquote(url))
+    return UrlTarget(url)
+
+
+def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | None:
+    """What is wrong with the scheme of a normalised destination, if anything."""
+    found = _SCHEME.match(url.strip())
+    if found is None or found[1] in _OURS:
+        return None
+    scheme = found[1].lower()
+    if scheme in _FORBIDDEN:
+        if image and _PICTURE.match(url.strip()):
+            return None
+        return diagnose(
+            "link-scheme",
+            span,
+            f"`{scheme}:` must not stand in a page",
+            help="link to an address with `https:`, to a file of the course, or to `lesson:`, `page:` or `model:`",
+        )
+    near = nearest(scheme, _OURS, cutoff=0.75)
+    if near is None:
+        return None
+    return diagnose(
+        "link-scheme", span, f"no link scheme `{found[1]}:`", help=f"did you mean `{near}:`?"
+    )

@@ -1,0 +1,312 @@
+"""Block content: markdown-it's block tokens become `Block` nodes with spans.
+
+Entry points: `TextReader` (one text into blocks), `Texts` (the `TextParser` that quizzes and labs get).
+
+1. `prepare` makes the tokens and notes the explicit ids and the footnotes in them, which must be known before the first reference.
+2. `blocks` walks the flat tokens once, a method for each kind of block; containers call back for what they hold.
+3. A paragraph looks at what follows it: `Output:` and the block below it are one `Recording`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from coursebuild.diagnostics import Parsed, diagnose
+from coursebuild.model import (
+    Block,
+    BlockQuote,
+    Callout,
+    CodeBlock,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Inline,
+    ListBlock,
+    ListItem,
+    MathBlock,
+    Paragraph,
+    Recording,
+    Table,
+    ThematicBreak,
+    plain_text,
+)
+from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.block_parser import Definitions
+from coursebuild.syntax.callout import Head, read_head, resolve
+from coursebuild.syntax.dispatch import fence_block
+from coursebuild.syntax.fence import read_fence
+from coursebuild.syntax.footnotes import Written
+from coursebuild.syntax.headings import Attributes, heading_mistakes, read_attributes
+from coursebuild.syntax.html import Balance, html_flow, tags
+from coursebuild.syntax.inlines import InlineReader
+from coursebuild.syntax.markdown import block_tokens
+from coursebuild.syntax.recording import is_caption, no_body, record_fence, record_table
+from coursebuild.syntax.session import Session
+from coursebuild.syntax.spans import Placed, Placer, locate, normalized, trimmed
+from coursebuild.syntax.tables import read_table
+
+
+class TextReader:
+    """Reads one text; `nested` for a text of a quiz or lab."""
+
+    def __init__(
+        self, base: Excerpt, session: Session, definitions: Definitions, *, nested: bool
+    ) -> None:
+        self.base, self.session, self.nested = base, session, nested
+        self.placer = Placer(base)
+        self.balance = Balance(session.report)
+        self.texts = Texts(session)
+        self.tokens = block_tokens(base, definitions)
+        self.at = 0
+        self.inlines = InlineReader(base, definitions, session.notes, self.balance, session.report)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        for i, token in enumerate(self.tokens):
+            if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
+                name = read_attributes(self._content(token)).value.id
+                if name is not None:
+                    self.session.anchors.reserve(name)
+            elif token.type == "footnote_reference_open":
+                label, at = token.content, token.start + 2
+                label_span = self.placer.span(at, at + len(label))
+                read = self._later(i + 1)
+                self.session.notes.write(Written(label, label_span, self._span(token), read))
+
+    def _later(self, at: int) -> Callable[[], tuple[Block, ...]]:
+        """Reads the footnote whose first token has the index `at`."""
+
+        def read() -> tuple[Block, ...]:
+            self.at = at
+            return self._blocks("footnote_reference_close")
+
+        return read
+
+    def read(self) -> tuple[Block, ...]:
+        """The blocks of the text, its footnotes left for later."""
+        blocks = self._blocks(None)
+        self.balance.finish()
+        return blocks
+
+    # -- walking
+
+    def _blocks(self, stop: str | None) -> tuple[Block, ...]:
+        """The blocks up to a closing token, which is passed."""
+        out: list[Block] = []
+        self.balance.enter()
+        while self.at < len(self.tokens):
+            token = self.tokens[self.at]
+            self.at += 1
+            if token.type == stop:
+                break
+            block = _READERS[token.type](self, token)
+            if block is not None:
+                out.append(block)
+        self.balance.leave()
+        return tuple(out)
+
+    def _span(self, token: Placed) -> Span:
+        return self.placer.span(token.start, token.end)
+
+    def _content(self, token: Placed) -> Excerpt:
+        """The content of a block, without white space at its ends."""
+        return trimmed(locate(self.base, token.rows))
+
+    # -- leaves
+
+    def _paragraph(self, token: Placed) -> Block:
+        self.at += 2
+        content = self._content(token)
+        children = self.inlines.read(content)
+        span = content.span()
+        if not self.nested and "Output" in content.text[:16] and is_caption(children):
+            recording = self._recording(children, span)
+            if recording is not None:
+                return recording
+        return Paragraph(span, children, token.hidden)
+
+    def _heading(self, token: Placed) -> Heading:
+        self.at += 2
+        span = self._span(token)
+        attributes = read_attributes(self._content(token))
+        self.session.diagnostics += attributes.diagnostics
+        children = self.inlines.read(attributes.value.title, mentions=False)
+        level = int(token.tag[1:])
+        session, above = self.session, None if self.nested else self.session.level
+        session.diagnostics += heading_mistakes(span, level, above, children, lesson=session.lesson)
+        if not self.nested:
+            session.level = level
+        return Heading(
+            span,
+            level,
+            children,
+            *self._anchor(attributes.value, children),
+            attributes.value.classes,
+        )
+
+    def _anchor(self, attributes: Attributes, children: tuple[Inline, ...]) -> tuple[str, bool]:
+        anchors = self.session.anchors
+        if attributes.id is not None and attributes.id_span is not None:
+            anchors.take(attributes.id, attributes.id_span)
+            return attributes.id, True
+        return anchors.make(plain_text(children)), False
+
+    def _fence(self, token: Placed) -> Block:
+        return fence_block(
+            read_fence(token, self.base, nested=self.nested), self.session, self.texts
+        )
+
+    def _code(self, token: Placed) -> CodeBlock:
+        code = locate(self.base, token.rows)
+        return CodeBlock(
+            self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
+        )
+
+    def _html(self, token: Placed) -> HtmlBlock | HtmlFlow:
+        html = locate(self.base, token.rows)
+        if self.nested:
+            return html_flow(trimmed(html, " \t\n"), self.balance)
+        for tag in tags(html.text):
+            self.balance.add(tag, html.span(tag.start, tag.end))
+        text = html.text if html.text.endswith("\n") else html.text + "\n"
+        return HtmlBlock(self._span(token), text)
+
+    def _rule(self, token: Placed) -> ThematicBreak:
+        return ThematicBreak(self._span(token))
+
+    def _math(self, token: Placed) -> MathBlock:
+        text = locate(self.base, token.rows)
+        start, end = text.text.index("$$") + 2, len(text.text)
+        if token.info != "unclosed":
+            end = text.text.rindex("$$")
+        tex = trimmed(text.slice(start, end), " \t\n")
+        if token.info == "unclosed":
+            help = "close it with `$$` on a line below, with no empty line before it"
+            wrong = diagnose(
+                "math-unclosed",
+                text.span(start - 2, start),
+                "display math is never closed",
+                help=help,
+            )
+            self.session.report(wrong)
+        elif not tex.text:
+            self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
+        return MathBlock(self._span(token), tex)
+
+    # -- containers
+
+    def _quote(self, token: Placed) -> BlockQuote | Callout:
+        span, opened = self._span(token), self.tokens[self.at]
+        head = read_head(self._content(opened)) if opened.type == "paragraph_open" else None
+        if head is None:
+            return BlockQuote(span, self._blocks("blockquote_close"))
+        return self._callout(span, head)
+
+    def _callout(self, span: Span, head: Head) -> Callout:
+        kind = resolve(head.kind, self.session.callouts)
+        self.session.diagnostics += kind.diagnostics
+        title = self.inlines.read(head.title)
+        self.at += 3
+        first: tuple[Block, ...] = ()
+        if head.rest.text:
+            first = (Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
+        blocks = (*first, *self._blocks("blockquote_close"))
+        return Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
+
+    def _list(self, token: Placed) -> ListBlock:
+        ordered = token.type == "ordered_list_open"
+        items: list[ListItem] = []
+        while (item := self.tokens[self.at]).type == "list_item_open":
+            self.at += 1
+            items.append(self._item(item))
+        self.at += 1
+        return ListBlock(
+            self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
+        )
+
+    def _item(self, token: Placed) -> ListItem:
+        blocks = self._blocks("list_item_close")
+        marker = self.placer.span(token.start, token.start + len(token.info) + 1)
+        span = marker.to(blocks[-1].span) if blocks else marker
+        return ListItem(span, blocks, token.meta.get("checked"))
+
+    def _table(self, token: Placed) -> Table:
+        table, self.at = read_table(self.tokens, self.at - 1, self.base, self.inlines.read)
+        return table
+
+    def _footnote(self, token: Placed) -> None:
+        """Pass over a footnote: it is read later."""
+        depth = 1
+        while depth:
+            kind = self.tokens[self.at].type
+            depth += (kind == "footnote_reference_open") - (kind == "footnote_reference_close")
+            self.at += 1
+
+    # -- recorded output
+
+    def _recording(self, caption: tuple[Inline, ...], span: Span) -> Recording | None:
+        """The recording whose caption was just read, if what follows is its body."""
+        token = self.tokens[self.at] if self.at < len(self.tokens) else None
+        if token is None:
+            return None
+        recording = None
+        if token.type == "table_open":
+            table, after = read_table(self.tokens, self.at, self.base, self.inlines.read)
+            self.at = after
+            return record_table(caption, span, table, self.session)
+        if token.type == "fence":
+            fence = read_fence(token, self.base, nested=False)
+            recording = record_fence(caption, span, fence, self.session)
+        elif token.type == "code_block":
+            self.session.report(no_body(self._span(token).first_line(), "an indented block"))
+        if recording is not None:
+            self.at += 1
+        return recording
+
+
+_READERS: dict[str, Callable[[TextReader, Placed], Block | None]] = {
+    "paragraph_open": TextReader._paragraph,
+    "heading_open": TextReader._heading,
+    "fence": TextReader._fence,
+    "code_block": TextReader._code,
+    "html_block": TextReader._html,
+    "hr": TextReader._rule,
+    "math_block": TextReader._math,
+    "blockquote_open": TextReader._quote,
+    "bullet_list_open": TextReader._list,
+    "ordered_list_open": TextReader._list,
+    "table_open": TextReader._table,
+    "footnote_reference_open": TextReader._footnote,
+}
+
+
+class Texts:
+    """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
+        """The blocks of a text; HTML becomes an `HtmlFlow`."""
+        return self._session.apart(lambda: self._reader(normalized(excerpt)).read())
+
+    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        """The inlines of a text that is one paragraph at most."""
+        content = trimmed(normalized(excerpt))
+
+        def read() -> tuple[Inline, ...]:
+            balance = Balance(self._session.report)
+            links = self._definitions()
+            reader = InlineReader(
+                content, links, self._session.notes, balance, self._session.report
+            )
+            return reader.read(content)
+
+        return self._session.apart(read)
+
+    def _reader(self, base: Excerpt) -> TextReader:
+        return TextReader(base, self._session, self._definitions(), nested=True)
+
+    def _definitions(self) -> Definitions:
+        """The document's link definitions; those that a text adds are its own."""
+        return Definitions(dict(self._session.definitions.links))

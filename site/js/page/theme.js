@@ -1,0 +1,57 @@
+/** Light, dark or as the system has it; kept in the reader's browser. */
+
+const KEY = 'coursebuild.theme'
+const THEMES = ['auto', 'light', 'dark']
+
+/** The theme that the reader chose; `auto` where none is kept or storage is closed to the page. */
+export function storedTheme() {
+  try {
+    const theme = localStorage.getItem(KEY)
+    return THEMES.includes(theme) ? theme : 'auto'
+  } catch {
+    return 'auto'
+  }
+}
+
+function storeTheme(theme) {
+  try {
+    if (theme === 'auto') localStorage.removeItem(KEY)
+    else localStorage.setItem(KEY, theme)
+  } catch {
+    // Storage is closed: the choice holds for this page.
+  }
+}
+
+/** Show a theme: the style sheet reads `data-theme`, the browser's own frame reads the meta element. */
+export function applyTheme(theme) {
+  const root = document.documentElement
+  if (theme === 'auto') delete root.dataset.theme
+  else root.dataset.theme = theme
+  for (const meta of document.querySelectorAll('meta[name="theme-color"]')) {
+    meta.dataset.media ??= meta.media
+    const own = meta.dataset.media.includes('dark') ? 'dark' : 'light'
+    meta.media = theme === 'auto' ? meta.dataset.media : own === theme ? 'all' : 'not all'
+  }
+}
+
+/** Put the switch into the head of the page, and follow a choice made in another tab. */
+export function addThemeSwitch(document, words) {
+  const tools = document.querySelector('[data-tools]')
+  if (!tools) return
+  const label = document.createElement('label')
+  label.className = 'theme'
+  const select = document.createElement('select')
+  for (const theme of THEMES) select.add(new Option(words(`theme.${theme}`), theme))
+  select.value = storedTheme()
+  select.addEventListener('change', () => {
+    storeTheme(select.value)
+    applyTheme(select.value)
+  })
+  window.addEventListener('storage', (event) => {
+    if (event.key !== KEY && event.key !== null) return
+    select.value = storedTheme()
+    applyTheme(select.value)
+  })
+  label.append(words('theme.label'), ' ', select)
+  tools.append(label)
+}

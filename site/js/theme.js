@@ -1,0 +1,5 @@
+/** Sets the colours that the reader chose, before anything is drawn. Runs in the head of every page. */
+
+import { applyTheme, storedTheme } from './page/theme.js'
+
+applyTheme(storedTheme())
