@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 
 _LETTERS = re.compile(r"[A-Za-z]+")
+_DOLLARS = re.compile(r"(?<!\\)\$+")
 
 _COMMANDS = frozenset(
     re.findall(
@@ -48,22 +50,16 @@ def tex_escapes(value: str, escapes: Iterable[tuple[int, str]]) -> Iterator[tupl
     """
     if "$" not in value:
         return
+    dollars = [match.start() for match in _DOLLARS.finditer(value)]
     for at, letter in escapes:
         rest = tex_word(value, at + 1)
         if not rest or letter not in "tnbfr":
             continue
         known = letter + rest in _COMMANDS
-        if letter == "n":
-            meant = known and _in_math(value, at)
-        else:
-            meant = letter in "bfr" or known or _in_math(value, at)
+        in_math = bisect_left(dollars, at) % 2 == 1
+        meant = (known and in_math) if letter == "n" else (known or in_math or letter in "bfr")
         if meant:
             yield at, letter + rest
-
-
-def _in_math(value: str, at: int) -> bool:
-    """Whether an odd number of dollar signs that are not escaped stands before `at`."""
-    return len(re.findall(r"(?<!\\)\$+", value[:at])) % 2 == 1
 
 
 def odd_character(char: str) -> str:

@@ -56,15 +56,27 @@ def circles(graph: Graph, order: Sequence[str]) -> list[list[str]]:
 
 
 def _without_ends(graph: Graph) -> dict[str, list[str]]:
-    """The graph without names that lie on no way from circle to circle."""
-    forward = {name: list(dict.fromkeys(targets)) for name, targets in graph.items()}
-    while True:
-        reached = {target for targets in forward.values() for target in targets}
-        kept = {name: targets for name, targets in forward.items() if targets and name in reached}
-        kept = {name: [t for t in targets if t in kept] for name, targets in kept.items()}
-        if len(kept) == len(forward):
-            return kept
-        forward = kept
+    """The names that lead into a circle: what can be put into an order is taken away."""
+    targets = {name: list(dict.fromkeys(required)) for name, required in graph.items()}
+    waiting = {name: len(required) for name, required in targets.items()}
+    backward = _turned(targets)
+    ready = [name for name, count in waiting.items() if count == 0]
+    while ready:
+        for name in backward[ready.pop()]:
+            waiting[name] -= 1
+            if waiting[name] == 0:
+                ready.append(name)
+    left = {name for name, count in waiting.items() if count}
+    return {name: [t for t in targets[name] if t in left] for name in graph if name in left}
+
+
+def _turned(graph: Graph) -> dict[str, list[str]]:
+    """The graph with every edge the other way round."""
+    backward: dict[str, list[str]] = {name: [] for name in graph}
+    for name, targets in graph.items():
+        for target in targets:
+            backward[target].append(name)
+    return backward
 
 
 def _shortest(graph: Graph, start: str) -> list[str]:
@@ -87,11 +99,7 @@ def _shortest(graph: Graph, start: str) -> list[str]:
 
 def _group(graph: Graph, start: str) -> set[str]:
     """The names that `start` reaches and that reach it."""
-    backward: dict[str, list[str]] = {name: [] for name in graph}
-    for name, targets in graph.items():
-        for target in targets:
-            backward[target].append(name)
-    return _reached(graph, start) & _reached(backward, start)
+    return _reached(graph, start) & _reached(_turned(graph), start)
 
 
 def _reached(graph: Graph, start: str) -> set[str]:

@@ -14,7 +14,7 @@ from coursebuild.syntax.nodes import StringNode
 from coursebuild.syntax.toml_fault import FaultError
 
 _PLAIN = re.compile(r'[^"\\\n]*')
-_PLAIN_LINES = re.compile(r'(?:[^"\\]|"(?!""))*')
+_PLAIN_LINES = re.compile(r'[^"\\]*(?:"(?!"")[^"\\]*)*')
 _LINE_END = re.compile(r"\\[ \t]*\n[ \t\n]*")
 _CODE = re.compile(r"\\(?:u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2})")
 _ESCAPES = {

@@ -1,0 +1,473 @@
+"""JSON with places: what is JSON, where its values stand, and what an author is told."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.diagnostics import Diagnostic, Parsed
+from coursebuild.source import Excerpt, Source
+from coursebuild.syntax.json_text import MAX_DEPTH, parse_json
+from coursebuild.syntax.nodes import (
+    ArrayNode,
+    BoolNode,
+    Node,
+    NullNode,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+)
+
+
+def parse(text: str) -> Parsed[Node | None]:
+    source = Source("lesson.md", text)
+    return parse_json(Excerpt.of_span(source.span()), source.span(0, 0))
+
+
+def plain(node: Node) -> object:
+    """The value as `json.loads` gives it."""
+    match node:
+        case ObjectNode():
+            return {member.key.value: plain(member.value) for member in node.members}
+        case ArrayNode():
+            return [plain(item) for item in node.items]
+        case StringNode() | NumberNode() | BoolNode():
+            return node.value
+        case NullNode():
+            return None
+        case _:
+            raise AssertionError(node)
+
+
+def shown(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
+    return [
+        f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"
+        + (f" [{d.help}]" if d.help else "")
+        for d in diagnostics
+    ]
+
+
+def walk(node: Node) -> list[Node]:
+    if isinstance(node, ObjectNode):
+        inner = [n for member in node.members for n in (member.key, member.value)]
+        return [node, *(m for n in inner for m in walk(n))]
+    if isinstance(node, ArrayNode):
+        return [node, *(n for item in node.items for n in walk(item))]
+    return [node]
+
+
+DOUBLE = "to write a backslash, double it: "
+READ = f"is read as a control character [{DOUBLE}"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        # the text as a whole
+        (
+            "",
+            [
+                "1:1-1 json-syntax: the block is empty: a JSON object is expected"
+                ' [write `{"field": value, …}`]'
+            ],
+        ),
+        (
+            " \n\t ",
+            [
+                "1:1-1 json-syntax: the block is empty: a JSON object is expected"
+                ' [write `{"field": value, …}`]'
+            ],
+        ),
+        ('{"a": 1} x', ["1:10-11 json-syntax: text after the end of the JSON value"]),
+        ('{"a": 1}\n\n{"b": 2}', ["3:1-9 json-syntax: text after the end of the JSON value"]),
+        ('{"a": 1}}', ["1:9-10 json-syntax: `}` closes nothing"]),
+        # commas and brackets
+        ('{"a": 1,}', ["1:8-9 json-syntax: a comma before `}` [remove the comma]"]),
+        ("[1, 2,\n]", ["1:6-7 json-syntax: a comma before `]` [remove the comma]"]),
+        (
+            "[1,, 2]",
+            ["1:4-5 json-syntax: two commas with no value between them [remove one]"],
+        ),
+        (
+            '{"a": "x"\n "b": 2}',
+            ["1:10-10 json-syntax: a comma is missing here [put `,` between the two values]"],
+        ),
+        (
+            '[{"a": 1}\n {"b": 2}]',
+            ["1:10-10 json-syntax: a comma is missing here [put `,` between the two values]"],
+        ),
+        ('{"a": [1, 2}', ["1:12-13 json-syntax: expected `,` or `]`, found `}`"]),
+        ('{"a": {"b": 1}', ["1:1-2 json-syntax: `{` is never closed"]),
+        ('{"a": [1, 2', ["1:7-8 json-syntax: `[` is never closed"]),
+        ("[", ["1:1-2 json-syntax: `[` is never closed"]),
+        ("{", ["1:1-2 json-syntax: `{` is never closed"]),
+        ('{"a"', ["1:4-5 json-syntax: the JSON ends where `:` after the key `a` is expected"]),
+        ('{"a":\n', ["1:5-6 json-syntax: the JSON ends where a value is expected"]),
+        ('{"a" 1}', ["1:6-7 json-syntax: expected `:` after the key `a`, found `1`"]),
+        ('{"a" = 1}', ["1:6-7 json-syntax: `=` where JSON has `:` [write `:`]"]),
+        (
+            "[1; 2]",
+            ["1:3-4 json-syntax: expected `,` or `]`, found `;` [JSON separates values by `,`]"],
+        ),
+        ('{"a": }', ["1:7-8 json-syntax: expected a value, found `}`"]),
+        (
+            '{"a": (1, 2)}',
+            ["1:7-8 json-syntax: expected a value, found `(` [a list stands between `[` and `]`]"],
+        ),
+        # quotes
+        (
+            "{“a”: 1}",
+            [
+                "1:2-3 json-syntax: expected a key in double quotes, found `“`"
+                ' [JSON knows only the straight quote `"`; replace the curly ones of this block]'
+            ],
+        ),
+        (
+            "{'a': 1}",
+            [
+                "1:2-3 json-syntax: expected a key in double quotes, found `'`"
+                ' [JSON strings stand between double quotes: `"…"`]'
+            ],
+        ),
+        (
+            "{\"a\": 'x'}",
+            [
+                "1:7-8 json-syntax: expected a value, found `'`"
+                ' [JSON strings stand between double quotes: `"…"`]'
+            ],
+        ),
+        (
+            "{title: 1}",
+            ['1:2-7 json-syntax: expected a key in double quotes, found `title` [write `"title"`]'],
+        ),
+        (
+            '{"a": Mass and inertia}',
+            [
+                "1:7-11 json-syntax: expected a value, found `Mass`"
+                " [text stands between double quotes]"
+            ],
+        ),
+        (
+            '{"q": "the "best" one"}',
+            [
+                "1:13-17 json-syntax: expected `,` or `}`, found `best`"
+                ' [a double quote inside a string is written `\\"`]'
+            ],
+        ),
+        (
+            '{"a": "x\n"}',
+            [
+                "1:7-9 json-syntax: the string is not closed on its line"
+                ' [close it with `"`; a line end inside a string is written `\\n`]'
+            ],
+        ),
+        (
+            '{"a": "x',
+            [
+                "1:7-9 json-syntax: the string is not closed on its line"
+                ' [close it with `"`; a line end inside a string is written `\\n`]'
+            ],
+        ),
+        # words
+        ('{"a": True}', ["1:7-11 json-syntax: `True` is not JSON [write `true`]"]),
+        (
+            "[False, None]",
+            [
+                "1:2-7 json-syntax: `False` is not JSON [write `false`]",
+                "1:9-13 json-syntax: `None` is not JSON [write `null`]",
+            ],
+        ),
+        ("[NaN]", ["1:2-5 json-syntax: JSON has no `NaN` [write a finite number]"]),
+        ("[-Infinity]", ["1:2-11 json-syntax: JSON has no `-Infinity` [write a finite number]"]),
+        # numbers
+        ("[01]", ["1:2-4 json-syntax: `01` is not a number of JSON [write `1`]"]),
+        ("[-007.50]", ["1:2-9 json-syntax: `-007.50` is not a number of JSON [write `-7.50`]"]),
+        ("[.5]", ["1:2-4 json-syntax: `.5` is not a number of JSON [write `0.5`]"]),
+        ("[5.]", ["1:2-4 json-syntax: `5.` is not a number of JSON [write `5`]"]),
+        ("[+5]", ["1:2-4 json-syntax: `+5` is not a number of JSON [write `5`]"]),
+        ("[1e]", ["1:2-4 json-syntax: `1e` is not a number of JSON"]),
+        ("[-]", ["1:2-3 json-syntax: `-` is not a number of JSON"]),
+        ("[1_000]", ["1:2-7 json-syntax: `1_000` is not a number of JSON [write `1000`]"]),
+        (
+            "[0x1F]",
+            ["1:2-6 json-syntax: `0x1F` is not a number of JSON [JSON has decimal numbers only]"],
+        ),
+        ("[3.14.0]", ["1:2-8 json-syntax: `3.14.0` is not a number of JSON"]),
+        ("[٣]", ["1:2-3 json-syntax: expected a value, found `٣`"]),
+        ("[1٣]", ["1:2-4 json-syntax: `1٣` is not a number of JSON"]),
+        ("[" + "9" * 5000 + "]", ["1:2-5002 json-syntax: a number of 5000 digits is too long"]),
+        # comments and spaces
+        ('{"a": 1 // one\n}', ["1:9-15 json-syntax: JSON has no comments [remove it]"]),
+        ('# all\n{"a": 1}', ["1:1-6 json-syntax: JSON has no comments [remove it]"]),
+        ("[1, /* two\nlines */ 2]", ["1:5-11 json-syntax: JSON has no comments [remove it]"]),
+        (
+            "[1,\u00a02]",
+            [
+                "1:4-5 json-syntax: U+00A0 (no-break space) is not white space in JSON"
+                " [replace it by a plain space, or remove it]"
+            ],
+        ),
+        (
+            "\ufeff[]",
+            [
+                "1:1-2 json-syntax: U+FEFF (zero width no-break space) is not white space in JSON"
+                " [replace it by a plain space, or remove it]"
+            ],
+        ),
+        # inside strings
+        (
+            r'["\omega"]',
+            [f"1:3-5 json-syntax: `\\o` is not an escape of JSON [{DOUBLE}`\\\\omega`]"],
+        ),
+        (r'["\("]', [f"1:3-5 json-syntax: `\\(` is not an escape of JSON [{DOUBLE}`\\\\`]"]),
+        (
+            r'["\upsilon"]',
+            [
+                "1:3-5 json-syntax: `\\u` is not followed by four hexadecimal digits"
+                f" [{DOUBLE}`\\\\upsilon`]"
+            ],
+        ),
+        (
+            r'["\u12"]',
+            [
+                "1:3-5 json-syntax: `\\u` is not followed by four hexadecimal digits"
+                " [write four hexadecimal digits after `\\u`]"
+            ],
+        ),
+        (
+            r'["\ud83d!"]',
+            ["1:3-9 json-syntax: `\\ud83d` is half of a character [write the character itself]"],
+        ),
+        (
+            r'["\ude00\ud83d"]',
+            [
+                "1:3-9 json-syntax: `\\ude00` is half of a character [write the character itself]",
+                "1:9-15 json-syntax: `\\ud83d` is half of a character [write the character itself]",
+            ],
+        ),
+        (
+            '["\ud83d"]',
+            ["1:3-4 json-syntax: U+D83D is half of a character [write the character itself]"],
+        ),
+        ('["a\tb"]', ["1:4-5 json-syntax: a tab inside a string [write `\\t`, or a space]"]),
+        (
+            '["a\x01b"]',
+            [
+                "1:4-5 json-syntax: the control character U+0001 inside a string"
+                " [write `\\u0001`, or remove it]"
+            ],
+        ),
+        # TeX that is a valid escape
+        (
+            r'["$\tau$"]',
+            [f"1:4-8 field-value: `\\t` of `\\tau` {READ}`\\\\tau`]"],
+        ),
+        (
+            r'["$\frac12 \beta \rho$"]',
+            [
+                f"1:4-9 field-value: `\\f` of `\\frac` {READ}`\\\\frac`]",
+                f"1:12-17 field-value: `\\b` of `\\beta` {READ}`\\\\beta`]",
+                f"1:18-22 field-value: `\\r` of `\\rho` {READ}`\\\\rho`]",
+            ],
+        ),
+        (
+            r'["$\nabla f$"]',
+            [f"1:4-10 field-value: `\\n` of `\\nabla` {READ}`\\\\nabla`]"],
+        ),
+        # keys
+        ('{"a": 1, "b": 2, "a": 3}', ["1:18-21 field-repeated: `a` is given twice"]),
+        (r'{"a": 1, "\u0061": 3}', ["1:10-18 field-repeated: `a` is given twice"]),
+        # several at once
+        (
+            '{"a": True,\n "b": "\\p",\n "c": [01,],\n "a": 1 // x\n}',
+            [
+                "1:7-11 json-syntax: `True` is not JSON [write `true`]",
+                f"2:8-10 json-syntax: `\\p` is not an escape of JSON [{DOUBLE}`\\\\p`]",
+                "3:8-10 json-syntax: `01` is not a number of JSON [write `1`]",
+                "3:10-11 json-syntax: a comma before `]` [remove the comma]",
+                "4:2-5 field-repeated: `a` is given twice",
+                "4:9-13 json-syntax: JSON has no comments [remove it]",
+            ],
+        ),
+    ],
+)
+def test_what_an_author_is_told(text: str, expected: list[str]) -> None:
+    assert shown(parse(text).diagnostics) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r'"a\nabout"',  # a line end before a word, no formula
+        r'"\nabla"',  # no dollar: not a text with formulas
+        r'"costs $5 and $6\nnu"',
+        r'"$x$\nnot"',  # after the formula
+        r'"$x$\tabc"',
+        r'"$\\tau$"',
+        r'"a\r\n$b$"',
+        r'"$a$ \b"',
+    ],
+)
+def test_escapes_that_may_be_meant_are_left_alone(text: str) -> None:
+    assert parse(text).diagnostics == ()
+
+
+def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
+    repeated = parse('{"a": 1,\n "a": 2}').diagnostics[0]
+    assert [
+        (n.message, n.span and n.span.text, n.span and n.span.line) for n in repeated.notes
+    ] == [("the first one is here", '"a"', 1)]
+    closed = parse('{"a":\n [1}').diagnostics[0]
+    assert [(n.message, n.span and n.span.column) for n in closed.notes] == [
+        ("`[` is opened here", 2)
+    ]
+
+
+def test_nesting_is_limited() -> None:
+    fine = "[" * MAX_DEPTH + "]" * MAX_DEPTH
+    assert parse(fine).diagnostics == ()
+    for opening in ("[", '{"a":'):
+        deep = parse(opening * 100_000)
+        assert deep.value is None
+        at = len(opening) * MAX_DEPTH
+        assert [(d.message, d.span.start) for d in deep.diagnostics] == [
+            ("objects and arrays nest more than 64 deep", at)
+        ]
+
+
+def test_values_that_json_has_and_python_stretches() -> None:
+    node = parse(
+        '[1e999, -0, -0.0, 1E+2, 123456789012345678901234567890, "\\u0000\\ud83d\\ude00\\/"]'
+    )
+    assert node.diagnostics == ()
+    assert node.value is not None
+    assert repr(plain(node.value)) == (
+        "[inf, 0, -0.0, 100.0, 123456789012345678901234567890, '\\x00😀/']"
+    )
+
+
+def test_a_prefix_is_cut_off_and_counted() -> None:
+    text = '> {"a": [1,\n>   "$\\\\x$",\n> \n>  tru]}\n'
+    source = Source("lesson.md", text)
+    lines = [(line[2:], text.index(line) + 2) for line in text.split("\n") if line]
+    parsed = parse_json(Excerpt.of_lines(source, lines), source.span(0, 0))
+    assert shown(parsed.diagnostics) == [
+        "4:4-7 json-syntax: expected a value, found `tru` [text stands between double quotes]"
+    ]
+
+
+def test_each_character_of_a_string_knows_its_place() -> None:
+    text = '> ["a\\n\\u00e9\\ud83d\\ude00\\\\x",\n>  "plain", ""]'
+    source = Source("lesson.md", text)
+    first, second = text.split("\n")
+    body = Excerpt.of_lines(source, [(first[2:], 2), (second[2:], len(first) + 3)])
+    node = parse_json(body, source.span(0, 0)).value
+    assert isinstance(node, ArrayNode)
+    escaped, simple, empty = node.items
+    assert isinstance(escaped, StringNode) and isinstance(simple, StringNode)
+    assert isinstance(empty, StringNode)
+    excerpt = escaped.excerpt
+    assert excerpt.text == "a\n\u00e9\U0001f600\\x"
+    places = [excerpt.offset(i) for i in range(len(excerpt.text))]
+    assert [text[p : p + 2] for p in places] == ["a\\", "\\n", "\\u", "\\u", "\\\\", 'x"']
+    assert simple.excerpt.span().text == "plain"
+    assert simple.excerpt.span(2, 4).text == "ai"
+    assert (simple.span.line, simple.span.column) == (2, 4)
+    assert empty.excerpt.text == "" and text[empty.excerpt.span().start] == '"'
+
+
+# ------------------------------------------------------------------------------------- properties
+
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.text(st.characters(exclude_categories=["Cs"]), max_size=4), inner, max_size=4
+        )
+    ),
+    max_leaves=12,
+)
+PIECES = st.sampled_from(
+    [
+        *"{}[],:\" \n\t\r0123456789-+.eE/*#\\='",
+        *('"a"', '"b":', "true", "false", "null", "NaN", "True", "//", "/*", "*/", '"$\\tau$"'),
+        *("\\u00e9", "\\ud83d\\ude00", "“", "\u00a0", "\x0c"),
+    ]
+)
+
+
+@settings(max_examples=200)
+@given(VALUES, st.sampled_from([None, 0, 2]), st.booleans())
+def test_valid_json_is_read_as_the_standard_library_reads_it(
+    value: object, indent: int | None, ascii_only: bool
+) -> None:
+    text = json.dumps(value, indent=indent, ensure_ascii=ascii_only)
+    parsed = parse(text)
+    assert [d for d in parsed.diagnostics if d.rule != "field-value"] == []
+    assert parsed.value is not None
+    assert repr(plain(parsed.value)) == repr(json.loads(text))
+
+
+@settings(max_examples=200)
+@given(VALUES, st.sampled_from([None, 1]))
+def test_spans_nest_and_slice_back(value: object, indent: int | None) -> None:
+    text = json.dumps(value, indent=indent)
+    root = parse(text).value
+    assert root is not None
+    for node in walk(root):
+        assert json.loads(node.span.text) == plain(node)
+        assert root.span.contains(node.span)
+        assert node.span.contains(node.mark)
+        if isinstance(node, StringNode):
+            excerpt = node.excerpt
+            assert excerpt.text == node.value
+            for i, char in enumerate(excerpt.text):
+                there = text[excerpt.offset(i)]
+                assert there in (char, "\\")
+                assert node.span.start < excerpt.offset(i) < node.span.end - 1
+
+
+def is_json(text: str) -> bool:
+    def refuse(name: str) -> None:
+        raise ValueError(name)
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+        json.dumps(value, ensure_ascii=False).encode()
+    except (ValueError, UnicodeEncodeError):
+        return False
+    return True
+
+
+@settings(max_examples=500)
+@given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20))
+@example('{"a":1}{')
+@example("[1]]")
+@example('["\\u')
+def test_any_text_is_json_or_told_why_not(text: str) -> None:
+    parsed = parse(text)
+    syntax = [d for d in parsed.diagnostics if d.rule == "json-syntax"]
+    assert is_json(text) == (not syntax)
+    for diagnostic in parsed.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+    assert syntax or parsed.value is not None
+
+
+@settings(max_examples=300)
+@given(VALUES, st.data())
+def test_a_mutation_is_never_too_much(value: object, data: st.DataObject) -> None:
+    text = json.dumps(value, indent=1)
+    at = data.draw(st.integers(0, len(text)))
+    cut = data.draw(st.integers(0, 3))
+    mutated = text[:at] + data.draw(PIECES) + text[at + cut :]
+    parsed = parse(mutated)
+    syntax = [d for d in parsed.diagnostics if d.rule == "json-syntax"]
+    assert is_json(mutated) == (not syntax)
