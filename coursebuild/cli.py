@@ -7,24 +7,53 @@ usage. Heavy imports happen in the command that needs them.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
+
+from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report, Style
 
-CLEAN, WRONG, USAGE, INTERRUPTED = 0, 1, 2, 130
+CLEAN, WRONG, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+
+
+class _Terminated(KeyboardInterrupt):
+    """Somebody asked this process to end: what it has begun is cleaned up, as after Ctrl-C."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the arguments name; gives the exit status."""
+    before = _heed_sigterm()
+    try:
+        return _main(arguments)
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGTERM, before)
+
+
+def _heed_sigterm() -> Any:
+    """Make SIGTERM an exception; gives the handler there was, or nothing where it is left alone."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+
+    def terminate(*_: object) -> NoReturn:
+        raise _Terminated
+
+    return signal.signal(signal.SIGTERM, terminate)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
     _utf8_streams()
     options = _parser().parse_args(arguments)
-    from coursebuild.effects.errors import EffectError, PublishRefusedError
     from coursebuild.pipeline.options import UsageError
 
     try:
@@ -36,20 +65,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(USAGE, error.message, error.help)
     except EffectError as error:
         return _fail(WRONG, error.message, error.help)
+    except _Terminated:
+        return _say(TERMINATED, "terminated")
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output went away; python would complain again when it closes the stream.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return WRONG
+        return _say(INTERRUPTED, "interrupted")
 
 
 def _fail(status: int, message: str, help: str = "") -> int:
-    print(f"coursebuild: {message}", file=sys.stderr)
-    if help:
-        print(f"  help: {help}", file=sys.stderr)
+    return _say(status, f"coursebuild: {message}" + (f"\n  help: {help}" if help else ""))
+
+
+def _say(status: int, text: str) -> int:
+    if sys.stderr is not None:  # print would take standard output in its place
+        with contextlib.suppress(OSError):  # nobody reads it; the status says it too
+            print(text, file=sys.stderr, flush=True)
     return status
+
+
+def _write(text: str, status: int) -> int:
+    """Write to standard output; gives the status, another one where the text cannot be written."""
+    if sys.stdout is None:  # closed by whoever started us
+        return status
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has seen enough; what was found is as it was
+        _forget_stdout()
+    except OSError as error:
+        _forget_stdout()
+        return _fail(WRONG, f"standard output cannot be written: {reason(error)}")
+    return status
+
+
+def _forget_stdout() -> None:
+    """Python writes what is left once more when it ends, and would complain."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 def _utf8_streams() -> None:
@@ -84,7 +136,7 @@ def _parser() -> argparse.ArgumentParser:
         "--out",
         default="public",
         metavar="FOLDER",
-        help="where the site goes (default: %(default)s)",
+        help="where the site goes, from the course's folder (default: %(default)s)",
     )
     check = _command(commands, "check", _check, "verify, publish nothing")
     _lessons(check)
@@ -224,27 +276,28 @@ def _serve(arguments: argparse.Namespace) -> int:
 def _schema(arguments: argparse.Namespace) -> int:
     from coursebuild.syntax.schemas import json_schema
 
-    sys.stdout.write(json_schema(arguments.name).decode())
-    return CLEAN
+    return _write(json_schema(arguments.name).decode(), CLEAN)
 
 
 def _print(report: Report, form: str, options: Options) -> int:
     from coursebuild.report import FORMATS, render_report
 
+    status = CLEAN if report.ok else WRONG
+    if options.quiet and form == "text":
+        if not report.diagnostics:
+            return status
+        report = replace(report, scripts=(), remarks=())
     chosen = next(known for known in FORMATS if known == form)
-    text = render_report(report, chosen, _style(sys.stdout))
-    if not (options.quiet and report.ok and not report.diagnostics and form == "text"):
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    return CLEAN if report.ok else WRONG
+    return _write(render_report(report, chosen, _style(sys.stdout)), status)
 
 
-def _style(stream: TextIO) -> Style:
+def _style(stream: TextIO | None) -> Style:
     """Colour only on a terminal whose user does not ask for none (https://no-color.org)."""
     import shutil
 
     from coursebuild.report import Style
 
-    colour = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    width = shutil.get_terminal_size((100, 24)).columns if stream.isatty() else 100
-    return Style(colour, width)
+    if stream is None or not stream.isatty():
+        return Style()
+    colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return Style(colour, shutil.get_terminal_size((100, 24)).columns)

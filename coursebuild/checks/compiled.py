@@ -5,18 +5,21 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
 1. `mjcf_texts` gives each `mjcf` block and each lab's inline `xml` as a whole model, with the
    number of lines put before it.
 2. `check_compiled` holds what compiling gave against what the lesson says, and a lab's names
-   against its model.
+   against its model. A file that only other models include need not compile by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Course, Lab, Mjcf, document_blocks
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Excerpt, Span
+
+_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,33 +64,45 @@ def check_compiled(
     course: Course,
     models: Mapping[str, CompileResult],
     texts: Sequence[tuple[MjcfText, CompileResult]],
+    readable: Callable[[str], str],
 ) -> tuple[Diagnostic, ...]:
-    """Diagnostics of the models, of the MJCF texts, and of the names that labs use."""
+    """Diagnostics of the models, of the MJCF texts, and of the names that labs use.
+
+    `readable` makes one line of a message of MuJoCo's.
+    """
+    blocks = [block for document in course.documents for block in document_blocks(document)]
+    labs = [block for block in blocks if isinstance(block, Lab)]
     found: list[Diagnostic] = []
+    parts = _parts(course, models) - {lab.model for lab in labs}
     for model in course.models:
         result = models[model.name]
-        if result.error:
+        if result.error and model.name not in parts:
             span = _line(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
-            found.append(
-                diagnose(
-                    "model-error",
-                    span,
-                    f"the model `{model.name}` does not compile: {result.error}",
-                )
-            )
+            message = f"the model `{model.name}` does not compile: {readable(result.error)}"
+            found.append(diagnose("model-error", span, message))
     facts: dict[int, ModelFacts] = {}
     for text, result in texts:
-        found += _check_text(text, result)
+        found += _check_text(text, result, readable)
         if result.facts is not None:
             facts[id(text.block)] = result.facts
-    for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Lab):
-                compiled = models.get(block.model) if block.model is not None else None
-                known = compiled.facts if compiled is not None else facts.get(id(block))
-                if known is not None:
-                    found += _check_names(block, known)
+    for lab in labs:
+        compiled = models.get(lab.model) if lab.model is not None else None
+        known = compiled.facts if compiled is not None else facts.get(id(lab))
+        if known is not None:
+            found += _check_names(lab, known)
     return tuple(found)
+
+
+def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str | None]:
+    """Names of the files in models/ that are there to be included by others."""
+    included = {
+        path for result in models.values() if result.facts for path in result.facts.includes
+    }
+    return {
+        model.name
+        for model in course.models
+        if model.source.path in included or _PART.match(model.source.text)
+    }
 
 
 def _line(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span:
@@ -98,7 +113,9 @@ def _line(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 
 
-def _check_text(text: MjcfText, result: CompileResult) -> Iterator[Diagnostic]:
+def _check_text(
+    text: MjcfText, result: CompileResult, readable: Callable[[str], str]
+) -> Iterator[Diagnostic]:
     block = text.block
     if isinstance(block, Mjcf) and block.error is not None:
         span = block.error_span or block.span.first_line()
@@ -120,14 +137,10 @@ def _check_text(text: MjcfText, result: CompileResult) -> Iterator[Diagnostic]:
     if result.error:
         span = _line(text.code, result.line, text.lines_before, block.span.first_line())
         what = "the lab's `xml`" if isinstance(block, Lab) else "this block"
-        yield diagnose(
-            "mjcf-error",
-            span,
-            f"{what} does not compile: {result.error}",
-            help=""
-            if isinstance(block, Lab)
-            else 'if it is a part of a model say so: `fragment="worldbody"`',
-        )
+        whole = isinstance(block, Lab) or block.fragment is not None or "<mujoco" in text.text
+        help = "" if whole else 'if it is a part of a model say so: `fragment="worldbody"`'
+        message = f"{what} does not compile: {readable(result.error)}"
+        yield diagnose("mjcf-error", span, message, help=help)
 
 
 def _folded(text: str) -> str:
@@ -152,7 +165,7 @@ def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
     if lab.trail is not None and lab.trail not in facts.sites:
         yield diagnose(
             "lab-name",
-            lab.span.first_line(),
+            lab.trail_span or lab.span.first_line(),
             f"the model has no site `{lab.trail}`",
             help=did_you_mean(lab.trail, facts.sites),
         )

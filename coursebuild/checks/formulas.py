@@ -14,12 +14,13 @@ from coursebuild.source import Excerpt
 
 
 def _uses(course: Course) -> Iterator[tuple[Formula, Excerpt]]:
+    """Every formula that says something; an empty one is the parser's to report."""
     for document in course.documents:
         for block in document_blocks(document):
-            if isinstance(block, MathBlock):
+            if isinstance(block, MathBlock) and block.tex.text.strip():
                 yield Formula(block.tex.text, True), block.tex
             for inline in walk_inlines(block_inlines(block)):
-                if isinstance(inline, Math):
+                if isinstance(inline, Math) and inline.tex.text.strip():
                     yield Formula(inline.tex.text, inline.display), inline.tex
 
 

@@ -1,6 +1,6 @@
 """Compiling MJCF with MuJoCo itself, in a child process.
 
-Entry points: `compile_models`, `compile_texts`, and `readable_error` for what is shown to people.
+Entry points: `compile_all`, `compile_models`, `compile_texts`; `readable_error`, for people.
 
 1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
@@ -37,39 +37,39 @@ _TEXT_NAME = ".coursebuild-text.xml"
 """What a text would be called in `models/`; no file has this name."""
 
 
-def compile_models(
-    root: Path, models: Sequence[MjcfModel], *, timeout: float = TIMEOUT
-) -> tuple[CompileResult, ...]:
-    """Compile models of the course, in their order.
+def compile_all(
+    root: Path, models: Sequence[MjcfModel], texts: Sequence[str], *, timeout: float = TIMEOUT
+) -> tuple[tuple[CompileResult, ...], tuple[CompileResult, ...]]:
+    """Compile models of the course and texts as if they stood in `models/`, all in one child.
+
+    Returns:
+        A result for each model, and one for each text; the facts of a text list no includes.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
     """
     root = root.resolve()
     jobs = [(root / model.source.path, model.source.text, True) for model in models]
-    return _compile(root, jobs, timeout)
+    jobs += [(root / "models" / _TEXT_NAME, text, False) for text in texts]
+    if not jobs:
+        return (), ()
+    with _Compiler(root, timeout) as compiler:
+        results = tuple(compiler.compile(*job) for job in jobs)
+    return results[: len(models)], results[len(models) :]
+
+
+def compile_models(
+    root: Path, models: Sequence[MjcfModel], *, timeout: float = TIMEOUT
+) -> tuple[CompileResult, ...]:
+    """See `compile_all`."""
+    return compile_all(root, models, (), timeout=timeout)[0]
 
 
 def compile_texts(
     root: Path, texts: Sequence[str], *, timeout: float = TIMEOUT
 ) -> tuple[CompileResult, ...]:
-    """Compile MJCF texts as if they stood in `models/`; their facts list no includes.
-
-    Raises:
-        EffectError: MuJoCo cannot be loaded.
-    """
-    root = root.resolve()
-    jobs = [(root / "models" / _TEXT_NAME, text, False) for text in texts]
-    return _compile(root, jobs, timeout)
-
-
-def _compile(
-    root: Path, jobs: Sequence[tuple[Path, str, bool]], timeout: float
-) -> tuple[CompileResult, ...]:
-    if not jobs:
-        return ()
-    with _Compiler(root, timeout) as compiler:
-        return tuple(compiler.compile(*job) for job in jobs)
+    """See `compile_all`."""
+    return compile_all(root, (), texts, timeout=timeout)[1]
 
 
 class _Compiler:

@@ -9,6 +9,7 @@ by SIGALRM.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -102,7 +103,9 @@ def _facts(mujoco: Any, model: Any, path: str | None) -> Facts:
 
     files: list[str] = []
     if path is not None:
-        files = [f for f in mujoco.mju_getXMLDependencies(path) if f != path]
+        # It reads the file again, which somebody may have broken since.
+        with contextlib.suppress(ValueError, mujoco.FatalError):
+            files = [f for f in mujoco.mju_getXMLDependencies(path) if f != path]
     return {
         "bodies": model.nbody - 1,
         "geoms": model.ngeom,

@@ -1,7 +1,7 @@
 """Where the files lie that come with the tool and are not Python.
 
-Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`, for the pages' templates; `bundled_files` and
-`template_texts` read them whole.
+Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`,
+for the pages' templates; `bundled_files` and `template_texts` read them whole.
 
 In an installed package both are inside it. In a source tree they are where they are made:
 `site/dist` and `templates`.

@@ -167,7 +167,10 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer with a file, or with the stream of events."""
-        path = urlsplit(self.path).path
+        try:
+            path = urlsplit(self.path).path
+        except ValueError:
+            path = ""  # no address of a page
         if not self._trusted():
             self._send(
                 HTTPStatus.FORBIDDEN,
@@ -211,6 +214,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Connection", "close")
         self.end_headers()
         self.close_connection = True
+        if self.command == "HEAD":
+            return
         events = self.server.preview.listen()
         try:
             while True:

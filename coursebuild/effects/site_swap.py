@@ -38,6 +38,8 @@ MARKER = ".coursebuild-site"
 _HEADER = "site built by coursebuild; every file listed here may be replaced"
 _JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """What file managers strew about."""
+_TRIES = 100
+"""How often to start again when another build publishes to the same place."""
 _AUTHORED = ("content", "models", "examples", ".coursebuild", ".git")
 
 
@@ -191,7 +193,7 @@ def _write_file(path: Path, data: bytes) -> None:
 
 def _swap(staging: Path, place: Path) -> None:
     """Put the new site at the place; the old one is then where that was, or is named old."""
-    for _ in range(100):
+    for _ in range(_TRIES):
         if os.path.lexists(place):
             if exchange(staging, place):
                 return
@@ -217,11 +219,23 @@ def _mode(place: Path) -> int:
 
 def _foreign(place: Path) -> list[str]:
     """Files at the place that no build of ours put there; sorted."""
-    if not place.is_dir():
-        return []
+    for _ in range(_TRIES):
+        try:
+            before = place.stat()
+            found = _foreign_once(place)
+            if os.path.samestat(before, place.stat()):
+                return found
+        except FileNotFoundError:
+            if not place.exists():
+                return []
+        # Another build swapped its site in while we looked.
+    raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+
+
+def _foreign_once(place: Path) -> list[str]:
     try:
         header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
-    except (OSError, ValueError):
+    except (FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
         header, listed = "", []
     ours = {MARKER, *map(_normal, listed)} if header == _HEADER else set[str]()
     return sorted(path for path in _files(place) if _normal(path) not in ours)

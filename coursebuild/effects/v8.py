@@ -26,7 +26,7 @@ from coursebuild.results import Formula, MathError
 if TYPE_CHECKING:
     from py_mini_racer import MiniRacer
 
-_MEMORY = 256 << 20
+_MEMORY = 128 << 20
 """Bytes of JavaScript objects."""
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""

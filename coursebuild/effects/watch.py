@@ -1,6 +1,7 @@
 """Waiting for the author to save: changes below the course's folder.
 
-Entry point: `changes(root, stop)`. Derived folders, caches and editors' own files are no changes.
+Entry point: `changes(root, stop)`. What reading a course leaves out (caches, editors' own files) is
+no change.
 """
 
 from __future__ import annotations
@@ -9,26 +10,52 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-_DERIVED = frozenset(
-    {"public", "examples", ".coursebuild", ".git", ".venv", "node_modules", "__pycache__"}
-)
+_FOLDERS = ("content", "models", "mjcourse")
+_LOOK = 200
+"""Milliseconds from one look for new and removed folders to the next."""
 
 
 def changes(root: Path, stop: threading.Event) -> Iterator[frozenset[str]]:
-    """Sets of changed paths (POSIX, relative to `root`), one for each burst of saves."""
+    """Sets of changed paths (POSIX, relative to `root`), one for each burst of saves.
+
+    The first set is empty: it says that from now on no change is missed, also while the caller does
+    something else.
+    """
+    first = True
+    while not stop.is_set():
+        folders = _present(root)
+        if not first:
+            yield frozenset(_FOLDERS)
+        for changed in _below(root, folders, stop):
+            if changed or first:
+                first = False
+                yield changed
+            if _present(root) != folders:
+                break
+
+
+def _present(root: Path) -> tuple[Path, ...]:
+    return tuple(root / name for name in _FOLDERS if (root / name).is_dir())
+
+
+def _below(
+    root: Path, folders: tuple[Path, ...], stop: threading.Event
+) -> Iterator[frozenset[str]]:
+    """Changes in these folders; an empty set now and then."""
     from watchfiles import watch
 
-    def wanted(_: object, path: str) -> bool:
-        return _is_source(root, path)
-
-    folders = [root / name for name in ("content", "models", "mjcourse") if (root / name).is_dir()]
+    if not folders:
+        while not stop.wait(_LOOK / 1000):
+            yield frozenset()
+        return
     for batch in watch(
         *folders,
-        watch_filter=wanted,
+        watch_filter=lambda _, path: _is_source(root, path),
         stop_event=stop,
         debounce=300,
         step=20,
-        yield_on_timeout=False,
+        rust_timeout=_LOOK,
+        yield_on_timeout=True,
     ):
         yield frozenset(Path(path).relative_to(root).as_posix() for _, path in batch)
 
@@ -38,10 +65,9 @@ def _is_source(root: Path, path: str) -> bool:
         parts = Path(path).relative_to(root).parts
     except ValueError:
         return False
-    name = parts[-1] if parts else ""
-    editor = (
-        name.startswith((".", "#"))
-        or name.endswith(("~", ".swp", ".swx", ".tmp"))
-        or name == "4913"
-    )
-    return bool(parts) and not editor and not _DERIVED.intersection(parts)
+    return bool(parts) and not any(map(_is_dropping, parts))
+
+
+def _is_dropping(name: str) -> bool:
+    """Whether a file or folder of this name is an editor's, or Python's."""
+    return name.startswith((".", "#")) or name.endswith("~") or name in ("4913", "__pycache__")

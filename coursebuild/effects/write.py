@@ -46,7 +46,7 @@ def write_atomic(
         EffectError: it cannot be written.
     """
     target = resolve_inside(root, path)
-    temporary = ""
+    temporary = ""  # its path, as long as it is to be removed
     try:
         if target.exists() and not target.is_file():
             raise EffectError(f"{path} is not a regular file")
@@ -59,6 +59,7 @@ def write_atomic(
             _put(temporary, target, path, new=expected is None)
             if durable:
                 _sync_folder(target.parent)
+                remove_leftovers([target.parent])
         finally:
             os.close(fd)
     except OSError as error:

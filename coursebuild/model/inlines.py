@@ -142,6 +142,8 @@ class Image:
     url: str
     alt: str
     title: str
+    url_span: Span
+    """Where the address is written: in the image, or in the definition that it names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ Entry points: `build(options, out)`; `prepare(options, progress)`, the same with
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
@@ -42,13 +42,16 @@ def build(options: Options, out: Path) -> Report:
     check_out(options.root, options.root / out)
     with project_lock(options.root, progress.say):
         prepared = prepare(options, progress)
-        if prepared.report.ok:
-            with progress.stage("publishing"):
-                publish(options.root, options.root / out, prepared.files)
-            progress.say(f"published {len(prepared.files)} files in {out}")
-        else:
-            progress.say("nothing was published; the last site stays as it is")
-    return prepared.report
+        if not prepared.report.ok:
+            return replace(prepared.report, remarks=(_unpublished(options.root, out),))
+        with progress.stage("publishing"):
+            publish(options.root, options.root / out, prepared.files)
+    return replace(prepared.report, remarks=(f"published {len(prepared.files)} files in {out}",))
+
+
+def _unpublished(root: Path, out: Path) -> str:
+    there = (root / out).exists()
+    return "nothing was published" + (f"; {out} stays as it is" if there else "")
 
 
 def prepare(options: Options, progress: Progress) -> Prepared:

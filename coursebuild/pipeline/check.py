@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.locks import project_lock
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.judge import judge
@@ -36,7 +36,7 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
     verified = verify(course, options, progress, chosen.documents)
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)
-    found += _no_scripts(course, chosen, verified.scripts)
+    found += _no_scripts(course, chosen, verified.scripts, found)
     return judge(
         course,
         found,
@@ -57,11 +57,21 @@ def no_lessons(course: Course) -> list[Diagnostic]:
 
 
 def _no_scripts(
-    course: Course, chosen: Selection, scripts: Sequence[ScriptLine]
+    course: Course, chosen: Selection, scripts: Sequence[ScriptLine], found: Sequence[Diagnostic]
 ) -> list[Diagnostic]:
-    if any(line.status not in ("skipped", "norun") for line in scripts):
+    """That nothing was verified, where no other mistake says why."""
+    wrong = {d.span.path for d in found if d.severity is Severity.ERROR}
+    told = wrong if chosen.documents is None else wrong & {*chosen.documents, course.map.path}
+    if told or any(line.status not in ("skipped", "norun") for line in scripts):
         return []
-    where = "the course" if chosen.documents is None else " and ".join(x.id for x in chosen.lessons)
-    why = "has none" if not scripts else "has none that can run here"
-    message = f"no script was run: {where} {why}, so that nothing was verified"
-    return [diagnose("no-scripts", course.map.span(0, 0), message)]
+    which = "none that can run here" if scripts else "none"
+    message = f"no script was run, so that nothing was verified: {_chosen(chosen)} {which}"
+    help = "a script is a block that begins with ```` ```python file=examples/….py ````"
+    return [diagnose("no-scripts", course.map.span(0, 0), message, help="" if scripts else help)]
+
+
+def _chosen(chosen: Selection) -> str:
+    ids = ", ".join(lesson.id for lesson in chosen.lessons)
+    if chosen.documents is None:
+        return "the course has"
+    return f"lessons {ids} have" if len(chosen.lessons) > 1 else f"lesson {ids} has"

@@ -6,20 +6,24 @@ Entry point: `extract(options, adopt=…)`.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
-from coursebuild.diagnostics import Diagnostic, Edit
+from coursebuild.diagnostics import Diagnostic, Edit, Severity
 from coursebuild.effects.examples import Obstacle
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.write import write_atomic
+from coursebuild.model import Course
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.update import changed_text
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts
 from coursebuild.report import Report
-from coursebuild.scripts.adopt import adopted
+from coursebuild.scripts.adopt import adopted, block_text
 from coursebuild.scripts.edit import apply_edits
+from coursebuild.scripts.extract import extract as extract_course
 from coursebuild.source import Source
 
 
@@ -36,42 +40,64 @@ def _extract(options: Options, *, adopt: bool) -> Report:
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
     extracted = extract_scripts(course, options)
-    remarks: list[str] = []
+    remarks = _told(extracted)
     refused: list[Diagnostic] = []
     if adopt and extracted.blocked:
-        adoptions, refused = _adopt(options, extracted)
-        remarks += adoptions
-        if adoptions:
+        adoptions, refused, read = _adopt(options, extracted)
+        if read:
             loaded = load(options.root)
             course = loaded.course or course
+            _settle(options, course, read)
             extracted = extract_scripts(course, options)
-    remarks += [f"wrote {path}" for path in extracted.written]
-    remarks += [f"removed {path}, which no lesson has any more" for path in extracted.removed]
-    if not remarks:
-        remarks.append("every script is extracted already")
+        remarks += [*adoptions, *_told(extracted)]
     found = [*loaded.diagnostics, *extracted.diagnostics, *refused]
+    if not remarks and all(d.severity is not Severity.ERROR for d in found):
+        remarks.append("every script is extracted already")
     lessons = sum(lesson.document is not None for lesson in course.lessons)
     seconds = time.monotonic() - began
     return judge(course, found, (), seconds, lessons=lessons, remarks=tuple(remarks))
 
 
-def _adopt(options: Options, extracted: ExtractedScripts) -> tuple[list[str], list[Diagnostic]]:
-    """Write the edited files into their lessons' blocks."""
+def _told(extracted: ExtractedScripts) -> list[str]:
+    removed = (f"removed {path}, which no lesson has any more" for path in extracted.removed)
+    return [*(f"wrote {path}" for path in extracted.written), *removed]
+
+
+def _adopt(
+    options: Options, extracted: ExtractedScripts
+) -> tuple[list[str], list[Diagnostic], dict[str, bytes]]:
+    """Write the edited files into their lessons' blocks; also gives what was in these files."""
     by_path = {e.path: e for e in extracted.all}
     edits: dict[Source, list[Edit]] = {}
-    remarks: list[str] = []
     refused: list[Diagnostic] = []
+    read: dict[str, bytes] = {}
     for example in extracted.blocked:
         extraction = by_path.get(example.path)
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
-        made = adopted(extraction.script, read_bytes(options.root, example.path))
+        data = read_bytes(options.root, example.path)
+        made = adopted(extraction.script, data)
         if isinstance(made, Edit):
             edits.setdefault(made.span.source, []).append(made)
-            remarks.append(f"brought {example.path} into {extraction.document}")
+            read[example.path] = data
         else:
             refused.append(made)
+    remarks: list[str] = []
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
-        write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
-    return remarks, refused
+        if new != source.text:
+            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+            remarks.append(changed_text("updated", source, new))
+    return remarks, refused, read
+
+
+def _settle(options: Options, course: Course, read: Mapping[str, bytes]) -> None:
+    """Make each adopted file what its block extracts to now.
+
+    An editor's line ends or blank lines at the end are nothing that a block holds; without this the
+    file would count as edited for ever.
+    """
+    for extraction in extract_course(course).value:
+        data = read.get(extraction.path, extraction.data)
+        if data != extraction.data and block_text(data) == extraction.text:
+            write_atomic(options.root, extraction.path, extraction.data, expected=data)

@@ -13,6 +13,15 @@ from coursebuild.model import Course, Silence
 from coursebuild.report import Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")
+_OF_RUNS = (
+    "script-failed",
+    "script-timeout",
+    "script-killed",
+    "script-output-limit",
+    "script-encoding",
+    "script-silent",
+)
+"""Only scripts that were to be run have these; they may point at a line of another lesson."""
 
 
 def judge(
@@ -25,11 +34,14 @@ def judge(
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
 ) -> Report:
-    """The report of a command; `documents` limits it to mistakes in these files and in the map."""
+    """The report of a command.
+
+    `documents` limits it to mistakes in these files and in the map, and of the scripts that ran.
+    """
     told = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
         wanted = {*documents, course.map.path}
-        told = tuple(d for d in told if d.span.path in wanted)
+        told = tuple(d for d in told if d.span.path in wanted or d.rule in _OF_RUNS)
     silences = course.silences if course is not None else ()
     kept = tuple(d for d in told if not _silenced(d, silences))
     errors = sum(d.severity is Severity.ERROR for d in kept)

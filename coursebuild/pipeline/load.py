@@ -10,7 +10,6 @@ Entry point: `load(root)`.
 
 from __future__ import annotations
 
-import posixpath
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -53,6 +52,8 @@ class _Loader:
         self.found = found
         self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
+        self.unnamed: dict[str, Source] = {}
+        """Lesson files that the map does not name, by path; one that was surely meant is taken out."""
 
     def course(self) -> Course | None:
         """The whole course, or `None` where there is no usable map."""
@@ -63,8 +64,9 @@ class _Loader:
                     self._document(source, lesson=True)
             return None
         self.callouts = frozenset(kind.name for kind in course.callouts)
+        self.unnamed = self._unnamed(course)
         levels = tuple(self._level(level) for level in course.levels)
-        self._unlisted(course)
+        self._unlisted()
         pages = self._pages(course.pages)
         course = replace(
             course, levels=levels, pages=pages, models=self.files.models, files=self._others(course)
@@ -99,29 +101,24 @@ class _Loader:
         if source is not None:
             return replace(lesson, document=self._document(source, lesson=True))
         if lesson.path not in self.files.unreadable:
-            near = nearest(lesson.path, self._unnamed_files())
-            help = f"is it `{near}`?" if near else 'write it, or say `status = "planned"`'
+            near = nearest(lesson.path, self.unnamed)
+            help = 'write it, or say `status = "planned"`'
+            if near is not None:
+                help = f"is it `{near}`, which the map does not name?"
+                self._document(self.unnamed.pop(near), lesson=True)
             self._report("lesson-missing", lesson, f"there is no file {lesson.path}", help)
         return lesson
 
     def _report(self, rule: str, entry: Lesson | Page, message: str, help: str) -> None:
         self.found.append(diagnose(rule, entry.span.first_line(), message, help=help))
 
-    def _unnamed_files(self) -> list[str]:
-        return [source.path for source in self.files.lessons]
-
-    def _unlisted(self, course: Course) -> None:
+    def _unnamed(self, course: Course) -> dict[str, Source]:
         named = {lesson.path for lesson in course.lessons}
-        present = {source.path for source in self.files.lessons}
-        written = (lesson for lesson in course.lessons if lesson.status is not Status.PLANNED)
-        wanted = {lesson.path for lesson in written} - present
-        for source in self.files.lessons:
-            if source.path in named:
-                continue
-            near = nearest(source.path, wanted)
+        return {s.path: s for s in self.files.lessons if s.path not in named}
+
+    def _unlisted(self) -> None:
+        for source in self.unnamed.values():
             help = f"add a [[level.lesson]] to {MAP}, or move the file away"
-            if near is not None:
-                help = f"is it `{posixpath.basename(near)}`, which the map names?"
             message = f"the course map does not name {source.path}"
             self.found.append(diagnose("lesson-unlisted", source.span(0, 0), message, help=help))
             self._document(source, lesson=True)
@@ -146,7 +143,8 @@ class _Loader:
 
     def _others(self, course: Course) -> tuple[str, ...]:
         """The files that a page may show or link to: all but the map, the lessons and the pages."""
-        taken = {MAP, *self.sources, *(page.path for page in course.pages)}
+        models = (f"models/{model.name}.xml" for model in self.files.models)
+        taken = {MAP, *self.sources, *(page.path for page in course.pages), *models}
         return tuple(path for path in self.files.files if path not in taken)
 
 

@@ -22,7 +22,7 @@ from coursebuild.report import Style, render_report
 
 
 def serve(options: Options, port: int) -> None:
-    """Serve until interrupted."""
+    """Serve until interrupted, which is how a preview ends."""
     progress = Progress(quiet=options.quiet)
     script = dict(bundled_files())["js/preview.js"]
     try:
@@ -33,11 +33,14 @@ def serve(options: Options, port: int) -> None:
     print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
     stop = threading.Event()
     try:
-        _rebuild(options, progress, server)
+        # Watched from before the first build on, so that no save is missed.
         for changed in changes(options.root, stop):
-            names = sorted(changed)
-            progress.say(f"changed: {', '.join(names[:3])}{' …' if len(names) > 3 else ''}")
+            if changed:
+                names = sorted(changed)
+                progress.say(f"changed: {', '.join(names[:3])}{' …' if len(names) > 3 else ''}")
             _rebuild(options, progress, server)
+    except KeyboardInterrupt:
+        progress.say("stopped")
     finally:
         stop.set()
         server.stop()
@@ -56,7 +59,7 @@ def _rebuild(options: Options, progress: Progress, server: PreviewServer) -> Non
     report = prepared.report
     if report.ok:
         server.publish(prepared.files)
-        progress.say(f"served {server.url}")
+        progress.say(f"ready: {server.url}")
     else:
         text = render_report(replace(report, scripts=()), "text", Style())
         print(text, file=sys.stderr, flush=True)

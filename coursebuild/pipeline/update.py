@@ -15,7 +15,8 @@ import difflib
 import time
 from collections.abc import Mapping, Sequence
 
-from coursebuild.diagnostics import Diagnostic, Edit
+from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
+from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.write import write_atomic
 from coursebuild.model import Course, Recording, document_blocks
@@ -28,7 +29,7 @@ from coursebuild.report import Report
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.edit import apply_edits, updated_body
-from coursebuild.scripts.extract import Extraction
+from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.findings import script_findings
 from coursebuild.source import Source
 
@@ -52,12 +53,16 @@ def _update(
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
     first = run(scripts, options, progress)
-    again = run(scripts, options, progress)
+    again = run(scripts, options, progress, "running scripts again")
     edits, refused = _edits(course, chosen, first, again)
-    remarks = _write(options, course, edits, dry_run=dry_run)
-    found = [*extracted.diagnostics, *refused]
-    found += _afterwards(options, course, scripts, first, dry_run=dry_run)
-    found += loaded.diagnostics if dry_run or not edits else load(options.root).diagnostics
+    for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
+        edits = {source: changes for source, changes in edits.items() if source.path != path}
+    remarks, unwritten = _write(options, edits, dry_run=dry_run)
+    now = loaded if dry_run or not edits else load(options.root)
+    found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
+    found += _afterwards(now.course or course, scripts, first, again)
+    if not remarks and all(d.severity is not Severity.ERROR for d in found):
+        remarks = ("every recorded output is up to date",)
     lines = script_lines(scripts, first, ())
     seconds = time.monotonic() - began
     return judge(
@@ -113,36 +118,47 @@ def _edits(
 
 
 def _write(
-    options: Options, course: Course, edits: Mapping[Source, list[Edit]], *, dry_run: bool
-) -> tuple[str, ...]:
-    """Write the lessons; gives a remark for each."""
+    options: Options, edits: Mapping[Source, list[Edit]], *, dry_run: bool
+) -> tuple[tuple[str, ...], list[Diagnostic]]:
+    """Write the lessons; a remark for each, and what was not written."""
     remarks: list[str] = []
+    unwritten: list[Diagnostic] = []
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
-        if not dry_run:
-            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
-        what = "would update" if dry_run else "updated"
-        diff = difflib.unified_diff(
-            source.text.splitlines(), new.splitlines(), source.path, source.path, n=1, lineterm=""
-        )
-        remarks.append("\n".join([f"{what} {source.path}", *diff]))
-    if not remarks:
-        remarks.append("every recorded output is up to date")
-    return tuple(remarks)
+        try:
+            if not dry_run:
+                write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+        except EffectError as error:
+            span = min((edit.span for edit in changes), key=lambda span: span.start)
+            unwritten.append(diagnose("output-not-updatable", span, error.message, help=error.help))
+        else:
+            remarks.append(changed_text("would update" if dry_run else "updated", source, new))
+    return tuple(remarks), unwritten
+
+
+def changed_text(what: str, source: Source, new: str) -> str:
+    """A remark that says which file was changed, and how."""
+    diff = difflib.unified_diff(
+        source.text.splitlines(), new.splitlines(), source.path, source.path, n=1, lineterm=""
+    )
+    return "\n".join([f"{what} {source.path}", *diff])
 
 
 def _afterwards(
-    options: Options,
-    course: Course,
+    now: Course,
     scripts: Sequence[Extraction],
-    runs: Sequence[ScriptRun],
-    *,
-    dry_run: bool,
+    first: Sequence[ScriptRun],
+    again: Sequence[ScriptRun],
 ) -> list[Diagnostic]:
     """What is wrong with the lessons as they are now."""
-    now = course if dry_run else (load(options.root).course or course)
-    verdicts = compare_all(now, runs)
-    ran = {run.path for run in runs}
-    found = script_findings(now, scripts, runs, [v for v in verdicts if v.recording.script in ran])
+    runs = [
+        two if one.outcome is Outcome.OK and two.outcome is not Outcome.OK else one
+        for one, two in zip(first, again, strict=True)
+    ]
+    ran = {extraction.path for extraction in scripts}
+    # What was written above a script moved it, so that its place is another than before.
+    placed = [extraction for extraction in extract(now).value if extraction.path in ran]
+    verdicts = [v for v in compare_all(now, runs) if v.recording.script in ran]
+    found = script_findings(now, placed, runs, verdicts)
     # What update just refused is told by the refusal; a dry run leaves the drift as it is.
     return [d for d in found if d.rule != "output-drift"]

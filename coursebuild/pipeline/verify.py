@@ -11,7 +11,7 @@ Entry point: `verify(course, options, progress, lessons)`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -19,10 +19,11 @@ from coursebuild.checks import check_compiled, check_formulas, course_formulas, 
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.effects import mjcf
+from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
-from coursebuild.model import Course
+from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.report import ScriptLine
@@ -35,6 +36,7 @@ from coursebuild.results import (
     ScriptRun,
     Verdict,
 )
+from coursebuild.scripts.bindings import document_bindings
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
@@ -54,19 +56,33 @@ def verify(
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths."""
     extracted = extract_scripts(course, options)
-    chosen = [e for e in extracted.runnable if documents is None or e.document in documents]
+    chosen: Sequence[Extraction] = extracted.runnable
+    if documents is not None:
+        leaned_on = _leaned_on(course, documents)
+        chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
     runs = run(chosen, options, progress)
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *script_findings(course, chosen, runs, verdicts)]
     found += check_output_lines(course, runs)
-    with progress.stage("compiling models"):
-        models, compiled = _compile(course, options)
+    models, compiled = _compile(course, options, progress)
     found += compiled
-    with progress.stage("typesetting formulas"):
-        formulas = _typeset(course)
+    formulas = _typeset(course, progress)
     found += check_formulas(course, dict(formulas))
     results = Results(runs, verdicts, formulas, models, python_version(), engine_version())
     return Verified(results, tuple(found), script_lines(chosen, runs, verdicts))
+
+
+def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
+    """Scripts, of any lesson, whose output the numbers and questions of these documents quote."""
+    paths: set[str] = set()
+    for document in course.documents:
+        if document.source.path in documents:
+            paths |= {b.script for b in document_bindings(document) if b.script is not None}
+            quizzes = (b for b in document_blocks(document) if isinstance(b, Quiz))
+            for question in (q for quiz in quizzes for q in quiz.questions):
+                if isinstance(question, OutputQuestion):
+                    paths.add(question.script)
+    return paths
 
 
 # --- scripts
@@ -88,7 +104,12 @@ class ExtractedScripts:
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     """Bring `examples/` up to date, as far as nobody's edits are lost."""
     parsed = extract(course)
-    report = write_examples(options.root, [(e.path, e.data) for e in parsed.value])
+    try:
+        report = write_examples(options.root, [(e.path, e.data) for e in parsed.value])
+    except OutsideProjectError as error:
+        place = parsed.value[0].script.path_span if parsed.value else course.map.span(0, 0)
+        told = diagnose("script-path", place, error.message, help="make it a folder of the course")
+        return ExtractedScripts(parsed.value, (), (*parsed.diagnostics, told), (), (), ())
     by_path = {e.path: e for e in parsed.value}
     blocked = {example.path for example in report.blocked}
     found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
@@ -102,7 +123,7 @@ _LEFT = {
     Obstacle.EDITED: "{path} was edited by hand since it was extracted, so it is left as it is",
     Obstacle.FOREIGN: "{path} holds something else than this block, which was not extracted there",
     Obstacle.ORPHAN: "{path} was edited by hand, and no lesson has this script any more",
-    Obstacle.LINK: "{path} cannot be written: a link stands in its way",
+    Obstacle.LINK: "{path} is, or lies behind, a link, and nothing is written through links",
     Obstacle.FOLDER: "{path} cannot be written: a folder and a file would have the same name",
 }
 
@@ -115,20 +136,26 @@ def _left(blocked: Blocked, extraction: Extraction | None, course: Course) -> Di
         return diagnose("example-edited", course.map.span(0, 0), message, help=help)
     if blocked.obstacle in (Obstacle.LINK, Obstacle.FOLDER):
         help = "move what is there away, or extract the script to another path"
-    else:
-        help = (
-            "`coursebuild extract --adopt` brings what the file holds into the lesson; "
-            "to drop it instead, delete the file"
-        )
+        return diagnose("script-path", extraction.script.path_span, message, help=help)
+    help = (
+        "`coursebuild extract --adopt` brings what the file holds into the lesson; "
+        "to drop it instead, delete the file"
+    )
     notes = [Note("from the block to the file:\n" + blocked.diff.rstrip())] if blocked.diff else []
     return diagnose("example-edited", extraction.script.path_span, message, help=help, notes=notes)
 
 
 def run(
-    chosen: Iterable[Extraction], options: Options, progress: Progress
+    chosen: Iterable[Extraction],
+    options: Options,
+    progress: Progress,
+    stage: str = "running scripts",
 ) -> tuple[ScriptRun, ...]:
     """Run the chosen scripts, telling of each when it begins and ends."""
     todo = jobs(chosen)
+    count = sum(not job.norun for job in todo)
+    if not count:
+        return run_scripts(options.root, todo, parallel=1)
 
     def told(event: RunEvent) -> None:
         match event:
@@ -140,7 +167,7 @@ def run(
             case _:
                 assert_never(event)
 
-    with progress.stage("running scripts", len(todo)):
+    with progress.stage(stage, count):
         return run_scripts(options.root, todo, parallel=options.jobs, on_event=told)
 
 
@@ -163,23 +190,26 @@ def script_lines(
 
 
 def _compile(
-    course: Course, options: Options
+    course: Course, options: Options, progress: Progress
 ) -> tuple[tuple[tuple[str, CompileResult], ...], tuple[Diagnostic, ...]]:
     texts = mjcf_texts(course)
-    compiled = mjcf.compile_models(options.root, course.models) if course.models else ()
-    parts = mjcf.compile_texts(options.root, [text.text for text in texts]) if texts else ()
+    if not course.models and not texts:
+        return (), ()
+    with progress.stage("compiling models"):
+        compiled, parts = mjcf.compile_all(options.root, course.models, [t.text for t in texts])
     models = tuple(
         (model.name, result) for model, result in zip(course.models, compiled, strict=True)
     )
-    found = check_compiled(course, dict(models), tuple(zip(texts, parts, strict=True)))
+    made = tuple(zip(texts, parts, strict=True))
+    found = check_compiled(course, dict(models), made, mjcf.readable_error)
     return models, found
 
 
-def _typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
+def _typeset(course: Course, progress: Progress) -> tuple[tuple[Formula, str | MathError], ...]:
     formulas = course_formulas(course)
     if not formulas:
         return ()
     from coursebuild.effects.v8 import MathEngine
 
-    with MathEngine() as engine:
+    with progress.stage("typesetting formulas"), MathEngine() as engine:
         return tuple(zip(formulas, engine.typeset(formulas), strict=True))

@@ -6,6 +6,7 @@ shown is worked out here as values; templates in `blocks/` say how it looks.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, assert_never
@@ -83,12 +84,11 @@ def plain_code(page: PageContext, block: PlainCode) -> Markup:
 
 def callout(page: PageContext, block: Callout) -> Markup:
     """A callout, folded where the author says so."""
-    kind = page.library.callouts.get(block.kind)
     return page.template(
         "blocks/callout.html",
         callout=block,
         label=page.library.callout_label(block.kind),
-        promise=kind.promise if kind is not None else "",
+        promise=page.library.callout_promise(block.kind),
         title=page.inlines(block.title),
         body=page.blocks(block.blocks),
     )
@@ -117,7 +117,8 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
 
 def binding(page: PageContext, node: NumberBinding) -> Markup:
     """A number that a script printed; the mark names the script."""
-    return page.template("blocks/binding.html", text=node.text, path=node.script)
+    text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
+    return page.template("blocks/binding.html", text=text, path=node.script)
 
 
 # --- outputs
@@ -182,11 +183,16 @@ def compared(words: Strings, comparison: Comparison) -> str:
 
 
 def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
+    relative, absolute = short(rtol), short(atol)
     if rtol and atol:
-        return words("receipt.rtol_atol", rtol=f"{rtol:g}", atol=f"{atol:g}")
-    return (
-        words("receipt.rtol", rtol=f"{rtol:g}") if rtol else words("receipt.atol", atol=f"{atol:g}")
-    )
+        return words("receipt.rtol_atol", rtol=relative, atol=absolute)
+    return words("receipt.rtol", rtol=relative) if rtol else words("receipt.atol", atol=absolute)
+
+
+def short(value: Decimal) -> str:
+    """A tolerance as a reader writes it: `1e-6`, `0.05`."""
+    value = value.normalize()
+    return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
 def _script_receipt(page: PageContext, run: ScriptRun | None) -> Receipt:

@@ -136,8 +136,8 @@ class PageContext:
     # what the blocks ask
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
-        """Blocks as HTML."""
-        return markup.render_blocks(content, self, self.look)
+        """Blocks as HTML, without the last line end."""
+        return Markup(markup.render_blocks(content, self, self.look).rstrip("\n"))
 
     def inlines(self, content: tuple[Inline, ...]) -> Markup:
         """Inlines as HTML."""
@@ -152,11 +152,8 @@ class PageContext:
         return highlight(language, text)
 
     def template(self, name: str, **values: object) -> Markup:
-        """A filled-in template; besides its values it sees `t`, the interface's words."""
-        text = self.library.templates.get_template(name).render(
-            t=self.library.words, page=self, **values
-        )
-        return Markup(text)
+        """A filled-in template."""
+        return self.library.render(name, **values)
 
 
 def _markup_words(words: Strings) -> markup.Words:

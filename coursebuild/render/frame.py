@@ -9,6 +9,8 @@ style sheet holds the fonts' names, which depend on every character of every pag
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,22 +19,6 @@ from markupsafe import Markup
 from coursebuild.render import meta, urls
 from coursebuild.render.highlight import visible
 from coursebuild.render.library import Library
-
-POLICY = "; ".join(
-    (
-        "default-src 'self'",
-        "script-src 'self' 'wasm-unsafe-eval'",
-        "style-src 'self'",
-        "img-src 'self' data: blob:",
-        "worker-src 'self' blob:",
-        "object-src 'none'",
-        "base-uri 'none'",
-        "form-action 'none'",
-    )
-)
-"""Content-Security-Policy of every page: nothing from elsewhere, no code and no style in the page
-itself."""
-
 
 PAGE_WORDS = (
     "theme.label",
@@ -76,6 +62,27 @@ class Names:
     credits: str
 
 
+def policy(json_ld: str) -> str:
+    """The Content-Security-Policy of a page: nothing from elsewhere, no code or style in the page.
+
+    Structured data is no code, but is named by its hash, since checkers take it for some.
+    """
+    digest = base64.b64encode(hashlib.sha256(json_ld.encode()).digest()).decode()
+    data = f" 'sha256-{digest}'" if json_ld else ""
+    return "; ".join(
+        (
+            "default-src 'self'",
+            f"script-src 'self' 'wasm-unsafe-eval'{data}",
+            "style-src 'self'",
+            "img-src 'self' data: blob:",
+            "worker-src 'self' blob:",
+            "object-src 'none'",
+            "base-uri 'none'",
+            "form-action 'none'",
+        )
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class NavLink:
     """An entry of the site's navigation."""
@@ -95,11 +102,10 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
     course = library.course
     place = place_of(library, draft.path)
     values: Mapping[str, object] = {
-        "t": library.words,
         "kind": draft.kind,
         "body": draft.body,
         "language": course.language or "en",
-        "policy": POLICY,
+        "policy": policy(draft.json_ld),
         "head_title": meta.head_title(course, draft.title, draft.kind),
         "description": draft.description,
         "robots": "" if draft.indexed else "noindex",
@@ -118,8 +124,7 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
         "results": library.results,
         "page_words": PAGE_WORDS,
     }
-    text = library.templates.get_template("base.html").render(values)
-    return visible(text) + "\n"
+    return visible(library.render("base.html", **values)) + "\n"
 
 
 def _navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:

@@ -47,6 +47,7 @@ def lab(page: PageContext, block: Lab) -> Markup:
         note=page.blocks(block.note),
         model_href=page.href(ModelTarget(block.model)) if block.model is not None else None,
         start=_start(page, block),
+        stop=number(block.stop_at) if block.stop_at is not None else None,
         controls=tuple(_control(words, control) for control in block.controls),
         plots=tuple(_plot(words, block, index) for index in range(len(block.plots))),
         overlays=tuple(_overlay(words, name) for name in block.toggles),

@@ -108,12 +108,8 @@ def stub_draft(library: Library, lesson: Lesson) -> Draft:
     """The page of a planned lesson: it says that it is planned, and what can be read now."""
     place = urls.Place(urls.lesson_path(lesson))
     written = [need for need in _ancestors(library, lesson) if need.document is not None]
-    template = library.templates.get_template("stub.html")
-    values = {
-        **_common(library, place, lesson),
-        "readable": tuple(lesson_link(library, place, need) for need in written),
-    }
-    body = Markup(template.render(t=library.words, **values))
+    readable = tuple(lesson_link(library, place, need) for need in written)
+    body = library.render("stub.html", **_common(library, place, lesson), readable=readable)
     return Draft(place.path, "stub", lesson.title, lesson.summary, body, indexed=False)
 
 
@@ -121,8 +117,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
     """What a lesson's page says whether it is written or not."""
     level = library.levels[lesson.level]
     order = library.course.lessons
-    at = order.index(lesson)
-    leads = tuple(other for other in order if lesson.id in other.prerequisites)
+    at = library.positions[lesson.id]
     return {
         "lesson": lesson,
         "status": lesson.status.value,
@@ -131,7 +126,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "home": place.href(urls.HOME),
         "level_href": place.href(urls.level_path(level)),
         "needs": lesson_link(library, place, lesson, needs=True).needs,
-        "leads": tuple(lesson_link(library, place, other) for other in leads),
+        "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
         "previous": lesson_link(library, place, order[at - 1]) if at else None,
         "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,
     }
@@ -179,7 +174,7 @@ def article(page: PageContext, document: Document) -> Markup:
             parts.append(
                 page.template("partials/dock.html", before=before, lab=instrument, after=after)
             )
-    return Markup("").join(parts) + page.footnotes()
+    return Markup("\n").join((*parts, page.footnotes()))
 
 
 @dataclass(frozen=True, slots=True)

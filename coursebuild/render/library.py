@@ -32,6 +32,9 @@ from coursebuild.model import (
 from coursebuild.render.assets import Assets, strings_for, template_environment
 from coursebuild.render.strings import Strings
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
+from coursebuild.vocabulary import CALLOUTS
+
+_OURS = {kind.name: kind for kind in CALLOUTS}
 
 Owner: TypeAlias = Lesson | Page
 """What a document belongs to."""
@@ -63,6 +66,12 @@ class Library:
     scripts: Mapping[str, tuple[Script, Owner]]
     """By path, in the order of the course."""
     runs: Mapping[str, ScriptRun]
+    positions: Mapping[str, int]
+    """Where a lesson stands in the order of the course, by id, from 0."""
+    leads: Mapping[str, tuple[Lesson, ...]]
+    """The lessons that need a lesson, by its id."""
+    uses: Mapping[str, tuple[ModelUse, ...]]
+    """Where a model is used, by its name, in the order of the course."""
     _formulas: Mapping[Formula, str | MathError]
     _verdicts: Mapping[tuple[str, int], Verdict]
 
@@ -81,9 +90,17 @@ class Library:
             models=dict(results.models),
             scripts=_scripts(course),
             runs={run.path: run for run in results.runs},
+            positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
+            leads=_leads(course),
+            uses=_uses(course),
             _formulas=dict(results.formulas),
             _verdicts={_place(verdict.recording): verdict for verdict in results.verdicts},
         )
+
+    def render(self, template: str, **values: object) -> Markup:
+        """A filled-in template, without its last line end; it sees `t`, the interface's words."""
+        text = self.templates.get_template(template).render(t=self.words, **values)
+        return Markup(text.rstrip("\n"))
 
     def mathml(self, tex: str, display: bool) -> Markup:
         """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
@@ -97,14 +114,20 @@ class Library:
         return self._verdicts.get(_place(recording))
 
     def callout_label(self, kind: str) -> str:
-        """The label of a kind of callout, translated where the kind is one of ours."""
-        if self.words.has(f"callout.{kind}"):
-            return self.words(f"callout.{kind}")
-        return self.callouts[kind].label if kind in self.callouts else kind.capitalize()
+        """The label of a kind of callout: the course's own, else that of the interface."""
+        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+        if theirs is not None and (ours is None or theirs.label != ours.label):
+            return theirs.label
+        return self.words(f"callout.{kind}") if ours is not None else kind.capitalize()
 
-    def model_uses(self, name: str) -> tuple[ModelUse, ...]:
-        """Where a model is used, in the order of the course."""
-        return tuple(use for owner in owners(self.course) if (use := _use(owner, name)) is not None)
+    def callout_promise(self, kind: str) -> str:
+        """What a kind of callout promises; empty where nobody says."""
+        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+        if theirs is not None and (ours is None or theirs.promise != ours.promise):
+            return theirs.promise
+        if self.words.has(f"promise.{kind}"):
+            return self.words(f"promise.{kind}")
+        return ours.promise if ours is not None else ""
 
 
 def owners(course: Course) -> tuple[Owner, ...]:
@@ -117,10 +140,18 @@ def document_scripts(document: Document) -> tuple[Script, ...]:
     return tuple(block for block in document_blocks(document) if isinstance(block, Script))
 
 
-def uses_model(script: Script, name: str) -> bool:
-    """Whether a script names a model, as an argument of `model_path` or as a file."""
-    called = rf"""model_path\(\s*[rR]?(["']){re.escape(name)}\1"""
-    return re.search(called, script.code.text) is not None or f"{name}.xml" in script.code.text
+_MODEL_NAMED = re.compile(
+    r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?P<file>[\w./-]+)\.xml\b"""
+)
+
+
+def models_named(script: Script) -> frozenset[str]:
+    """What may be models in a script: what it asks `model_path` for, and files that it names."""
+    found: set[str] = set()
+    for match in _MODEL_NAMED.finditer(script.code.text):
+        name = (match["name"] or match["file"]).removesuffix(".xml")
+        found.add(name.removeprefix("models/"))
+    return frozenset(found)
 
 
 def _scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
@@ -136,14 +167,25 @@ def _place(recording: Recording) -> tuple[str, int]:
     return recording.span.path, recording.span.start
 
 
-def _use(owner: Owner, name: str) -> ModelUse | None:
-    if owner.document is None:
-        return None
-    blocks = tuple(document_blocks(owner.document))
-    by_lab = any(isinstance(b, Lab) and b.model == name for b in blocks)
-    by_script = any(isinstance(b, Script) and uses_model(b, name) for b in blocks)
-    by_link = any(
-        isinstance(i, Link) and i.target == ModelTarget(name)
-        for i in document_inlines(owner.document)
-    )
-    return ModelUse(owner, by_lab, by_script, by_link) if by_lab or by_script or by_link else None
+def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
+    found: dict[str, list[Lesson]] = {lesson.id: [] for lesson in course.lessons}
+    for lesson in course.lessons:
+        for need in lesson.prerequisites:
+            found[need].append(lesson)
+    return {id: tuple(lessons) for id, lessons in found.items()}
+
+
+def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
+    found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
+    for owner in owners(course):
+        if owner.document is None:
+            continue
+        blocks = tuple(document_blocks(owner.document))
+        labs = {block.model for block in blocks if isinstance(block, Lab)}
+        scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
+        targets = (i.target for i in document_inlines(owner.document) if isinstance(i, Link))
+        links = {target.name for target in targets if isinstance(target, ModelTarget)}
+        for name, uses in found.items():
+            if name in labs or name in scripts or name in links:
+                uses.append(ModelUse(owner, name in labs, name in scripts, name in links))
+    return {name: tuple(uses) for name, uses in found.items()}

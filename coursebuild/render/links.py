@@ -106,7 +106,7 @@ def _problem(
         return None
     folder = urlsplit(root).path
     if not f"{url.path}/".startswith(folder):
-        return broken("the address leads out of the site")
+        return broken("the address leads out of the site") if host == _ORIGIN else None
     target = unquote(url.path[len(folder) :])
     if not target or target.endswith("/"):
         target += urls.HOME

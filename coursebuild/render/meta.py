@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from coursebuild.model import Course, Lesson, Status
 from coursebuild.render import urls
+from coursebuild.render.highlight import visible
 from coursebuild.render.library import Library
 
 Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
@@ -103,7 +104,7 @@ def _filled(data: dict[str, Json]) -> dict[str, Json]:
 
 def _script(data: dict[str, Json]) -> Markup:
     """JSON that may stand in a `script` element: nothing in it can end that element."""
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+    text = visible(json.dumps(data, ensure_ascii=False, separators=(",", ":")))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 

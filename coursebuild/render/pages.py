@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from markupsafe import Markup
-
 from coursebuild.model import (
     Document,
     Lesson,
@@ -50,17 +48,12 @@ class Named:
     remark: str = ""
 
 
-def _render(library: Library, template: str, **values: object) -> Markup:
-    return Markup(library.templates.get_template(template).render(t=library.words, **values))
-
-
 def home_draft(library: Library) -> Draft:
     """The home page: the course map."""
     course = library.course
     place = urls.Place(urls.HOME)
     written = [lesson for lesson in course.lessons if lesson.document is not None]
-    body = _render(
-        library,
+    body = library.render(
         "home.html",
         course=course,
         levels=tuple(_level_view(library, place, level) for level in course.levels),
@@ -84,8 +77,7 @@ def level_draft(library: Library, level: Level) -> Draft:
     levels = library.course.levels
     at = levels.index(level)
     view = _level_view(library, place, level)
-    body = _render(
-        library,
+    body = library.render(
         "level.html",
         home=place.href(urls.HOME),
         level=view,
@@ -124,8 +116,7 @@ def model_draft(library: Library, model: MjcfModel) -> Draft:
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
     title = words("model.title", name=model.name)
-    body = _render(
-        library,
+    body = library.render(
         "model.html",
         home=place.href(urls.HOME),
         name=model.name,
@@ -134,7 +125,7 @@ def model_draft(library: Library, model: MjcfModel) -> Draft:
         href=place.href(urls.model_file_path(model.name)),
         facts=_facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
         code=highlight("xml", model.source.text.rstrip()),
-        uses=tuple(_use_link(library, place, use) for use in library.model_uses(model.name)),
+        uses=tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     )
     return Draft(place.path, "model", title, "", body)
 
@@ -198,7 +189,7 @@ def _first_sentences(document: Document) -> str:
 def not_found_draft(library: Library) -> Draft:
     """The page for missing addresses."""
     place = place_of(library, urls.NOT_FOUND)
-    body = _render(library, "notfound.html", home=place.href(urls.HOME))
+    body = library.render("notfound.html", home=place.href(urls.HOME))
     return Draft(
         urls.NOT_FOUND, "notfound", library.words("notfound.title"), "", body, indexed=False
     )

@@ -101,4 +101,13 @@ class Place:
             return self.root + encode("" if path == HOME else path) + fragment
         if path == self.path:
             return fragment or encode(posixpath.basename(path))
-        return encode(posixpath.relpath(path, posixpath.dirname(self.path) or ".")) + fragment
+        return encode(_relative(path, self.path)) + fragment
+
+
+def _relative(path: str, start: str) -> str:
+    """A site path as seen from the page at `start`."""
+    ends, starts = path.split("/"), start.split("/")[:-1]
+    shared = 0
+    while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
+        shared += 1
+    return "/".join([".."] * (len(starts) - shared) + ends[shared:])

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from coursebuild.model import Course, Lesson, Script
 from coursebuild.render import urls
-from coursebuild.render.library import Library, document_scripts, owners, uses_model
+from coursebuild.render.library import Library, document_scripts, models_named, owners
 from coursebuild.results import OutputFile
 
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -138,9 +138,10 @@ def _models(
     """The models that scripts name, and the files that these pull in."""
     sources = {model.source.path: model.source.text.encode() for model in library.course.models}
     others = {file.path: file.data for file in around.model_files}
+    named = {name for script in scripts for name in models_named(script)}
     found: dict[str, bytes] = {}
     for model in library.course.models:
-        if any(uses_model(script, model.name) for script in scripts):
+        if model.name in named:
             found[model.source.path] = sources[model.source.path]
             compiled = library.models.get(model.name)
             facts = compiled.facts if compiled is not None else None

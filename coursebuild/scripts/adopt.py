@@ -1,6 +1,6 @@
 """An edit made in an extracted file, brought back into the lesson's block.
 
-Entry point: `adopted(script, data)`.
+Entry points: `adopted(script, data)`; `block_text(data)`, what a block can hold of a file.
 """
 
 from __future__ import annotations
@@ -21,15 +21,12 @@ def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
         message = f"{script.path} cannot be brought into the lesson: {why}"
         return diagnose("example-edited", script.path_span, message, help="bring it over by hand")
 
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
+    text = block_text(data)
+    if text is None:
         return refused("it is not UTF-8")
-    lines = re.split(r"\r\n|\r|\n", text)
-    while lines and not lines[-1]:
-        lines.pop()
-    if not lines:
+    if text == "\n":
         return refused("it is empty")
+    lines = text.removesuffix("\n").split("\n")
     opening = re.search(r"`{3,}|~{3,}", script.span.first_line().text)
     fence = opening.group() if opening else "```"
     closing = re.compile(rf" {{0,3}}{re.escape(fence[0])}{{{len(fence)},}}[ \t]*")
@@ -40,3 +37,15 @@ def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
     newline = "\r\n" if "\r\n" in script.span.text else "\n"
     written = [f"{script.prefix}{line}" if line else script.prefix.rstrip() for line in lines]
     return Edit(script.body_span, "".join(line + newline for line in written))
+
+
+def block_text(data: bytes) -> str | None:
+    """A file as a block can hold it; `None` where it is not UTF-8.
+
+    Without a byte order mark, with LF line ends, and one at the end.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return None
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n") + "\n"

@@ -45,8 +45,15 @@ class Leaning:
 class Printed:
     """What a binding can lean on: the recorded outputs of a course and the runs of its scripts."""
 
-    def __init__(self, verdicts: Iterable[Verdict], runs: Iterable[ScriptRun]) -> None:
+    def __init__(
+        self,
+        verdicts: Iterable[Verdict],
+        runs: Iterable[ScriptRun],
+        scripts: Iterable[str] = (),
+    ) -> None:
+        """`scripts` are the paths of all scripts of the course, run or not."""
         self._runs = {run.path: run for run in runs}
+        self._scripts = frozenset(scripts)
         self._by_script: dict[str, list[Verdict]] = {}
         self._by_document: dict[str, list[Verdict]] = {}
         self._lines: dict[tuple[str, int], tuple[PrintedLine, ...]] = {}
@@ -58,9 +65,9 @@ class Printed:
         for found in self._by_document.values():
             found.sort(key=lambda verdict: verdict.recording.body_span.end)
 
-    def scripts(self) -> set[str]:
-        """The paths of all scripts that were to be run or that have a recorded output."""
-        return {*self._runs, *self._by_script}
+    def scripts(self) -> frozenset[str]:
+        """The paths of all scripts."""
+        return self._scripts | self._runs.keys() | self._by_script.keys()
 
     def run(self, path: str) -> ScriptRun | None:
         """The run of a script."""
@@ -102,7 +109,7 @@ def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     run = printed.run(path) if path is not None else None
-    if path is None or (not verdicts and run is None):
+    if path is None or path not in printed.scripts():
         return _orphan(binding, printed)
     if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
         return None
@@ -133,7 +140,9 @@ def _silent(run: ScriptRun) -> bool:
 
 def _unrecorded(binding: NumberBinding, path: str, run: ScriptRun | None) -> Diagnostic | None:
     """A binding to a script without a recorded output: what it printed in this run counts."""
-    if run is None or run.outcome is Outcome.NORUN:
+    if run is None:
+        return None
+    if run.outcome is Outcome.NORUN:
         return diagnose(
             "binding-orphan",
             binding.text_span,

@@ -16,7 +16,16 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from coursebuild.model import Comparison, Course, Filter, Mode, Recording, Table, document_blocks
+from coursebuild.model import (
+    Comparison,
+    Course,
+    Filter,
+    Mode,
+    Recording,
+    Script,
+    Table,
+    document_blocks,
+)
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.scripts.changes import differences, number_change
@@ -28,15 +37,25 @@ from coursebuild.source import Excerpt, Span
 
 
 def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
-    """A verdict for every recording of the course that has a script, in order."""
+    """A verdict for every recording of the course that has a script, in order.
+
+    Where two blocks have the same path only the first is run; what is recorded below the other is
+    not compared with its output.
+    """
     by_path = {run.path: run for run in runs}
+    first: dict[str, Script] = {}
     verdicts: list[Verdict] = []
     for document in course.documents:
+        nearest: Script | None = None
         for block in document_blocks(document):
-            if isinstance(block, Recording) and block.script is not None:
-                verdicts.append(
-                    _verdict(block, course.comparison, course.filters, by_path.get(block.script))
-                )
+            if isinstance(block, Script):
+                nearest = block
+                first.setdefault(block.path, block)
+            elif isinstance(block, Recording) and block.script is not None:
+                same = nearest is not None and nearest.path == block.script
+                kept = not same or first[block.script] is nearest
+                run = by_path.get(block.script) if kept else None
+                verdicts.append(_verdict(block, course.comparison, course.filters, run))
     return tuple(verdicts)
 
 

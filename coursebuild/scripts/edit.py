@@ -111,8 +111,7 @@ def _new_lines(
             return kept
         tries.append(kept)
     if not comparison.ellipsis:
-        # A filter may look at white space at the end of lines, so the text as printed comes last.
-        tries += (printed, ran.raw.replace("\r\n", "\n").replace("\r", "\n").rstrip().split("\n"))
+        tries.append(printed)
     for lines in tries:
         if same_lines(Side.of("\n".join(lines), filters), ran, comparison):
             return lines
@@ -247,9 +246,9 @@ def _unholdable(lines: Sequence[str], fence: str, fence_span: Span) -> Diagnosti
     runs = [len(found[1]) for line in lines if (found := closing.fullmatch(line))]
     if not runs:
         return None
-    longer = fence[0] * (max(runs) + 1)
+    marks = "backticks" if fence[0] == "`" else "tildes"
     return refused(
         fence_span,
         "the output has a line that would close this fence",
-        f"open and close it with `{longer}`, then update again",
+        f"open and close it with {max(runs) + 1} {marks}, then update again",
     )

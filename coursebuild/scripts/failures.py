@@ -4,12 +4,14 @@ Entry points: `failure` (a run), `silence` (an output is recorded and nothing wa
 `in_lessons` (a text with the paths of extracted files made places of lessons).
 
 A traceback's frames are read out of the standard error: each line of an extracted file is the line
-of a lesson, and the innermost such line is what the diagnostic points at.
+of a lesson, and the innermost such line is what the diagnostic points at. Of a script that does not
+parse nothing is said: the reader of its lesson has told it.
 """
 
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable
 from typing import assert_never
 
@@ -22,8 +24,11 @@ from coursebuild.source import Span
 
 _FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
 _WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
+_THREAD = re.compile(r"(?<=\b[Tt]hread )0x[0-9a-f]+ ")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-_CRASH = "most recent call first"
+_CRASH = "Current thread "
+_ABORTED = "Fatal Python error: Aborted\n\n"
+"""What Python says when it is asked, at the end of its time, where it is."""
 _LIBRARIES = ("site-packages", "dist-packages")
 
 _SIGNALS = {
@@ -57,15 +62,33 @@ class _Lessons:
     def __init__(self, extractions: Iterable[Extraction]) -> None:
         self._by_path = {extraction.path: extraction for extraction in extractions}
 
+    def innermost(self, stderr: str) -> tuple[Extraction, Span] | None:
+        """The script and the lesson's line where a traceback or a crash dump ends."""
+        dump = stderr.rfind(_CRASH)
+        for found in _FRAME.finditer(stderr, dump) if dump >= 0 else reversed(_frames(stderr)):
+            extraction, span = self._find(found)
+            if extraction is not None and span is not None:
+                lead = len(span.text) - len(span.text.lstrip())
+                return extraction, Span(span.source, span.start + lead, span.end)
+        return None
+
     def place(self, found: re.Match[str]) -> Span | None:
+        """The lesson's line of a frame."""
+        return self._find(found)[1]
+
+    def _find(self, found: re.Match[str]) -> tuple[Extraction | None, Span | None]:
         parts = found["path"].replace("\\", "/").split("/")
         if any(library in parts for library in _LIBRARIES):
-            return None
+            return None, None
         for first in range(len(parts)):
             extraction = self._by_path.get("/".join(parts[first:]))
             if extraction is not None:
-                return extraction.line_span(int(found["line"]))
-        return None
+                return extraction, extraction.line_span(int(found["line"]))
+        return None, None
+
+
+def _frames(stderr: str) -> list[re.Match[str]]:
+    return list(_FRAME.finditer(stderr))
 
 
 def in_lessons(text: str, extractions: Iterable[Extraction]) -> str:
@@ -102,13 +125,8 @@ def failure(
             return _crash("script-killed", extraction, run, extractions, message)
         case Outcome.TIMEOUT:
             limit = f"{extraction.script.timeout:g}"
-            return diagnose(
-                "script-timeout",
-                fence,
-                f"{path} was stopped after {limit} s, its time limit",
-                help="make it do less, or set `timeout=SECONDS` on its fence to a higher limit",
-                notes=_stderr_notes(run, _Lessons(extractions)),
-            )
+            message = f"{path} was stopped after {limit} s, its time limit"
+            return _crash("script-timeout", extraction, run, extractions, message)
         case Outcome.OUTPUT_LIMIT:
             return diagnose(
                 "script-output-limit",
@@ -149,48 +167,70 @@ def _crash(
     run: ScriptRun,
     extractions: Iterable[Extraction],
     message: str,
-) -> Diagnostic:
+) -> Diagnostic | None:
     """A diagnostic at the innermost line of the traceback that lies in a lesson."""
     lessons = _Lessons(extractions)
     stderr = _COLOURS.sub("", run.stderr)
-    frames = [(found, span) for found in _FRAME.finditer(stderr) if (span := lessons.place(found))]
     fence = extraction.script.span.first_line()
     notes: list[Note] = []
-    span = fence
-    if frames:
-        span = frames[0 if _CRASH in stderr else -1][1]
-        inside = extraction.script.span
-        if span.source is not inside.source or not inside.start <= span.start < inside.end:
-            notes.append(Note(f"`{extraction.path}` was running", fence))
+    where, span = lessons.innermost(stderr) or (extraction, fence)
+    if rule == "script-failed" and not (_parses(where) and _parses(extraction)):
+        return None
+    if where is not extraction:
+        notes.append(Note(f"`{extraction.path}` was running", fence))
     return diagnose(
         rule,
         span,
         message,
-        label=_last_words(stderr) if rule == "script-failed" else "",
-        help="the system ends a process that takes too much memory" if _is_kill(rule, run) else "",
+        label=_beside(rule, stderr, span is not fence),
+        help=_help(rule, run),
         notes=[*notes, *_stderr_notes(run, lessons)],
     )
 
 
-def _is_kill(rule: str, run: ScriptRun) -> bool:
-    return rule == "script-killed" and _signal_name(run.status) == "SIGKILL"
+def _beside(rule: str, stderr: str, found: bool) -> str:
+    """What stands beside the marked line."""
+    if rule == "script-failed":
+        return _last_words(stderr)
+    return "it was here" if found else ""
+
+
+def _help(rule: str, run: ScriptRun) -> str:
+    if rule == "script-timeout":
+        return "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
+    if rule == "script-killed" and _signal_name(run.status) == "SIGKILL":
+        return "the system ends a process that takes too much memory"
+    return ""
+
+
+def _parses(extraction: Extraction) -> bool:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(extraction.text, extraction.path, "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, MemoryError, RecursionError, OverflowError):
+        return False
+    return True
 
 
 def _last_words(stderr: str) -> str:
     """The exception's line of the last traceback, else the last line that was written."""
-    frames = list(_FRAME.finditer(stderr))
+    frames = _frames(stderr)
     if frames:
         after = stderr[frames[-1].end() :].split("\n")[1:]
         lines = [line for line in after if line and not line[0].isspace()]
         if lines:
             return shortened(lines[0].strip(), _LABEL)
-    written = [line.strip() for line in stderr.split("\n") if line.strip()]
+    # Exception groups are drawn with lines and corners.
+    written = [line.strip(" \t\r|+-") for line in stderr.split("\n")]
+    written = [line for line in written if line]
     return shortened(written[-1], _LABEL) if written else ""
 
 
 def _stderr_notes(run: ScriptRun, lessons: _Lessons) -> list[Note]:
     """The end of the standard error, its paths made places of lessons."""
     text = _in_lessons(_COLOURS.sub("", run.stderr), lessons).rstrip()
+    text = _THREAD.sub("", text.removeprefix(_ABORTED) if run.outcome is Outcome.TIMEOUT else text)
     if not text.strip():
         return []
     lines = text.replace("\r\n", "\n").split("\n")

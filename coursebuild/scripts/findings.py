@@ -14,7 +14,7 @@ from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
 from coursebuild.scripts.drift import drift_diagnostic
-from coursebuild.scripts.extract import Extraction, owners
+from coursebuild.scripts.extract import Extraction, extract, owners
 from coursebuild.scripts.failures import failure, silence
 
 
@@ -24,15 +24,19 @@ def script_findings(
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
 ) -> tuple[Diagnostic, ...]:
-    """The diagnostics of a course whose scripts were run and whose recordings were compared."""
+    """The diagnostics of the scripts that were run, and of all that leans on them.
+
+    `extractions` are those that were run, maybe not all of the course.
+    """
     by_path = {run.path: run for run in runs}
+    everything = extract(course).value
     found: list[Diagnostic] = []
     for extraction in extractions:
         run = by_path.get(extraction.path)
-        failed = failure(extraction, run, extractions) if run is not None else None
+        failed = failure(extraction, run, everything) if run is not None else None
         if failed is not None:
             found.append(failed)
-    printed = Printed(verdicts, runs)
+    printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
     owner_of = {document.source.path: owner for owner, document in owners(course)}
     for verdict in verdicts:
         recording = verdict.recording

@@ -24,6 +24,9 @@ ELLIPSIS = "..."
 
 _CLOSING = frozenset(")]},;|")
 _PATIENCE = 2_000_000
+"""Numbers compared before a line with ellipses is taken for one that does not match."""
+_SEARCH = 32
+"""Characters searched for at the cost of comparing one number."""
 
 SameNumber = Callable[[Number, Number], bool]
 
@@ -215,7 +218,7 @@ def find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> tuple[i
     """Where the parts of a recorded line stand in a line that ran: offsets in its skeleton.
 
     The first part stands at the start and the last at the end. `None` where they don't fit, or
-    after two million comparisons of numbers.
+    when finding out takes too long.
     """
     ends = {0, len(parts) - 1}
     stop = len(line.skeleton) - len(parts[-1].skeleton)
@@ -236,7 +239,7 @@ def find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> tuple[i
                 break
             if index in ends:
                 return None
-            budget -= misfit + 1
+            budget -= misfit + 1 + len(part.skeleton) // _SEARCH
             place += 1
         places.append(place)
         at = place + len(part.skeleton)

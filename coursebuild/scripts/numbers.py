@@ -5,8 +5,8 @@ Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 1
 
 1. One regular expression walks the text. Its first alternatives take what only looks like a number:
    words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day, hexadecimal
-   literals, hashes. They stay text. No alternative can start inside what another one gave up, so
-   that the walk is linear.
+   literals, hashes. They stay text, as do powers (`m^2`). No alternative can start inside what
+   another one gave up, so that the walk is linear.
 2. A number may carry a unit of letters (`12.5ms`); letters with a digit among them make the whole
    thing text (`4x4`).
 3. Values are decimals as written: nothing is rounded on the way, so that a border such as half a
@@ -36,13 +36,13 @@ _LOOKS_LIKE_A_NUMBER = "|".join(
         r"(?<![0-9]:)[0-9]{1,3}(?::[0-9]{2})+(?:[.,][0-9]+)?(?![0-9:])",  # time of day
         r"[0-9]+(?:\.[0-9]+){2,}[\w.]*(?:[-+:][\w.]+)*",  # version, address
         r"(?<![0-9]-)[0-9]+(?:-[0-9]+)+(?![\w.])",  # 10-20
-        rf"[0-9]+\.?[0-9]*[eE]{_SIGN}?[0-9]{{5,}}",  # past any exponent
+        rf"[0-9]+(?:\.[0-9]*)?[eE]{_SIGN}?[0-9]{{5,}}",  # past any exponent
     )
 )
 _SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
 _TOKEN = re.compile(
     rf"(?P<imaginary>(?<=[0-9.]){_SIGN}{_MAGNITUDE}(?=[jJ](?!\w)))"
-    rf"|(?<![\w.])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
+    rf"|(?<![\w.^])(?<!\^[+\-])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )

@@ -5,7 +5,7 @@ Entry points: `Traced.of_text`, `filtered`, `Side.of`.
 1. `Traced` is a text with its origin: stretches that are copies know it character by character, a
    stretch that a filter wrote stands for all that it replaced.
 2. `filtered` applies the course's filters, one after the other, each to the whole text (`^` and `$`
-   match at lines).
+   match at lines), after white space that does not count has gone.
 3. A `Side` is what one side of a comparison has: the lines without trailing white space and without
    trailing empty lines.
 """
@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from coursebuild.model import Filter
+
+_LINE_END = re.compile(r"\r\n?|\n")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +49,40 @@ class Traced:
         """A text that is its own origin."""
         return cls(text, (Piece(0, 0, len(text), True),))
 
+    @classmethod
+    def of_output(cls, text: str) -> Traced:
+        """An output without what does not count.
+
+        Line ends are LF, the last line has one too, no line ends in white space, no empty lines
+        stand at the end.
+        """
+        lines = _bare_lines(text)
+        pieces: list[Piece] = []
+        at = copied = copied_from = 0
+        for line, start, end in lines:
+            stop = start + len(line)
+            at += len(line) + 1
+            if end == stop + 1 and text[stop] == "\n":
+                continue
+            # The copy that began at `copied` ends before this line's end, which is made anew.
+            if at - 1 > copied:
+                pieces.append(Piece(copied, copied_from, stop, True))
+            pieces.append(Piece(at - 1, stop, end, False))
+            copied, copied_from = at, end
+        if at > copied:
+            pieces.append(Piece(copied, copied_from, copied_from + at - copied, True))
+        joined = "".join(line + "\n" for line, _, _ in lines)
+        return cls(joined, tuple(pieces) or (Piece(0, 0, 0, False),))
+
     def _piece(self, at: int) -> Piece:
         return self.pieces[max(0, bisect_right(self.pieces, at, key=lambda piece: piece.at) - 1)]
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
-        """The smallest range of the origin that `text[start:end]` came from."""
+        """The smallest range of the origin that `text[start:end]` came from; empty for no text."""
         first, last = self._piece(start), self._piece(max(start, end - 1))
         low = first.start + start - first.at if first.verbatim else first.start
         high = last.start + end - last.at if last.verbatim else last.end
-        return low, max(low, high)
+        return low, low if start == end else max(low, high)
 
     def substituted(self, pattern: re.Pattern[str], replacement: str) -> Traced:
         """`pattern.sub(replacement, text)`, traced."""
@@ -93,8 +120,17 @@ class Traced:
                 into.append(Piece(new_at, piece.start, piece.end, False))
 
 
-_CR = re.compile(r"\r\n?")
-_LINE_END = re.compile(r"\r\n?|\n")
+def _bare_lines(text: str) -> list[tuple[str, int, int]]:
+    """Lines without white space at their ends, where each begins, and where the next one does."""
+    lines: list[tuple[str, int, int]] = []
+    start = 0
+    for found in _LINE_END.finditer(text):
+        lines.append((text[start : found.start()].rstrip(), start, found.end()))
+        start = found.end()
+    lines.append((text[start:].rstrip(), start, len(text)))
+    while lines and not lines[-1][0]:
+        lines.pop()
+    return lines
 
 
 @lru_cache(maxsize=64)
@@ -103,9 +139,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 
 def filtered(traced: Traced, filters: Iterable[Filter]) -> Traced:
-    """The text with its line ends made LF, after the filters."""
-    if "\r" in traced.text:
-        traced = traced.substituted(_CR, "\n")
+    """The text after the filters."""
     for rule in filters:
         pattern = _compiled(rule.pattern)
         if pattern.search(traced.text):
@@ -133,7 +167,7 @@ class Side:
     @classmethod
     def of(cls, text: str, filters: Iterable[Filter] = ()) -> Side:
         """The lines of a text after the filters."""
-        traced = filtered(Traced.of_text(text), filters)
+        traced = filtered(Traced.of_output(text), filters)
         lines: list[Line] = []
         at = 0
         for line in traced.text.split("\n"):

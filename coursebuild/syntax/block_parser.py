@@ -41,6 +41,9 @@ from coursebuild.syntax.spans import BlockState, Placed, Row
 MAX_NESTING = 60
 """Containers inside each other; a list with its item counts as two."""
 
+LOOK_AHEAD = 20
+"""Lines of a paragraph that are searched for an underline before the rule itself is asked."""
+
 BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
 
@@ -204,14 +207,14 @@ class Blocks(ParserBlock):
 
 
 def _underlined(state: StateBlock, line: int, end: int) -> bool:
-    """Whether some line of the paragraph that begins here could underline a heading."""
-    for below in range(line + 1, end):
+    """Whether a line of the paragraph that begins here may underline a heading."""
+    for below in range(line + 1, min(end, line + LOOK_AHEAD)):
         at = state.bMarks[below] + state.tShift[below]
         if at >= state.eMarks[below]:
             return False
         if state.src[at] in "-=":
             return True
-    return False
+    return line + LOOK_AHEAD < end
 
 
 def _place(state: BlockState, before: int, begin: int) -> None:

@@ -10,10 +10,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from coursebuild.diagnostics import Parsed, diagnose, did_you_mean
-from coursebuild.source import Excerpt
+from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import trimmed
 
-_HEAD = re.compile(r"\[!([^\]\n]*)\](-?)(?=[ \t]|\n|$)([^\n]*)(?:\n|$)")
+_HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
 """What a callout of an unknown kind is read as, so that all in it is still checked."""
 
@@ -24,6 +24,8 @@ class Head:
 
     kind: Excerpt
     folded: bool
+    stray: Span | None
+    """What stands between the kind and the title and is neither a space nor the mark that folds."""
     title: Excerpt
     rest: Excerpt
 
@@ -33,17 +35,24 @@ def read_head(paragraph: Excerpt) -> Head | None:
     found = _HEAD.match(paragraph.text)
     if found is None:
         return None
+    start = found.start(3)
+    stray = found[3][:1].strip() != ""
     return Head(
         trimmed(paragraph.slice(found.start(1), found.end(1))),
         bool(found[2]),
+        paragraph.span(start, start + 1) if stray else None,
         trimmed(paragraph.slice(found.start(3), found.end(3))),
         trimmed(paragraph.slice(found.end())),
     )
 
 
-def resolve(kind: Excerpt, known: Collection[str]) -> Parsed[str]:
+def resolve(head: Head, known: Collection[str]) -> Parsed[str]:
     """The known kind that is meant, without regard to case."""
-    name = kind.text
+    name = head.kind.text
+    if head.stray is not None:
+        message = f"`{head.stray.text}` cannot follow the kind of a callout"
+        help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
+        return Parsed(FALLBACK, (diagnose("callout-unknown", head.stray, message, help=help),))
     if name in known:
         return Parsed(name)
     for candidate in sorted(known):
@@ -53,4 +62,4 @@ def resolve(kind: Excerpt, known: Collection[str]) -> Parsed[str]:
     help = did_you_mean(name.lower(), known) or "known: " + ", ".join(
         f"`{k}`" for k in sorted(known)
     )
-    return Parsed(FALLBACK, (diagnose("callout-unknown", kind.span(), message, help=help),))
+    return Parsed(FALLBACK, (diagnose("callout-unknown", head.kind.span(), message, help=help),))

@@ -48,7 +48,8 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
 def _unclosed(fence: Fence, session: Session) -> CodeBlock:
     """What follows may be anything, so that nothing is said about it."""
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
-    help = f"close it with a line `{marks}` in the same quote or list item"
+    name = "backticks" if marks[0] == "`" else "tildes"
+    help = f"close it with a line of {len(marks)} {name} in the same quote or list item"
     session.report(
         diagnose("fence-unclosed", fence.head, "this code fence is never closed", help=help)
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import islice
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Block, Footnote, FootnoteRef
@@ -48,7 +49,7 @@ class Notes:
         """A reference, or `None` (and a diagnostic) where no such footnote is written."""
         key = label.casefold()
         if key not in self.written:
-            known = [note.label for note in self.written.values()]
+            known = [note.label for note in islice(self.written.values(), 100)]
             message = f"footnote `[^{label}]` is not written anywhere"
             hint = (
                 did_you_mean(label, known)

@@ -79,6 +79,8 @@ class Anchors:
     """Each explicit id; the span of the heading that took it, once one has."""
     taken: set[str] = field(default_factory=set)
     """Ids that headings got from their text."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """How far each text's ids are numbered."""
 
     def reserve(self, name: str) -> None:
         """Keep an id for the heading that asks for it."""
@@ -98,10 +100,11 @@ class Anchors:
     def make(self, text: str) -> str:
         """The anchor of a heading without an id."""
         base = name = slug(text)
-        count = 1
+        count = self.counts.get(base, 1)
         while name in self.explicit or name in self.taken:
             count += 1
             name = f"{base}-{count}"
+        self.counts[base] = count
         self.taken.add(name)
         return name
 

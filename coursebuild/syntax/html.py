@@ -20,6 +20,7 @@ from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.math import find_formula
 from coursebuild.syntax.mention import Item, plain, with_mentions
 from coursebuild.syntax.spans import Placer
+from coursebuild.syntax.targets import check_raw_scheme
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 _IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
@@ -31,6 +32,9 @@ _LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
 _TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
+_LINK = re.compile(
+    r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
+)
 _PIECE = re.compile(r"\\\$|\$|<")
 _ENTITY = re.compile(r"&[^\s&;]{1,32};")
 
@@ -97,9 +101,14 @@ class Balance:
         """The text is over."""
         self._unwind(0)
 
-    def add(self, tag: Tag, span: Span) -> None:
-        """Take note of a tag."""
-        name = tag.name
+    def add(self, tag: Tag, text: str, place: Callable[[int, int], Span]) -> None:
+        """Take note of a tag of `text`; `place` says where a part of that text stands."""
+        name, span = tag.name, place(tag.start, tag.end)
+        for link in _LINK.finditer(text, tag.start, tag.end) if name else ():
+            start, end = link.span(link.lastindex or 0)
+            wrong = check_raw_scheme(unescape(text[start:end]), place(start, end))
+            if wrong is not None:
+                self._report(wrong)
         if not name or tag.complete or name in VOID or name in _IMPLIED:
             return
         if name in _OPTIONAL:
@@ -213,7 +222,7 @@ class _Flow:
 
     def _tag(self, tag: Tag) -> RawInline:
         span = self.placer.span(tag.start, tag.end)
-        self.balance.add(tag, span)
+        self.balance.add(tag, self.text, self.placer.span)
         if tag.closes and tag.name in self.literal:
             del self.literal[self.literal.index(tag.name) :]
         elif tag.name in _LITERAL and not tag.closes and not tag.complete:

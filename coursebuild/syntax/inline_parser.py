@@ -30,8 +30,8 @@ from markdown_it.utils import EnvType
 from coursebuild.syntax.math import math_inline
 from coursebuild.syntax.spans import InlineState, Placed
 
-MAX_NESTING = 60
-"""Links and images inside each other."""
+MAX_NESTING = 20
+"""Brackets inside each other that may still become links and images."""
 MAX_RUN = 200
 """Emphasis marks in a row."""
 
@@ -53,7 +53,14 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
+_BRACE = re.compile(r"\{\s*([A-Za-z]{2,20})")
 _BINDING = re.compile(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
+
+
+def _like_out(key: str) -> bool:
+    """Whether the key of an attribute is `out`, or looks like it."""
+    key = key.lower()
+    return key.startswith("out") or key in ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit")
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
@@ -61,7 +68,8 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     start = state.pos
     if not backtick(state, silent):
         return False
-    if not state.src.startswith("{out", state.pos) or not state.src[start : state.pos].strip("`"):
+    key = _BRACE.match(state.src, state.pos, state.posMax)
+    if key is None or not _like_out(key[1]) or not state.src[start : state.pos].strip("`"):
         return True
     end = state.pos
     found = _BINDING.match(state.src, end, state.posMax)
@@ -90,6 +98,17 @@ def _footnote_reference(state: StateInline, silent: bool) -> bool:
     return True
 
 
+def _link(state: StateInline, silent: bool) -> bool:
+    """A link or image, unless no bracket closes after this one."""
+    assert isinstance(state, InlineState)
+    if state.last_bracket is None:
+        state.last_bracket = state.src.rfind("]")
+    if state.pos > state.last_bracket:
+        return False
+    rule = link if state.src[state.pos] == "[" else image
+    return rule(state, silent)
+
+
 _STOP = re.compile(r"[\n\\`*_~\[\]<&$]|!\[")
 _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "\n": (newline,),
@@ -98,9 +117,9 @@ _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "*": (_emphasis,),
     "_": (_emphasis,),
     "~": (_emphasis,),
-    "[": (link, _footnote_reference),
+    "[": (_link, _footnote_reference),
     "]": (),
-    "!": (image,),
+    "!": (_link,),
     "<": (autolink, html_inline),
     "&": (entity,),
     "$": (math_inline,),

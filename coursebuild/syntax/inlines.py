@@ -43,7 +43,7 @@ from coursebuild.syntax.targets import check_scheme, classify
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
 
-_BRACES = re.compile(r"\{[^}\n]*\}?")
+_BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
 _DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
@@ -132,24 +132,25 @@ class _Pass:
 
     def _open(self, token: Placed) -> None:
         self._flush()
-        self.stack.append(_Frame(token))
+        is_link = token.type == "link_open"
+        flat = len(self.stack) > MAX_DEPTH and not is_link
+        self.stack.append(_Frame(token, self.stack[-1].nodes if flat else []))
         self.reader.balance.enter()
-        if token.type == "link_open":
-            self.links += 1
+        self.links += is_link
 
     def _close(self, token: Placed) -> None:
         self._flush()
         frame = self.stack.pop()
         self.reader.balance.leave()
+        into = self.stack[-1].nodes
+        if frame.nodes is into:
+            return
         opened, children = frame.token, tuple(frame.nodes)
         assert opened is not None
-        into = self.stack[-1].nodes
         if token.type == "link_close":
             self.links -= 1
             link = self._link(opened, token, children)
             into.extend(children if link is None else (link,))
-        elif len(self.stack) > MAX_DEPTH:
-            into.extend(children)
         elif token.type == "strong_close":
             into.append(Strong(self.placer.span(opened.start - 1, token.end + 1), children))
         else:
@@ -250,8 +251,11 @@ class _Pass:
         return NumberBinding(span, token.content, self.placer.span(start, end), token.info or None)
 
     def _html(self, token: Placed, span: Span) -> RawInline:
+        def place(start: int, end: int) -> Span:
+            return self.placer.span(token.start + start, token.start + end)
+
         for tag in tags(token.content):
-            self.reader.balance.add(tag, span)
+            self.reader.balance.add(tag, token.content, place)
             if tag.name == "a" and not tag.complete:
                 self.links = max(0, self.links + (-1 if tag.closes else 1))
         return RawInline(span, token.content)
@@ -259,18 +263,16 @@ class _Pass:
     def _image(self, token: Placed, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
-        wrong = check_scheme(
-            url, self._written(self.content.text, token.start + 1, label_end, token.end), image=True
-        )
+        place = self._written(self.content.text, token.start + 1, label_end, token.end)
+        wrong = check_scheme(url, place, image=True)
         if wrong is not None:
             self.reader.report(wrong)
             url = ""
         if not alt.strip():
             help = "say in the brackets what it shows, for readers who cannot see it"
-            self.reader.report(
-                diagnose("image-alt", span, "the image has no text alternative", help=help)
-            )
-        return Image(span, url, alt, str(token.attrs.get("title", "")))
+            message = "the image has no text alternative"
+            self.reader.report(diagnose("image-alt", span, message, help=help))
+        return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
     def _footnote(self, token: Placed, span: Span) -> FootnoteRef | None:
         reference = self.reader.notes.refer(token.content, span)

@@ -1,6 +1,6 @@
 """MJCF blocks: a model or a fragment of one, or a model that must not compile.
 
-Entry point: `parse_mjcf`. Keys: `fragment="worldbody"` (where the fragment goes), `error="…"` (the message it must fail with).
+Entry point: `parse_mjcf`. Keys: `fragment="worldbody"` (where the fragment goes; `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
 """
 
 from __future__ import annotations
@@ -8,24 +8,25 @@ from __future__ import annotations
 import re
 
 from coursebuild.diagnostics import Parsed, diagnose
-from coursebuild.model import Mjcf
+from coursebuild.model import CodeBlock, Mjcf
 from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import parse_info, read_keys
 
-_ELEMENT = re.compile(r"[A-Za-z_][\w-]*")
+_ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
-def parse_mjcf(fence: Fence) -> Parsed[Mjcf]:
-    """An `mjcf` fence."""
+def parse_mjcf(fence: Fence) -> Parsed[Mjcf | CodeBlock]:
+    """An `mjcf` fence; one that says in a wrong way what it is cannot be compiled, and is code."""
     info = parse_info(fence.info)
     keys = read_keys("mjcf", info.value.words, values=("fragment", "error"))
     diagnostics = [*info.diagnostics, *keys.diagnostics]
     fragment, error = keys.value.get("fragment"), keys.value.get("error")
-    if fragment is not None and not _ELEMENT.fullmatch(fragment.value or ""):
+    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
         message = f"`{fragment.value}` is not the name of an element"
         help = 'name the element that it goes into, for example `fragment="worldbody"`'
         diagnostics.append(diagnose("fence-key-value", fragment.value_span, message, help=help))
-        fragment = None
+    if diagnostics:
+        return Parsed(fence.code(), tuple(diagnostics))
     mjcf = Mjcf(
         fence.span,
         fence.body,
@@ -33,4 +34,4 @@ def parse_mjcf(fence: Fence) -> Parsed[Mjcf]:
         None if error is None else error.value,
         None if error is None else error.value_span,
     )
-    return Parsed(mjcf, tuple(diagnostics))
+    return Parsed(mjcf)

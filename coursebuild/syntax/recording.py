@@ -1,7 +1,7 @@
 """Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
 
-Entry points: `is_caption`, `record_fence`, `record_table` (a caption and its body), `no_body` (what
-follows is no body), `stray_keys` (on a fence that records nothing).
+Entry points: `is_caption`, `record_fence`, `record_table` (a caption and its body), `no_body` and
+`nothing_recorded` (what follows is none), `stray_keys` (on a fence that records nothing).
 """
 
 from __future__ import annotations
@@ -38,11 +38,14 @@ def record_fence(
     caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: Session
 ) -> Recording | None:
     """The recording whose body may be this fence."""
-    if not fence.closed or (fence.kind in OURS and fence.kind != "text"):
+    if not fence.closed:
         return None
     if fence.kind != "text":
-        what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
-        session.report(no_body(fence.head, what))
+        if fence.kind in OURS:
+            session.diagnostics += nothing_recorded(caption, caption_span)
+        else:
+            what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
+            session.report(no_body(fence.head, what))
         return None
     how = parse_comparison(fence)
     session.diagnostics += how.diagnostics
@@ -64,6 +67,15 @@ def record_table(
     """The recording whose body is a table."""
     span, script = caption_span.to(table.span), _script(caption_span, session)
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
+
+
+def nothing_recorded(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+    """The mistake of a caption without a body, where it can be nothing but a caption."""
+    if plain_text(caption).strip() != "Output:":
+        return []
+    message = "no recorded output follows this line"
+    help = "put a fence that begins with ```` ```text ````, or a table, directly below it"
+    return [diagnose("recording-body", span, message, help=help)]
 
 
 def no_body(span: Span, what: str) -> Diagnostic:

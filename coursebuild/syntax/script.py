@@ -31,7 +31,7 @@ _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"
     "test",
     "this",
 }
-_ON_LINE = re.compile(r"\bon line ([0-9]+)")
+_ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
@@ -204,15 +204,25 @@ def syntax_mistake(code: Excerpt) -> tuple[Span, str, str] | None:
     line = min(mistake.line, len(rows))
     row = rows[line - 1]
     start = min(mistake.column, len(row.text))
+    if "indent" in mistake.message:  # python may point into the white space before the code
+        start = max(start, len(row.text) - len(row.text.lstrip()))
     end = mistake.end_column if mistake.end_line == line else len(row.text)
+    indentation = len(row.text) - len(row.text.lstrip())
+    start = max(start, min(indentation, len(row.text)))
     end = min(max(end, start + 1), len(row.text))
 
     def lesson_line(found: re.Match[str]) -> str:
-        return f"on line {code.line_span(int(found[1])).line}"
+        return f"{found[1]} line {code.line_span(int(found[2])).line}"
 
     message, _, hint = _ON_LINE.sub(lesson_line, mistake.message).partition(". ")
-    hint = hint[:1].lower() + hint[1:]
-    return row.span(start, max(start, end)), message, hint
+    return row.span(start, max(start, end)), _lower(message), _lower(hint)
+
+
+def _lower(sentence: str) -> str:
+    """A sentence of Python's as part of ours."""
+    if sentence[1:2].islower():
+        return sentence[:1].lower() + sentence[1:]
+    return sentence
 
 
 @lru_cache(maxsize=512)

@@ -95,6 +95,8 @@ class InlineState(StateInline):
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
         self.mark = 0
+        self.last_bracket: int | None = None
+        """Where the last `]` stands, once somebody asked."""
         self.last_runs: dict[int, int] | None = None
         """Where the last run of each number of backticks begins, once somebody asked."""
 

@@ -1,6 +1,6 @@
 """Where links lead: a destination as written becomes a `Target`, or a diagnostic where a page must not link there.
 
-Entry points: `classify`, `check_scheme`.
+Entry points: `classify`, `check_scheme`, `check_raw_scheme`.
 """
 
 from __future__ import annotations
@@ -63,3 +63,13 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     return diagnose(
         "link-scheme", span, f"no link scheme `{found[1]}:`", help=f"did you mean `{near}:`?"
     )
+
+
+def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
+    """What is wrong with the scheme of an address in raw HTML, which is published as it is."""
+    found = _SCHEME.match(url.strip())
+    if found is not None and found[1].lower() in _OURS:
+        message = f"`{found[1]}:` means nothing in raw HTML"
+        help = f"write the link in Markdown: `[…]({url.strip()})`"
+        return diagnose("link-scheme", span, message, help=help)
+    return check_scheme(url, span, image=True)

@@ -23,6 +23,7 @@ from coursebuild.model import (
     Inline,
     ListBlock,
     ListItem,
+    Math,
     MathBlock,
     Paragraph,
     Recording,
@@ -40,7 +41,13 @@ from coursebuild.syntax.headings import Attributes, heading_mistakes, read_attri
 from coursebuild.syntax.html import Balance, html_flow, tags
 from coursebuild.syntax.inlines import InlineReader
 from coursebuild.syntax.markdown import block_tokens
-from coursebuild.syntax.recording import is_caption, no_body, record_fence, record_table
+from coursebuild.syntax.recording import (
+    is_caption,
+    no_body,
+    nothing_recorded,
+    record_fence,
+    record_table,
+)
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import Placed, Placer, locate, normalized, trimmed
 from coursebuild.syntax.tables import read_table
@@ -165,9 +172,14 @@ class TextReader:
     def _html(self, token: Placed) -> HtmlBlock | HtmlFlow:
         html = locate(self.base, token.rows)
         if self.nested:
-            return html_flow(trimmed(html, " \t\n"), self.balance)
+            flow = html_flow(trimmed(html, " \t\n"), self.balance)
+            for child in flow.children:
+                if isinstance(child, Math) and not child.tex.text.strip():
+                    wrong = diagnose("math-syntax", child.span, "the formula is empty")
+                    self.session.report(wrong)
+            return flow
         for tag in tags(html.text):
-            self.balance.add(tag, html.span(tag.start, tag.end))
+            self.balance.add(tag, html.text, html.span)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return HtmlBlock(self._span(token), text)
 
@@ -203,7 +215,7 @@ class TextReader:
         return self._callout(span, head)
 
     def _callout(self, span: Span, head: Head) -> Callout:
-        kind = resolve(head.kind, self.session.callouts)
+        kind = resolve(head, self.session.callouts)
         self.session.diagnostics += kind.diagnostics
         title = self.inlines.read(head.title)
         self.at += 3
@@ -247,21 +259,20 @@ class TextReader:
     def _recording(self, caption: tuple[Inline, ...], span: Span) -> Recording | None:
         """The recording whose caption was just read, if what follows is its body."""
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
-        if token is None:
-            return None
-        recording = None
-        if token.type == "table_open":
-            table, after = read_table(self.tokens, self.at, self.base, self.inlines.read)
-            self.at = after
+        kind = "" if token is None else token.type
+        if token is not None and kind == "table_open":
+            table, self.at = read_table(self.tokens, self.at, self.base, self.inlines.read)
             return record_table(caption, span, table, self.session)
-        if token.type == "fence":
+        if token is not None and kind == "fence":
             fence = read_fence(token, self.base, nested=False)
             recording = record_fence(caption, span, fence, self.session)
-        elif token.type == "code_block":
+            self.at += recording is not None
+            return recording
+        if token is not None and kind == "code_block":
             self.session.report(no_body(self._span(token).first_line(), "an indented block"))
-        if recording is not None:
-            self.at += 1
-        return recording
+        else:
+            self.session.diagnostics += nothing_recorded(caption, span)
+        return None
 
 
 _READERS: dict[str, Callable[[TextReader, Placed], Block | None]] = {

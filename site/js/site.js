@@ -3,7 +3,7 @@
 import { addCopyButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
 import { openForPrint } from './page/print.js'
-import { freeUnscrolled } from './page/scroll.js'
+import { markScrolling } from './page/scroll.js'
 import { addThemeSwitch } from './page/theme.js'
 import { readWords } from './page/words.js'
 
@@ -11,5 +11,5 @@ const words = readWords(document)
 addThemeSwitch(document, words)
 addCopyButtons(document, words)
 followContents(document)
-freeUnscrolled(document)
+markScrolling(document)
 openForPrint(window)

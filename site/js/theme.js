@@ -3,3 +3,4 @@
 import { applyTheme, storedTheme } from './page/theme.js'
 
 applyTheme(storedTheme())
+document.documentElement.classList.add('scripted') // room for what scripts add is kept from the start

@@ -1,15 +1,27 @@
 /**
  * Boxes that may scroll can be reached by keyboard in the finished page. Where nothing is cut off there is nothing to
- * scroll, and the stop is taken away.
+ * scroll, and the stop is taken away; where something is, `data-more` says on which side.
  */
 
-export function freeUnscrolled(document) {
-  const boxes = [...document.querySelectorAll('[tabindex="0"]')]
-  const update = (box) => {
-    const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1
-    if (scrolls) box.tabIndex = 0
+/** On which sides of a box there is more to see: `start`, `end`, `both`, or nothing. */
+export function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
+  const position = Math.abs(scrollLeft) // negative where text runs from the right
+  const before = position > 1
+  const after = position + clientWidth < scrollWidth - 1
+  return before && after ? 'both' : before ? 'start' : after ? 'end' : ''
+}
+
+export function markScrolling(document) {
+  const mark = (box) => {
+    const sides = hiddenSides(box.scrollLeft, box.clientWidth, box.scrollWidth)
+    if (sides) box.dataset.more = sides
+    else delete box.dataset.more
+    if (sides || box.scrollHeight > box.clientHeight + 1) box.tabIndex = 0
     else box.removeAttribute('tabindex')
   }
-  const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => update(target)))
-  for (const box of boxes) observer.observe(box)
+  const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => mark(target)))
+  for (const box of document.querySelectorAll('[tabindex="0"]')) {
+    observer.observe(box)
+    box.addEventListener('scroll', () => mark(box), { passive: true })
+  }
 }

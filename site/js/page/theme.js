@@ -52,6 +52,8 @@ export function addThemeSwitch(document, words) {
     select.value = storedTheme()
     applyTheme(select.value)
   })
-  label.append(words('theme.label'), ' ', select)
+  const name = document.createElement('span')
+  name.textContent = words('theme.label')
+  label.append(name, ' ', select)
   tools.append(label)
 }

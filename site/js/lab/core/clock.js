@@ -1,0 +1,79 @@
+/**
+ * Real time, kept by whole timesteps.
+ *
+ * The clock owes the simulation the time that has passed, times the speed. `owed` says how many whole steps that is, `ran` what
+ * was done of it. The timestep itself is never changed. What a slow model cannot do within `catchUp` seconds is let go, so
+ * that a lab which was slow for a moment does not race afterwards, and `ratio` says how far behind it runs.
+ *
+ * Pure: the caller brings the time, in seconds.
+ */
+
+const WINDOW = 1 // s of real time that `ratio` looks back on
+const EPSILON = 1e-9 // of a step: rounding must not cost one
+
+export class Clock {
+  /** @param {{catchUp?: number}} [options] catchUp: the most real time (s) that is made up for */
+  constructor({ catchUp = 0.1 } = {}) {
+    this.catchUp = catchUp
+    this.speed = 1
+    this.stop()
+  }
+
+  /** Forget the past: the next `owed` starts a new count. */
+  stop() {
+    this.last = null
+    this.debt = 0
+    this.marks = []
+    this.done = 0
+    this.wanted = 0
+  }
+
+  /** Change how many simulated seconds go by in a real one. */
+  setSpeed(speed) {
+    if (!(speed > 0) || !Number.isFinite(speed)) throw new RangeError(`a speed of ${speed} is not possible`)
+    this.speed = speed
+    this.marks = []
+    this.debt = Math.min(this.debt, this.catchUp * speed)
+  }
+
+  /**
+   * The whole steps that are due.
+   *
+   * @param {number} now s
+   * @param {number} timestep s
+   */
+  owed(now, timestep) {
+    if (!(timestep > 0)) return 1 // the step itself will tell what is wrong
+    if (this.last !== null && now > this.last) {
+      const due = (now - this.last) * this.speed
+      this.wanted += due
+      // One step may be longer than what is made up for: it must still come due.
+      this.debt = Math.min(this.debt + due, Math.max(this.catchUp * this.speed, timestep))
+    }
+    this.last = now
+    return Math.floor(this.debt / timestep + EPSILON)
+  }
+
+  /** Take note of `steps` steps of `timestep` seconds; `now` as for `owed`. */
+  ran(steps, timestep, now) {
+    this.debt = Math.max(0, this.debt - steps * timestep)
+    this.done += steps * timestep
+    this.marks.push({ now, done: this.done, wanted: this.wanted })
+    while (this.marks.length > 2 && this.marks[1].now <= now - WINDOW) this.marks.shift()
+  }
+
+  /** Simulated time over the time it should have simulated, in the last second: 1 is on time, 0.5 half as fast. */
+  ratio() {
+    if (this.marks.length < 2) return 1
+    const first = this.marks[0]
+    const last = this.marks[this.marks.length - 1]
+    const wanted = last.wanted - first.wanted
+    // What is still owed is late by less than a frame and no sign of slowness.
+    return wanted > 0 ? Math.min(1, (last.done - first.done + this.debt) / wanted) : 1
+  }
+
+  /** Seconds of real time until the next step is due. */
+  wait(timestep) {
+    return Math.max(0, (timestep - this.debt) / this.speed)
+  }
+}

@@ -1,0 +1,128 @@
+/**
+ * MuJoCo's WebAssembly build, and the models that it holds.
+ *
+ *   createEngine(loadMujoco, instantiate) → Promise<Engine>
+ *   engine.load(bytes)                    → Handles
+ *
+ * The bindings hand out C++ objects that JavaScript does not collect. Here each has one owner, who deletes it once:
+ * `Handles` owns a model with its data, and whoever calls `load` owns the handles. `model.opt`, `data.warning` and the like
+ * are references into these two, which must not be deleted.
+ */
+
+/** The engine cannot be used, or cannot use a model. `fatal`: no further call will work either. */
+export class EngineError extends Error {
+  constructor(message, fatal = false) {
+    super(message)
+    this.name = 'EngineError'
+    this.fatal = fatal
+  }
+}
+
+/**
+ * Start the engine.
+ *
+ * @param {(module: object) => Promise<object>} loadMujoco the default export of @mujoco/mujoco
+ * @param {(imports: object) => {instance: WebAssembly.Instance, module: WebAssembly.Module} | Promise<...>} instantiate
+ *   at once where it returns a result, as an engine without an event loop needs
+ * @param {(text: string) => void} [log] what the engine prints
+ * @returns {Promise<Engine>}
+ */
+export async function createEngine(loadMujoco, instantiate, log = () => {}) {
+  let fail
+  const failed = new Promise((_, reject) => (fail = reject))
+  const loaded = loadMujoco({
+    print: log,
+    printErr: log,
+    instantiateWasm(imports, done) {
+      const result = instantiate(imports)
+      if (typeof result.then === 'function') result.then((made) => done(made.instance, made.module), fail)
+      else done(result.instance, result.module)
+    },
+  })
+  try {
+    return new Engine(await Promise.race([loaded, failed]))
+  } catch (error) {
+    throw new EngineError(`the engine does not start: ${error.message ?? error}`, true)
+  }
+}
+
+/** A running engine: `mj` are the bindings, `version` is MuJoCo's, `k` the numbers of its enumerations. */
+export class Engine {
+  constructor(mj) {
+    this.mj = mj
+    this.version = mj.mj_versionString()
+    this.k = constants(mj)
+  }
+
+  /**
+   * Load a compiled model.
+   *
+   * @param {Uint8Array} bytes an MJB file of the same engine version
+   * @returns {Handles}
+   */
+  load(bytes) {
+    return new Handles(this.mj, bytes)
+  }
+}
+
+/** A model, its data, and a second data for looking at (see `lab.js`). */
+export class Handles {
+  constructor(mj, bytes) {
+    this.model = readModel(mj, bytes)
+    this.owned = [this.model]
+    try {
+      this.data = this.own(new mj.MjData(this.model))
+      this.shown = this.own(new mj.MjData(this.model))
+    } catch (error) {
+      this.dispose()
+      throw new EngineError(`the model has no room: ${error.message}`)
+    }
+  }
+
+  /** Take over a C++ object: it is deleted with the model. */
+  own(object) {
+    this.owned.push(object)
+    return object
+  }
+
+  /** Delete everything, last made first; a second call does nothing. */
+  dispose() {
+    for (const object of this.owned.splice(0).reverse()) object.delete()
+  }
+}
+
+function readModel(mj, bytes) {
+  const files = new mj.MjVFS()
+  let model = null
+  try {
+    files.addBuffer('model.mjb', bytes)
+    model = mj.MjModel.from_binary_path('model.mjb', files)
+  } catch (error) {
+    throw new EngineError(`the model does not load: ${error.message}`, error instanceof WebAssembly.RuntimeError)
+  } finally {
+    files.delete()
+  }
+  if (model === null || model === undefined) throw new EngineError('the model does not load')
+  return model
+}
+
+/** The numbers of the enumerators that the lab needs: `k.obj.BODY`, `k.vis.COM`, `k.state.INTEGRATION`, … */
+function constants(mj) {
+  const numbers = (type, prefix) =>
+    Object.fromEntries(
+      Object.keys(type)
+        .filter((name) => name.startsWith(prefix))
+        .map((name) => [name.slice(prefix.length), type[name].value]),
+    )
+  return Object.freeze({
+    obj: numbers(mj.mjtObj, 'mjOBJ_'),
+    joint: numbers(mj.mjtJoint, 'mjJNT_'),
+    vis: numbers(mj.mjtVisFlag, 'mjVIS_'),
+    frame: numbers(mj.mjtFrame, 'mjFRAME_'),
+    category: numbers(mj.mjtCatBit, 'mjCAT_'),
+    state: numbers(mj.mjtState, 'mjSTATE_'),
+    disable: numbers(mj.mjtDisableBit, 'mjDSBL_'),
+    warning: numbers(mj.mjtWarning, 'mjWARN_'),
+    perturb: numbers(mj.mjtPertBit, 'mjPERT_'),
+  })
+}

@@ -1,0 +1,150 @@
+/**
+ * What lab code finds under `lib`: quantities that take more than an index, computed by MuJoCo.
+ *
+ * Nothing here changes the motion. `energy`, `momentum` and `angmom` need results that MuJoCo leaves in the data only on
+ * demand; the data are as before afterwards, so that a readout never changes what another one shows. Vectors are copies. SI units, world frame.
+ */
+
+const DEGREES = 180 / Math.PI
+
+/**
+ * @param {import('./engine.js').Engine} engine
+ * @param {object} model MjModel
+ * @param {object} data the MjData that is read
+ * @param {{force: object}} scratch a DoubleBuffer(6) of the owner
+ * @param {() => number} random
+ */
+export function createLib(engine, model, data, scratch, random) {
+  const { mj, k } = engine
+  const ids = new Map()
+
+  const id = (type, what, name) => {
+    if (typeof name === 'number') return name
+    const key = `${type} ${name}`
+    let found = ids.get(key)
+    if (found === undefined) {
+      found = mj.mj_name2id(model, type, String(name))
+      if (found < 0) throw new Error(`the model has no ${what} "${name}"`)
+      ids.set(key, found)
+    }
+    return found
+  }
+  const row = (array, index, what) => {
+    if (!(index >= 0 && 3 * index < array.length)) throw new Error(`the model has no ${what} number ${index}`)
+    return array.slice(3 * index, 3 * index + 3)
+  }
+
+  return Object.freeze({
+    /** J: {kinetic, potential, total}; potential: gravity and springs. */
+    energy() {
+      return undisturbed(data, ['energy'], ['flg_energypos', 'flg_energyvel'], () => {
+        mj.mj_energyPos(model, data)
+        mj.mj_energyVel(model, data)
+        const [potential, kinetic] = data.energy
+        return { kinetic, potential, total: kinetic + potential }
+      })
+    },
+
+    /** kg m/s, of everything. */
+    momentum() {
+      return subtree(() => data.subtree_linvel.slice(0, 3).map((v) => v * model.body_subtreemass[0]))
+    },
+
+    /** kg m²/s, of everything about its common centre of mass. */
+    angmom() {
+      return subtree(() => data.subtree_angmom.slice(0, 3))
+    },
+
+    sitePos: (name) => row(data.site_xpos, id(k.obj.SITE, 'site', name), 'site'),
+    bodyPos: (name) => row(data.xpos, id(k.obj.BODY, 'body', name), 'body'),
+    bodyId: (name) => id(k.obj.BODY, 'body', name),
+    jointId: (name) => id(k.obj.JOINT, 'joint', name),
+
+    /** The position of a joint: a number for a hinge (rad) or slide (m), four for a ball, seven for a free joint. */
+    qpos(name) {
+      const joint = id(k.obj.JOINT, 'joint', name)
+      if (!(joint >= 0 && joint < model.njnt)) throw new Error(`the model has no joint number ${joint}`)
+      const at = model.jnt_qposadr[joint]
+      const size = { [k.joint.FREE]: 7, [k.joint.BALL]: 4 }[model.jnt_type[joint]] ?? 1
+      return size === 1 ? data.qpos[at] : data.qpos.slice(at, at + size)
+    },
+
+    /** N: the normal forces of all contacts, or of those of one geom, added up. */
+    normalForce(geom) {
+      const only = geom === undefined ? -1 : id(k.obj.GEOM, 'geom', geom)
+      let sum = 0
+      eachContact(data, (contact, i) => {
+        if (only >= 0 && contact.geom1 !== only && contact.geom2 !== only) return
+        mj.mj_contactForce(model, data, i, scratch.force)
+        sum += scratch.force.GetView()[0]
+      })
+      return sum
+    },
+
+    /** The Euclidean length of a vector. */
+    norm: (vector) => Math.sqrt(vector.reduce((sum, x) => sum + x * x, 0)),
+    deg: (radians) => radians * DEGREES,
+    rad: (degrees) => degrees / DEGREES,
+
+    /** A number in [0, 1); the sequence starts again with every reset and depends on the lab's `seed`. */
+    random,
+  })
+
+  function subtree(read) {
+    return undisturbed(data, ['subtree_linvel', 'subtree_angmom'], ['flg_subtreevel'], () => {
+      mj.mj_subtreeVel(model, data)
+      return read()
+    })
+  }
+}
+
+/** Call `compute`, and put back what it did to these arrays and flags of the data. */
+function undisturbed(data, arrays, flags, compute) {
+  const before = arrays.map((name) => data[name].slice())
+  const set = flags.map((name) => data[name])
+  const result = compute()
+  arrays.forEach((name, i) => data[name].set(before[i]))
+  flags.forEach((name, i) => (data[name] = set[i]))
+  return result
+}
+
+/** Call `visit(contact, i)` for each contact; the contact is a copy that lives for the call. */
+export function eachContact(data, visit) {
+  if (data.ncon === 0) return
+  const vector = data.contact
+  try {
+    for (let i = 0; i < vector.size(); i++) {
+      const contact = vector.get(i)
+      try {
+        visit(contact, i)
+      } finally {
+        contact.delete()
+      }
+    }
+  } finally {
+    vector.delete()
+  }
+}
+
+/**
+ * The contacts as plain objects, what `sim.contacts()` gives: `geoms` are two ids (-1: not a geom, but part of a flex) and `names`
+ * their names; `pos` (m) and `normal` (unit, from the first to the second) are in the world, `dist` is negative in penetration (m),
+ * `force` is [normal, friction, friction, torsion, rolling, rolling] in the frame of the contact (N, N m).
+ */
+export function contactList(engine, model, data, scratch) {
+  const { mj, k } = engine
+  const list = []
+  eachContact(data, (contact, i) => {
+    mj.mj_contactForce(model, data, i, scratch.force)
+    const geoms = [contact.geom1, contact.geom2]
+    list.push({
+      geoms,
+      names: geoms.map((geom) => (geom < 0 ? '' : mj.mj_id2name(model, k.obj.GEOM, geom) ?? '')),
+      pos: Array.from(contact.pos),
+      normal: Array.from(contact.frame.slice(0, 3)),
+      dist: contact.dist,
+      force: Array.from(scratch.force.GetView()),
+    })
+  })
+  return list
+}

@@ -1,0 +1,54 @@
+/**
+ * Calling the pieces of a lab's code, so that whatever goes wrong is known by its entry in the lesson.
+ */
+
+/**
+ * A piece of lab code failed. `entry` is the way to it in the lab's JSON: ['controls', 2, 'set'].
+ * `kind`: 'throws' | 'type' | 'nan' | 'engine' (the engine ended and will not work any more).
+ */
+export class LabError extends Error {
+  constructor(kind, entry, message) {
+    super(message)
+    this.name = 'LabError'
+    this.kind = kind
+    this.entry = entry
+  }
+}
+
+/** The entry whose code runs now; outlives an engine that was stopped from outside. */
+export const current = { entry: null }
+
+/** Call `code` for `entry`; what it throws becomes a LabError. */
+export function call(entry, code) {
+  const outer = current.entry
+  current.entry = entry
+  try {
+    return code()
+  } catch (error) {
+    if (error instanceof LabError) throw error
+    const kind = error instanceof WebAssembly.RuntimeError ? 'engine' : 'throws'
+    throw new LabError(kind, entry, error instanceof Error ? `${error.name}: ${error.message}` : String(error))
+  } finally {
+    current.entry = outer
+  }
+}
+
+/** A value for a person: a number or a text. */
+export function readable(entry, value) {
+  if (typeof value === 'number' || typeof value === 'string') return value
+  throw new LabError('type', entry, `gives ${describe(value)}, not a number or a text`)
+}
+
+/** A value for a plot or a claim: a number, which may be NaN. */
+export function numeric(entry, value) {
+  if (typeof value === 'number') return value
+  throw new LabError('type', entry, `gives ${describe(value)}, not a number`)
+}
+
+function describe(value) {
+  if (value === null || value === undefined) return String(value)
+  if (typeof value === 'string') return `the text ${JSON.stringify(value)}`
+  if (typeof value !== 'object') return typeof value === 'function' ? 'a function' : `${typeof value} ${value}`
+  if (Array.isArray(value) || ArrayBuffer.isView(value)) return `an array of ${value.length}`
+  return 'an object'
+}

@@ -1,0 +1,90 @@
+/**
+ * What a lab records while it runs: the traces of its plots, and the trail of a site.
+ *
+ * Samples lie on a grid of steps counted from the reset, never on the clock, so that the same run gives the same samples in
+ * the page and in the build, at any speed.
+ */
+
+import { call, numeric } from './piece.js'
+
+const PER_WINDOW = 600 // samples in the width of a plot
+const DEFAULT_WINDOW = 10 // s, for a plot that shows all of its time
+const TRAIL = 2000 // points
+
+export class Sampler {
+  /**
+   * @param {object} config the lab's data
+   * @param {object} code the lab's code
+   * @param {number} site the id of the site whose trail is kept, or -1
+   */
+  constructor(config, code, site) {
+    this.traces = config.plots.flatMap((plot, i) =>
+      plot.traces.map((_, j) => ({ entry: ['plots', i, 'traces', j, 'expr'], run: code.plots[i][j] })),
+    )
+    const windows = config.plots.map((plot) => plot.window ?? DEFAULT_WINDOW)
+    this.interval = Math.min(DEFAULT_WINDOW, ...windows) / PER_WINDOW
+    this.site = site
+    this.active = this.traces.length > 0 || site >= 0
+    this.trail = new Float32Array(site >= 0 ? 3 * TRAIL : 0)
+    this.epoch = 0
+    this.clear()
+  }
+
+  /** A new run begins: what was recorded belongs to the one before. */
+  clear() {
+    this.epoch += 1
+    this.times = []
+    this.values = []
+    this.points = 0
+    this.last = -Infinity
+  }
+
+  /** Whether a sample is due after so many steps. */
+  due(steps, timestep) {
+    return this.active && steps % Math.max(1, Math.round(this.interval / timestep)) === 0
+  }
+
+  /** The traces, evaluated now. */
+  evaluate(env) {
+    return Float64Array.from(this.traces, ({ entry, run }) => call(entry, () => numeric(entry, run(env))))
+  }
+
+  /** Add a sample; `env` is of data whose derived quantities are current. */
+  record(env) {
+    if (this.traces.length > 0) {
+      this.values.push(...this.evaluate(env))
+      this.times.push(env.data.time)
+    }
+    if (this.site >= 0) {
+      const at = 3 * (this.points++ % TRAIL)
+      const from = 3 * this.site
+      this.trail.set(env.data.site_xpos.subarray(from, from + 3), at)
+    }
+    this.last = env.data.time
+  }
+
+  /**
+   * What was recorded since the last call. `values` holds, for each of the times, one value for each trace of all plots in turn;
+   * a new `epoch` says that the samples before it are of an earlier run.
+   */
+  take() {
+    const taken = { epoch: this.epoch, times: Float64Array.from(this.times), values: Float64Array.from(this.values) }
+    this.times = []
+    this.values = []
+    return taken
+  }
+
+  /** The number of points of the trail, and the points from the oldest to the newest, written into `target` at `at`. */
+  writeTrail(target, at) {
+    const count = Math.min(this.points, TRAIL)
+    const oldest = this.points > TRAIL ? 3 * (this.points % TRAIL) : 0
+    target.set(this.trail.subarray(oldest, 3 * count), at)
+    target.set(this.trail.subarray(0, oldest), at + 3 * count - oldest)
+    return count
+  }
+
+  /** The most points that a trail has. */
+  get capacity() {
+    return this.trail.length / 3
+  }
+}

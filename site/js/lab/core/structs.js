@@ -1,0 +1,129 @@
+/**
+ * C structures of the engine, read where they lie in its memory.
+ *
+ * The bindings only copy the warning counters and the geoms of a scene, object by object, which would cost more than a step.
+ * Both are plain structures whose layout belongs to the engine's version. Each reader compares what it finds with what the
+ * bindings say before it is used, and refuses to work on a difference.
+ *
+ * The engine's memory may grow, which detaches every array on it: views are made anew when they have become empty.
+ */
+
+import { EngineError } from './engine.js'
+
+const WRONG = 'the engine lays out its memory in another way than this version of it should'
+
+/** The memory of the engine, found through any array of a model. */
+const memory = (data) => data.xpos.buffer
+
+/** How often each of MuJoCo's warnings was raised since the last reset of the data. */
+export class WarningCounters {
+  /** @param {object} data MjData, which must outlive the counters */
+  constructor(data) {
+    this.data = data
+    // A vector of {pointer to an mjWarningStat, owned}; the structures themselves lie in mjData, one behind the other.
+    const vector = data.warning
+    this.count = vector.size()
+    const words = new Int32Array(memory(data))
+    const first = words[vector.$$.ptr >> 2] >> 2
+    this.address = words[first]
+    for (let i = 0; i < this.count; i++) {
+      if (words[first + 2 * i] !== this.address + 8 * i) throw new EngineError(WRONG, true)
+    }
+    this.view = new Int32Array(0)
+    this.prove(vector)
+  }
+
+  prove(vector) {
+    for (let i = 0; i < this.count; i++) {
+      const before = this.number(i)
+      this.words()[2 * i + 1] = 1000 + i
+      const copy = vector.get(i)
+      const right = copy.number === 1000 + i
+      copy.delete()
+      this.words()[2 * i + 1] = before
+      if (!right) throw new EngineError(WRONG, true)
+    }
+  }
+
+  words() {
+    if (this.view.length === 0) this.view = new Int32Array(memory(this.data), this.address, 2 * this.count)
+    return this.view
+  }
+
+  /** How often warning `i` was raised. */
+  number(i) {
+    return this.words()[2 * i + 1]
+  }
+
+  /** What the last warning `i` was about: an index into the array in question. */
+  info(i) {
+    return this.words()[2 * i]
+  }
+
+  /** The sum of all counters. */
+  total() {
+    const words = this.words()
+    let sum = 0
+    for (let i = 1; i < words.length; i += 2) sum += words[i]
+    return sum
+  }
+}
+
+const GEOM_WORDS = 63 // sizeof(mjvGeom) is 252 bytes
+const GEOMS_AT = 2 // mjvScene starts with maxgeom, ngeom and a pointer to the geoms
+
+/** The geoms of an mjvScene: rows of 32-bit words, as integers and as floats. */
+export class SceneGeoms {
+  /** @param {object} scene MjvScene; @param {object} data any MjData of the same engine */
+  constructor(scene, data) {
+    this.scene = scene
+    this.data = data
+    const words = new Int32Array(memory(data))
+    const wrapper = scene.$$.ptr >> 2
+    const candidates = [words[wrapper], words[wrapper + 1], words[wrapper + 2]]
+    this.address = candidates.find((at) => at > 0 && at % 4 === 0 && words[at >> 2] === scene.maxgeom)
+    if (this.address === undefined) throw new EngineError(WRONG, true)
+    this.ints = new Int32Array(0)
+    this.floats = new Float32Array(0)
+    this.proven = false
+  }
+
+  /** Read again after mjv_updateScene; returns the number of geoms. */
+  update() {
+    if (this.ints.length === 0) {
+      const buffer = memory(this.data)
+      const geoms = new Int32Array(buffer, this.address, 3)[GEOMS_AT]
+      this.header = new Int32Array(buffer, this.address, 2)
+      this.ints = new Int32Array(buffer, geoms, GEOM_WORDS * this.scene.maxgeom)
+      this.floats = new Float32Array(buffer, geoms, GEOM_WORDS * this.scene.maxgeom)
+    }
+    const count = this.header[1]
+    if (!this.proven && count > 0) this.prove(count)
+    return count
+  }
+
+  prove(count) {
+    const vector = this.scene.geoms
+    let right = vector.size() === count
+    for (let i = 0; right && i < count; i++) {
+      const copy = vector.get(i)
+      const at = i * GEOM_WORDS
+      right =
+        copy.type === this.ints[at] &&
+        copy.objid === this.ints[at + 3] &&
+        copy.size[2] === this.floats[at + 12] &&
+        copy.pos[0] === this.floats[at + 13] &&
+        copy.mat[8] === this.floats[at + 24] &&
+        copy.rgba[3] === this.floats[at + 28]
+      copy.delete()
+    }
+    vector.delete()
+    if (!right) throw new EngineError(WRONG, true)
+    this.proven = true
+  }
+
+  /** The first word of geom `i`. */
+  at(i) {
+    return i * GEOM_WORDS
+  }
+}

@@ -1,0 +1,100 @@
+/**
+ * Watching for divergence.
+ *
+ * MuJoCo answers a bad state (a value that is not finite, or beyond 1e10) with a reset and a counter. The lab switches the
+ * reset off, and looks after each step: at the counters, at the time, and at the state itself, which MuJoCo would only
+ * check at the next step. Where the author has switched the reset on again, the counter still tells.
+ */
+
+import { WarningCounters } from './structs.js'
+
+const LARGEST = 1e10 // mjMAXVAL
+
+/** @typedef {{time: number, kind: string, message: string}} Finding */
+
+export class Watch {
+  /** @param {import('./engine.js').Engine} engine; @param {object} model; @param {object} data */
+  constructor(engine, model, data) {
+    this.engine = engine
+    this.model = model
+    this.data = data
+    this.counters = new WarningCounters(data)
+    this.seen = new Int32Array(this.counters.count)
+    this.total = 0
+    this.arrays = {}
+    const { warning } = engine.k
+    this.names = Object.fromEntries(Object.entries(warning).map(([name, i]) => [i, name.toLowerCase()]))
+    this.fatal = new Set([warning.BADQPOS, warning.BADQVEL, warning.BADQACC])
+  }
+
+  /** Switch off MuJoCo's own reset of a diverged state. */
+  static keep(engine, model) {
+    model.opt.disableflags |= engine.k.disable.AUTORESET
+  }
+
+  /** Start afresh: after a reset, or after lab code that may have repaired the state. */
+  restart() {
+    for (let i = 0; i < this.seen.length; i++) this.seen[i] = this.counters.number(i)
+    this.total = this.counters.total()
+  }
+
+  /**
+   * Look after a step that began at time `before`.
+   *
+   * @returns {{diverged: Finding | null, warnings: Finding[]} | null} null when all is well
+   */
+  look(before) {
+    const { data } = this
+    const time = data.time
+    if (this.counters.total() === this.total && time > before && this.good('qpos') && this.good('qvel')) return null
+    const warnings = this.raised(time)
+    const fatal = warnings.find((finding) => finding.fatal)
+    return {
+      diverged: fatal ?? this.badTime(before, time) ?? this.badState('qpos', time) ?? this.badState('qvel', time),
+      warnings: warnings.filter((finding) => !finding.fatal),
+    }
+  }
+
+  /** The warnings raised since last time. */
+  raised(time) {
+    const found = []
+    for (let i = 0; i < this.seen.length; i++) {
+      const number = this.counters.number(i)
+      if (number > this.seen[i]) {
+        const message = sentence(this.engine.mj.mju_warningText(i, this.counters.info(i)))
+        found.push({ time, kind: this.names[i], message, fatal: this.fatal.has(i) })
+      }
+      this.seen[i] = number
+    }
+    this.total = this.counters.total()
+    return found
+  }
+
+  badTime(before, time) {
+    if (time > before) return null
+    return { time: before, kind: 'time', message: `the time went from ${before} s to ${time} s in a step`, fatal: true }
+  }
+
+  badState(name, time) {
+    if (this.good(name)) return null
+    const index = this.array(name).findIndex((x) => !(Math.abs(x) < LARGEST))
+    return { time, kind: `bad${name}`, message: `${name}[${index}] is ${this.array(name)[index]}`, fatal: true }
+  }
+
+  good(name) {
+    const array = this.array(name)
+    for (let i = 0; i < array.length; i++) if (!(Math.abs(array[i]) < LARGEST)) return false
+    return true
+  }
+
+  array(name) {
+    const array = this.arrays[name]
+    if (array !== undefined && array.length > 0) return array
+    return (this.arrays[name] = this.data[name])
+  }
+}
+
+/** MuJoCo's text in the style of our own messages. */
+function sentence(text) {
+  return text.trim().replace(/\.$/, '').replace(/^[A-Z](?=[a-z])/, (letter) => letter.toLowerCase())
+}

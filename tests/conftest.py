@@ -1,0 +1,28 @@
+"""Options and folders for all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--rewrite-fixtures",
+        action="store_true",
+        help="write what is expected anew instead of comparing with it; review the difference",
+    )
+
+
+@pytest.fixture(scope="session")
+def font_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for `.coursebuild/fonts` of scratch courses, so that a font is cut once a session.
+
+    Worker processes share it: an entry is named by what it is made from, and is whole or not there.
+    """
+    base = tmp_path_factory.getbasetemp()
+    store = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "fonts"
+    store.mkdir(exist_ok=True)
+    return store

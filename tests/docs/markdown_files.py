@@ -1,0 +1,84 @@
+"""Reading the documents of the repository: fences with their info strings, and links.
+
+Entry points: `fences(path)`, `code_spans(path)`, `links(path)`, `write_files(root, fences)`.
+markdown-it reads them, with none of coursebuild's rules, so that the tests do not lean on what they
+test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """A code fence."""
+
+    line: int
+    """Of its first line, from 1."""
+    kind: str
+    words: tuple[str, ...]
+    """Of the info string, after the kind."""
+    text: str
+
+    def __str__(self) -> str:
+        return f"line {self.line}"
+
+    def is_(self, flag: str) -> bool:
+        """Whether the info string has a word."""
+        return flag in self.words
+
+    def value(self, key: str) -> str | None:
+        """The value of `key=value` in the info string."""
+        values = (word.partition("=")[2] for word in self.words if word.startswith(f"{key}="))
+        return next(values, None)
+
+
+def _tokens(path: Path) -> list[Token]:
+    return MarkdownIt("commonmark").enable("table").parse(path.read_text(encoding="utf-8"))
+
+
+def fences(path: Path) -> list[Fence]:
+    """The fences of a document, in order."""
+    found = []
+    for token in _tokens(path):
+        if token.type == "fence" and token.map is not None:
+            kind, *words = token.info.split() or [""]
+            found.append(Fence(token.map[0] + 1, kind, tuple(words), token.content))
+    return found
+
+
+def code_spans(path: Path) -> list[str]:
+    """What stands between backticks in the prose of a document."""
+    inlines = (child for token in _tokens(path) for child in token.children or ())
+    return [child.content for child in inlines if child.type == "code_inline"]
+
+
+def links(path: Path) -> Iterator[str]:
+    """The destinations of a document's links and images, in order."""
+    for token in _tokens(path):
+        for child in token.children or ():
+            if child.type == "link_open":
+                yield str(child.attrs["href"])
+            elif child.type == "image":
+                yield str(child.attrs["src"])
+
+
+def write_files(root: Path, found: Iterable[Fence]) -> None:
+    """Write each fence that has `file=` to that path below a folder."""
+    for fence in found:
+        path = fence.value("file")
+        if path is not None:
+            target = root / path
+            assert target.resolve().is_relative_to(root.resolve()), path
+            assert not target.exists(), f"{path} is given twice"
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(fence.text, encoding="utf-8")

@@ -1,0 +1,258 @@
+"""What docs/authoring.md says is tried: its examples are built, its tables are held to the code.
+
+An example is a fence whose info string says what it is:
+
+- `file=PATH`: a file of the small course that all other examples live in.
+- `map`: another map for that course, which must then be clean.
+- `lesson`: a lesson 1.2 for that course. It must be clean, or with `error=RULE` have mistakes of
+  this one rule.
+- `prints`: what `check` says about the example above it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from markdown_files import DOCS, Fence, code_spans, fences, write_files
+
+from coursebuild.cli import main
+from coursebuild.rules import RULES
+from coursebuild.syntax.schemas import SchemaName, json_schema
+from coursebuild.vocabulary import CALLOUTS
+
+GUIDE = DOCS / "authoring.md"
+FENCES = fences(GUIDE)
+CODE = [*code_spans(GUIDE), *(fence.text for fence in FENCES)]
+LESSONS = [fence for fence in FENCES if fence.is_("lesson")]
+MAPS = [fence for fence in FENCES if fence.is_("map")]
+MESSAGES = [(a, b) for a, b in pairwise(FENCES) if b.is_("prints")]
+"""Each message on the page, after the example that it stands below."""
+SECOND = "content/lessons/1.2-large-swings.md"
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    """The course that the guide begins with, and the two files that one example shows."""
+    write_files(tmp_path, FENCES)
+    (tmp_path / "content/lessons/sketch.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40"><path d="M0 0V40"/></svg>'
+    )
+    (tmp_path / "content/measurements.csv").write_text("length,period\n0.5,1.419\n")
+    return tmp_path
+
+
+def with_second_lesson(course: Path, text: str) -> None:
+    """Puts a lesson into the place of the planned one."""
+    map_file = course / "content/course.toml"
+    planned, written = 'status = "planned"', 'status = "complete"'
+    assert map_file.read_text().count(planned) == 1
+    map_file.write_text(map_file.read_text().replace(planned, written))
+    (course / SECOND).write_text(text, encoding="utf-8")
+
+
+def check(course: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    """The JSON report of `coursebuild check`."""
+    capsys.readouterr()
+    status = main(["-C", str(course), "check", "--quiet", "--format", "json"])
+    report: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert status == (0 if report["summary"]["ok"] else 1)
+    return report
+
+
+def test_the_small_course_builds(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["-C", str(course), "check"]) == 0
+    assert main(["-C", str(course), "build"]) == 0
+    page = (course / "public/lessons/1.1-pendulum.html").read_text(encoding="utf-8")
+    assert "measured      1.422 s" in page
+
+
+def test_an_empty_recorded_output_is_filled_in(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lesson = course / "content/lessons/1.1-pendulum.md"
+    whole = lesson.read_text(encoding="utf-8")
+    emptied = re.sub(r"(?<=Output:\n\n```text\n)[^`]+(?=```)", "", whole)
+    assert emptied != whole
+    lesson.write_text(emptied, encoding="utf-8")
+    assert main(["-C", str(course), "update"]) == 0
+    assert lesson.read_text(encoding="utf-8") == whole
+
+
+@pytest.mark.parametrize("fence", MAPS, ids=str)
+def test_map(fence: Fence, course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (course / "content/course.toml").write_text(fence.text, encoding="utf-8")
+    assert check(course, capsys)["diagnostics"] == []
+
+
+@pytest.mark.parametrize(("lesson", "message"), MESSAGES, ids=str)
+def test_mistake(
+    lesson: Fence, message: Fence, course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with_second_lesson(course, lesson.text)
+    assert main(["-C", str(course), "check", "--quiet"]) == 1
+    told = capsys.readouterr().out
+    wanted = message.text.rstrip().splitlines()
+    assert told.splitlines()[: len(wanted)] == wanted
+    assert re.findall(r"^(?:error|warning)\[(.*)\]: ", told, re.MULTILINE) == [
+        lesson.value("error")
+    ]
+
+
+def test_every_mistake_on_the_page_has_its_message() -> None:
+    assert [lesson for lesson, _ in MESSAGES] == [x for x in LESSONS if x.value("error")]
+
+
+def test_every_right_example_builds(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Together, as lessons 1.2, 1.3 and so on of one course: not even a warning is given."""
+    right = [fence for fence in LESSONS if not fence.value("error")]
+    entries = []
+    for number, fence in enumerate(right, start=2):
+        slug = "large-swings" if number == 2 else f"example-of-line-{fence.line}"
+        entries.append(
+            f'[[level.lesson]]\nid = "1.{number}"\nslug = "{slug}"\n'
+            'title = "An example"\nstatus = "draft"\n'
+        )
+        (course / f"content/lessons/1.{number}-{slug}.md").write_text(fence.text, encoding="utf-8")
+    map_file = course / "content/course.toml"
+    before, planned, after = map_file.read_text().partition('[[level.lesson]]\nid = "1.2"')
+    assert planned
+    map_file.write_text(before + "\n".join(entries) + after[after.index("[[page]]") :])
+    assert main(["-C", str(course), "build"]) == 0, capsys.readouterr().out
+    assert "warning" not in capsys.readouterr().out
+    assert len(list((course / "public/lessons").glob("1.*.html"))) == len(right) + 1
+
+
+def test_what_is_said_about_drifts(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`update` mends the drift on the page, and leaves the bound number to the author."""
+    (lesson,) = (fence for fence in LESSONS if fence.value("error") == "output-drift")
+    with_second_lesson(course, lesson.text)
+    main(["-C", str(course), "update", "--dry-run", "1.2"])
+    assert (course / SECOND).read_text(encoding="utf-8") == lesson.text
+    assert main(["-C", str(course), "update", "1.2"]) == 1
+    assert "binding-mismatch" in capsys.readouterr().out
+    mended = lesson.text.replace("period 1.4291", "period 1.4219")
+    assert (course / SECOND).read_text(encoding="utf-8") == mended
+
+
+def test_an_edited_example_comes_back_into_its_lesson(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["-C", str(course), "extract"]) == 0
+    script = course / "examples/pendulum.py"
+    script.write_text(script.read_text().replace("import math\n", "import math  # edited\n"))
+    assert [d["rule"] for d in check(course, capsys)["diagnostics"]][:1] == ["example-edited"]
+    assert main(["-C", str(course), "extract", "--adopt"]) == 0
+    assert "import math  # edited\n" in (course / "content/lessons/1.1-pendulum.md").read_text()
+    assert check(course, capsys)["diagnostics"] == []
+
+
+@pytest.mark.parametrize(
+    ("status", "arguments"),
+    [
+        (0, ["check", "1.1"]),
+        (0, ["check", "pendulum"]),
+        (0, ["check", "content/lessons/1.1-pendulum.md"]),
+        (2, ["check", "1.3"]),
+        (2, ["build", "--out", "content"]),
+        (2, ["build", "--out", "mine"]),
+    ],
+    ids=str,
+)
+def test_exit_status(
+    status: int, arguments: list[str], course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (course / "mine").mkdir()
+    (course / "mine/thesis.txt").write_text("years of work")
+    assert main(["-C", str(course), *arguments]) == status
+
+
+def test_reports_for_machines(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with_second_lesson(course, "## One mistake\n\n[a](lesson:7.7)\n")
+    told = {}
+    for form in ("json", "junit", "sarif", "github"):
+        assert main(["-C", str(course), "check", "--quiet", "--format", form]) == 1
+        told[form] = capsys.readouterr().out
+    (found,) = json.loads(told["json"])["diagnostics"]
+    place = ("path", "line", "column", "end_line", "end_column")
+    assert {"rule", "severity", *place, "message", "label", "help", "notes"} <= found.keys()
+    assert (found["line"], found["column"]) == (3, 5)
+    cases = [case.get("name") for case in ElementTree.fromstring(told["junit"]).iter("testcase")]
+    assert cases == ["examples/pendulum.py", SECOND]
+    assert json.loads(told["sarif"])["version"] == "2.1.0"
+    assert told["github"].startswith(f"::error file={SECOND},line=3,")
+
+
+# ------------------------------------------------------------------------ nothing is left out
+
+
+def quoted(name: str) -> bool:
+    """Whether the page names something in code: in a fence, or in a span."""
+    word = re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
+    return any(word.search(code) for code in CODE)
+
+
+def fields(schema: object) -> Iterator[str]:
+    """Every name of a field in a schema."""
+    if isinstance(schema, dict):
+        yield from schema.get("properties", {})
+        for part in schema.values():
+            yield from fields(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from fields(part)
+
+
+@pytest.mark.parametrize("name", ["course", "lab", "quiz"])
+def test_every_field_is_named(name: SchemaName) -> None:
+    missing = {field for field in fields(json.loads(json_schema(name))) if not quoted(field)}
+    assert missing == set()
+
+
+def test_every_callout_kind_is_named() -> None:
+    assert [kind.name for kind in CALLOUTS if not quoted(kind.name)] == []
+
+
+@pytest.mark.parametrize("kind", ["python", "text", "io", "mjcf", "quiz", "lab"])
+def test_every_key_of_a_fence_is_named(
+    kind: str, course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The tool itself lists the keys of a kind, when it is given one that is far from all."""
+    body = {"io": "INPUT: a\nPROCESS: b\nOUTPUT: c", "quiz": "{}", "lab": "{}"}.get(kind, "")
+    with_second_lesson(course, f"## A\n\n```{kind} zzzzzzzz=1\n{body}\n```\n")
+    found = check(course, capsys)["diagnostics"]
+    (wrong,) = (d for d in found if d["rule"] == "fence-key-unknown")
+    keys = re.findall(r"`([^`]+)`", wrong["help"] or "")
+    assert keys or "takes no keys" in wrong["message"]
+    assert [key for key in keys if not quoted(key)] == []
+
+
+def test_every_rule_on_the_page_exists() -> None:
+    first_words = {name.split("-")[0] for name in RULES}
+    names = {code for code in code_spans(GUIDE) if re.fullmatch(r"[a-z]+(-[a-z]+)+", code)}
+    rules = {name for name in names if name.split("-")[0] in first_words}
+    assert len(rules) > 10
+    assert sorted(rules - RULES.keys()) == []
+
+
+COMMANDS = ["build", "check", "update", "extract", "serve", "schema"]
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_every_command_and_option_is_named(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main([command, "--help"] if command else ["--help"])
+    assert left.value.code == 0
+    told = capsys.readouterr().out
+    if not command:
+        assert re.findall(r"^    (\w+) ", told, re.MULTILINE) == COMMANDS
+    options = set(re.findall(r"(?<![\w-])--[a-z-]+", told))
+    assert [option for option in sorted(options) if not quoted(option)] == []

@@ -1,0 +1,203 @@
+"""The README and the pages in docs/: commands exist, the README's course builds, links lead."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from markdown_files import DOCS, ROOT, code_spans, fences, links, write_files
+
+from coursebuild.cli import main
+from coursebuild.pipeline.load import load
+
+README = ROOT / "README.md"
+FENCES = fences(README)
+LESSON = "content/lessons/1.1-free-fall.md"
+PICTURE_LIMIT = 300_000  # bytes
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    """The course of one's own that the README shows."""
+    write_files(tmp_path, FENCES)
+    return tmp_path
+
+
+def coursebuild(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs the tool in a folder, as the README says."""
+    command = [sys.executable, "-m", "coursebuild", *arguments]
+    return subprocess.run(
+        command, cwd=folder, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+
+
+# ------------------------------------------------------------------------------------- README
+
+
+def test_the_course_of_the_readme_is_two_files(course: Path) -> None:
+    files = sorted(p.relative_to(course).as_posix() for p in course.rglob("*") if p.is_file())
+    assert files == ["content/course.toml", LESSON]
+
+
+def test_the_course_of_the_readme_builds_by_its_commands(course: Path) -> None:
+    for command in ("update", "check", "build"):
+        done = coursebuild(course, command)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert "every recorded output is up to date" in coursebuild(course, "update").stdout
+    page = (course / "public/lessons/1.1-free-fall.html").read_text(encoding="utf-8")
+    assert "after 1.000 s the ball has fallen 4.9148 m" in page
+
+
+def test_update_fills_the_empty_fence(course: Path) -> None:
+    whole = (course / LESSON).read_text(encoding="utf-8")
+    printed = re.search(r"(?<=```text digits\n).*\n(?=```)", whole)
+    assert printed is not None
+    (course / LESSON).write_text(whole.replace(printed[0], ""), encoding="utf-8")
+    assert coursebuild(course, "update").returncode == 0
+    assert (course / LESSON).read_text(encoding="utf-8") == whole
+
+
+def test_the_mistake_of_the_readme(course: Path) -> None:
+    """`drift=` says which digits somebody put in the place of the printed ones."""
+    (message,) = (fence for fence in FENCES if fence.value("drift"))
+    lesson = (course / LESSON).read_text(encoding="utf-8")
+    assert lesson.count("4.9148") == 1
+    changed = lesson.replace("4.9148", message.value("drift") or "")
+    (course / LESSON).write_text(changed, encoding="utf-8")
+    done = coursebuild(course, "check")
+    assert done.returncode == 1
+    wanted = message.text.rstrip().splitlines()
+    assert done.stdout.splitlines()[: len(wanted)] == wanted
+    assert "error[binding-mismatch]" in done.stdout  # the last sentence is checked as well
+
+
+def shell_lines(path: Path) -> list[str]:
+    """The commands in a document: lines of its `sh` fences, and code in its prose."""
+    blocks = [line for f in fences(path) if f.kind == "sh" for line in f.text.splitlines()]
+    return [line.partition("#")[0].split(">")[0].strip() for line in blocks] + code_spans(path)
+
+
+def test_every_make_target_exists() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    said = [line.split()[1] for line in shell_lines(README) if re.match(r"make \w", line)]
+    assert {"site", "test", "serve", "help"} <= set(said)
+    assert [t for t in said if not re.search(rf"^{re.escape(t)}:", makefile, re.MULTILINE)] == []
+
+
+@pytest.mark.parametrize("path", [README, DOCS / "authoring.md"], ids=lambda path: path.name)
+def test_every_command_exists(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = set()
+    for line in shell_lines(path):
+        called = re.match(r"coursebuild (?:-C \S+ )?([a-z]+)", line)
+        if called is not None:
+            said.add((called[1], *re.findall(r"--[a-z-]+", line)))
+    assert {command for command, *_ in said} >= {"build", "check", "update", "extract", "schema"}
+    for command, *options in sorted(said):
+        with pytest.raises(SystemExit) as left:
+            main([command, "--help"])
+        assert left.value.code == 0
+        told = capsys.readouterr().out
+        assert [option for option in options if option not in told] == []
+
+
+# -------------------------------------------------------------------------------------- links
+
+
+@pytest.mark.parametrize("path", [README, ROOT / "benchmarks/README.md"], ids=str)
+def test_links_of_files_that_are_no_pages(path: Path) -> None:
+    for url in links(path):
+        if not re.match(r"https?://", url):
+            target, _, anchor = unquote(url).partition("#")
+            assert not anchor, "headings have no anchors outside of a built page"
+            assert (path.parent / target).is_file(), url
+
+
+def test_every_document_is_a_page_without_mistakes() -> None:
+    """As pages, their links, anchors and all else are checked by the tool itself."""
+    loaded = load(ROOT)
+    assert loaded.course is not None
+    pages = {page.path for page in loaded.course.pages}
+    documents = {path.relative_to(ROOT).as_posix() for path in DOCS.glob("*.md")}
+    assert documents - pages == set()
+    assert [d for d in loaded.diagnostics if d.span.path in documents] == []
+
+
+def test_the_picture_is_there_and_small() -> None:
+    (picture,) = (ROOT / url for url in links(README) if url.endswith(".png"))
+    data = picture.read_bytes()
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    assert 20_000 < len(data) < PICTURE_LIMIT
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+def test_the_picture_can_be_taken_again(tmp_path: Path) -> None:
+    course = tmp_path / "course"
+    for folder in ("content", "models", "docs"):
+        shutil.copytree(ROOT / folder, course / folder)
+    assert main(["-C", str(course), "build", "--quiet"]) == 0
+    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(course / "public")]
+    done = subprocess.run(
+        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    taken = {path.name for path in tmp_path.glob("*.png")}
+    assert taken == {path.name for path in (DOCS / "images").glob("*.png")}
+
+
+def test_a_picture_of_a_site_that_is_not_there(tmp_path: Path) -> None:
+    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(tmp_path)]
+    done = subprocess.run(
+        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 1
+    assert "run `make site` first" in done.stderr
+
+
+# ------------------------------------------------------------------------------- architecture
+
+
+def rows(path: Path) -> list[list[str]]:
+    """The cells of the first table of a document."""
+    lines = path.read_text(encoding="utf-8").split("\n\n")
+    table = next(block for block in lines if block.startswith("| "))
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
+
+
+def test_the_folders_are_those_of_the_architecture() -> None:
+    package = ROOT / "coursebuild"
+    parts = {
+        path.name + "/" * path.is_dir()
+        for path in package.iterdir()
+        if (path.suffix == ".py" and not path.name.startswith("__"))
+        or (path / "__init__.py").is_file()
+    }
+    listed: set[str] = set()
+    for where, _, entry_points in rows(DOCS / "architecture.md"):
+        names = [name.removeprefix("coursebuild/") for name in re.findall(r"`([^`]+)`", where)]
+        for name in names:
+            place = package / name if name in parts else ROOT / name
+            assert place.exists(), name
+        listed.update(names)
+        found = {name for part in names if part in parts for name in defined(package / part)}
+        if found:
+            assert set(re.findall(r"`([^`]+)`", entry_points)) <= found, where
+    assert parts <= listed
+
+
+def defined(place: Path) -> set[str]:
+    """The names of top-level functions, classes and constants in a module or a package."""
+    found: set[str] = set()
+    for path in [place] if place.is_file() else place.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found.add(node.name)
+            elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                found.add(node.target.id)
+    return found

@@ -1,0 +1,140 @@
+"""One writer at a time, and no lock outlives its holder."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects import locks
+from coursebuild.effects.locks import is_abandoned, project_lock
+
+ROOT = Path(locks.__file__).parents[2]
+HOLD = """
+import sys, time
+from pathlib import Path
+from coursebuild.effects.locks import project_lock
+with project_lock(Path(sys.argv[1]), lambda said: print(said, flush=True)):
+    print("held", flush=True)
+    time.sleep(float(sys.argv[2]))
+print("done", flush=True)
+"""
+
+
+def holder(root: Path, seconds: float) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(root), str(seconds)],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+
+
+def line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+def test_free_lock_says_nothing(tmp_path: Path) -> None:
+    with project_lock(tmp_path, pytest.fail):
+        pass
+    with project_lock(tmp_path, pytest.fail):
+        pass
+    assert (tmp_path / ".coursebuild/.gitignore").read_bytes() == b"*\n"
+
+
+def test_second_run_says_so_and_waits(tmp_path: Path) -> None:
+    with holder(tmp_path, 60) as first:
+        assert line(first) == "held"
+        with holder(tmp_path, 0) as second:
+            who = f"another coursebuild (process {first.pid})"
+            assert line(second) == f"{who} is at work on this course; waiting for it"
+            time.sleep(0.1)
+            assert second.poll() is None
+            first.send_signal(signal.SIGKILL)  # a lock dies with its holder
+            assert line(second) == "held"
+            assert line(second) == "done"
+
+
+def test_lock_file_deleted_while_waiting(tmp_path: Path) -> None:
+    with holder(tmp_path, 60) as first:
+        assert line(first) == "held"
+        with holder(tmp_path, 0) as second:
+            assert "waiting" in line(second)
+            (tmp_path / ".coursebuild/lock").unlink()
+            (tmp_path / ".coursebuild/.gitignore").unlink()
+            (tmp_path / ".coursebuild").rmdir()
+            first.kill()
+            assert line(second) == "held"
+            assert (tmp_path / ".coursebuild/lock").read_text() == f"{second.pid}\n"
+
+
+def test_a_thread_does_not_wait_for_itself(tmp_path: Path) -> None:
+    with project_lock(tmp_path), pytest.raises(RuntimeError), project_lock(tmp_path):
+        pass
+
+
+def test_another_thread_waits(tmp_path: Path) -> None:
+    order: list[str] = []
+
+    def work() -> None:
+        with project_lock(tmp_path, lambda said: order.append("waits")):
+            order.append("second")
+
+    with project_lock(tmp_path):
+        thread = threading.Thread(target=work)
+        thread.start()
+        while "waits" not in order:
+            time.sleep(0.001)
+        order.append("first")
+    thread.join(10)
+    assert order == ["waits", "first", "second"]
+
+
+def test_freed_by_an_exception(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), project_lock(tmp_path):
+        raise KeyboardInterrupt
+    with project_lock(tmp_path, pytest.fail):
+        pass
+
+
+def test_where_nothing_can_be_written_the_work_goes_on(tmp_path: Path) -> None:
+    (tmp_path / ".coursebuild").touch()  # in the way
+    with project_lock(tmp_path, pytest.fail):
+        pass
+
+
+def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(fd: int, how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(locks.fcntl, "flock", refuse)
+    with project_lock(tmp_path, pytest.fail), project_lock(tmp_path / ".coursebuild", pytest.fail):
+        pass
+    path = tmp_path / "temporary"
+    path.touch()
+    fd = os.open(path, os.O_RDONLY)
+    try:
+        assert not is_abandoned(fd)
+        os.utime(path, (0, 0))
+        assert is_abandoned(fd)
+    finally:
+        os.close(fd)
+
+
+def test_children_do_not_inherit_it(tmp_path: Path) -> None:
+    with project_lock(tmp_path):
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    try:
+        with project_lock(tmp_path, pytest.fail):
+            pass
+    finally:
+        child.kill()
+        child.wait()

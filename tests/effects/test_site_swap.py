@@ -1,0 +1,359 @@
+"""Publishing: the whole site or the old one, and never over what is not ours."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects import locks, site_swap
+from coursebuild.effects.errors import EffectError, PublishRefusedError
+from coursebuild.effects.exchange import exchange
+from coursebuild.effects.site_swap import MARKER, check_out, publish, recover
+from coursebuild.results import OutputFile
+
+
+def site(text: str, *more: str) -> list[OutputFile]:
+    paths = ("index.html", "404.html", "lessons/4.2/index.html", "assets/fonts/a b é.woff2", *more)
+    return [OutputFile(path, f"{text} {path}".encode()) for path in paths]
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {
+        p.relative_to(folder).as_posix(): p.read_bytes()
+        for p in folder.rglob("*")
+        if p.is_file() and p.name != MARKER
+    }
+
+
+def as_tree(files: list[OutputFile]) -> dict[str, bytes]:
+    return {f.path: f.data for f in files}
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    root = tmp_path / "course"
+    (root / "content/lessons").mkdir(parents=True)
+    (root / "content/course.toml").write_text("[course]\n")
+    (root / "models").mkdir()
+    return root
+
+
+@pytest.fixture(params=[True, False], ids=["exchange", "two renames"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[bool]:
+    if not request.param:
+        monkeypatch.setattr(site_swap, "exchange", lambda a, b: False)
+    yield request.param
+
+
+def test_this_system_exchanges_in_one_step(tmp_path: Path) -> None:
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / name).touch()
+    assert exchange(tmp_path / "a", tmp_path / "b")
+    assert (tmp_path / "a/b").exists() and (tmp_path / "b/a").exists()
+    with pytest.raises(FileNotFoundError):
+        exchange(tmp_path / "a", tmp_path / "none")
+
+
+@pytest.mark.usefixtures("way")
+class TestPublish:
+    def test_first_and_again(self, root: Path) -> None:
+        out = root / "public"
+        for text in ("one", "two", "two", "three"):
+            publish(root, out, site(text))
+            assert tree(out) == as_tree(site(text))
+            assert sorted(p.name for p in root.iterdir()) == ["content", "models", "public"]
+
+    def test_files_of_the_old_site_go(self, root: Path) -> None:
+        publish(root, root / "public", site("one", "removed/lesson/index.html"))
+        publish(root, root / "public", site("two"))
+        assert tree(root / "public") == as_tree(site("two"))
+        assert not (root / "public/removed").exists()
+
+    def test_same_bytes_whatever_the_umask(self, root: Path) -> None:
+        old = os.umask(0o077)
+        try:
+            publish(root, root / "public", site("one"))
+        finally:
+            os.umask(old)
+        modes = {
+            p.relative_to(root).as_posix(): stat.S_IMODE(p.stat().st_mode)
+            for p in (root / "public", *(root / "public").rglob("*"))
+        }
+        assert set(modes.values()) == {0o755, 0o644}
+        assert all((mode == 0o755) == (root / path).is_dir() for path, mode in modes.items())
+        publish(root, root / "again", site("one"))
+        assert (root / "again" / MARKER).read_bytes() == (root / "public" / MARKER).read_bytes()
+
+    def test_permissions_of_the_folder_stay(self, root: Path) -> None:
+        (root / "public").mkdir()
+        (root / "public").chmod(0o2775)
+        for _ in range(2):
+            publish(root, root / "public", site("one"))
+            assert stat.S_IMODE((root / "public").stat().st_mode) == 0o2775
+
+    def test_a_link_to_a_folder_stays(self, root: Path, tmp_path: Path) -> None:
+        (tmp_path / "www").mkdir()
+        (root / "public").symlink_to(tmp_path / "www")
+        for text in ("one", "two"):
+            publish(root, root / "public", site(text))
+            assert (root / "public").is_symlink()
+            assert tree(tmp_path / "www") == as_tree(site(text))
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["course", "www"]
+
+    def test_folders_above_are_made(self, root: Path, tmp_path: Path) -> None:
+        publish(root, tmp_path / "a/b/c", site("one"))
+        assert tree(tmp_path / "a/b/c") == as_tree(site("one"))
+
+    def test_relative_place(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(root)
+        publish(root, Path("public"), site("one"))
+        assert tree(root / "public") == as_tree(site("one"))
+
+    def test_file_managers_may_look(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        (root / "public/.DS_Store").touch()
+        (root / "public/empty").mkdir()
+        publish(root, root / "public", site("two"))
+        assert tree(root / "public") == as_tree(site("two"))
+
+    def test_an_empty_site_is_a_site(self, root: Path) -> None:
+        for _ in range(2):
+            publish(root, root / "public", [])
+            assert tree(root / "public") == {}
+
+    @pytest.mark.parametrize("call", ["write", "mkdir", "fchmod"])
+    def test_full_disk(self, root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
+        publish(root, root / "public", site("one"))
+        really = getattr(os, call)
+        calls = 0
+
+        def fail(*arguments: object) -> object:
+            nonlocal calls
+            calls += 1
+            if calls > 2:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return really(*arguments)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, call, fail)
+            with pytest.raises(EffectError, match="no space left on device"):
+                publish(root, root / "public", site("two"))
+        assert tree(root / "public") == as_tree(site("one"))
+        assert sorted(p.name for p in root.iterdir()) == ["content", "models", "public"]
+
+    def test_failure_while_the_site_is_made(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+
+        def broken() -> Iterator[OutputFile]:
+            yield from site("two")
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            publish(root, root / "public", broken())
+        assert tree(root / "public") == as_tree(site("one"))
+        assert sorted(p.name for p in root.iterdir()) == ["content", "models", "public"]
+
+    def test_what_killed_builds_left_goes(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        for name in (".public.new-0123abcd", ".public.old-0123abcd"):
+            (root / name / "x").mkdir(parents=True)
+            (root / name / "x/y").touch()
+        (root / ".public.new-notours-at-all").mkdir()
+        (root / ".public.new-12345678").write_text("a file")
+        publish(root, root / "public", site("two"))
+        assert sorted(p.name for p in root.iterdir()) == [
+            ".public.new-12345678",
+            ".public.new-notours-at-all",
+            "content",
+            "models",
+            "public",
+        ]
+
+    def test_what_a_running_build_writes_stays(self, root: Path) -> None:
+        running = site_swap._Staging.make(root / "public")
+        try:
+            publish(root, root / "public", site("one"))
+            assert running.path.is_dir()
+        finally:
+            os.close(running.fd)
+        publish(root, root / "public", site("two"))
+        assert not running.path.exists()
+
+    @pytest.mark.parametrize(
+        "path",
+        ["", "/a", "../a", "a/../b", "a//b", "./a", "a/", "a\\b", "a\nb", "a\0b", MARKER],
+    )
+    def test_paths_that_no_site_has(self, root: Path, path: str) -> None:
+        publish(root, root / "public", site("one"))
+        with pytest.raises(ValueError, match="is no path that a site may have"):
+            publish(root, root / "public", [OutputFile("a.html", b""), OutputFile(path, b"")])
+        assert tree(root / "public") == as_tree(site("one"))
+
+    @pytest.mark.parametrize("paths", [("a", "a"), ("a", "a/b"), ("a/b", "a")])
+    def test_files_in_each_others_way(self, root: Path, paths: tuple[str, str]) -> None:
+        with pytest.raises((ValueError, EffectError)):
+            publish(root, root / "public", [OutputFile(p, b"") for p in paths])
+        assert sorted(p.name for p in root.iterdir()) == ["content", "models"]
+
+    def test_every_instant_has_a_whole_site(self, root: Path, way: bool) -> None:
+        """Somebody reads the page all the time while it is published over and over."""
+        out = root / "public"
+        publish(root, out, site("0"))
+        stop = threading.Event()
+        seen: set[bytes | None] = set()
+
+        def read() -> None:
+            while not stop.is_set():
+                try:
+                    seen.add((out / "index.html").read_bytes())
+                except FileNotFoundError:
+                    seen.add(None)
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        for i in range(60):
+            publish(root, out, site(str(i % 7)))
+        stop.set()
+        reader.join()
+        allowed: set[bytes | None] = {f"{i} index.html".encode() for i in range(7)}
+        # Without an exchange there is an instant between two renames, and nothing can be done.
+        assert seen <= (allowed if way else allowed | {None})
+        assert len(seen) > 1
+
+
+class TestRefusal:
+    def refused(self, root: Path, out: Path) -> str:
+        before = tree(root.parent)
+        with pytest.raises(PublishRefusedError) as caught:
+            publish(root, out, site("one"))
+        assert tree(root.parent) == before
+        return caught.value.message
+
+    @pytest.mark.parametrize(
+        ("out", "why"),
+        [
+            (".", "is the project itself"),
+            ("..", "holds the project"),
+            ("../..", "holds the project"),
+            ("/", "holds the project"),
+            ("content", "lies in content/ of the project, where no site may go"),
+            ("content/lessons/out", "lies in content/ of the project, where no site may go"),
+            ("models/x", "lies in models/ of the project, where no site may go"),
+            ("examples", "lies in examples/ of the project, where no site may go"),
+            (".git/x", "lies in .git/ of the project, where no site may go"),
+            (".coursebuild/x", "lies in .coursebuild/ of the project, where no site may go"),
+            ("public/../models", "lies in models/ of the project, where no site may go"),
+            ("content/course.toml", "lies in content/ of the project, where no site may go"),
+        ],
+    )
+    def test_places_of_the_author(self, root: Path, out: str, why: str) -> None:
+        assert self.refused(root, root / out) == f"{root / out} {why}"
+
+    def test_a_link_to_such_a_place(self, root: Path) -> None:
+        (root / "public").symlink_to("content")
+        assert "lies in content/" in self.refused(root, root / "public")
+
+    def test_a_file(self, root: Path) -> None:
+        (root / "public").write_text("mine")
+        assert self.refused(root, root / "public") == f"{root / 'public'} is not a folder"
+
+    def test_somebodys_folder(self, root: Path, tmp_path: Path) -> None:
+        for i in range(5):
+            (tmp_path / "home" / str(i)).mkdir(parents=True)
+            (tmp_path / "home" / str(i) / "thesis.tex").write_text("mine")
+        assert self.refused(root, tmp_path / "home").endswith(
+            "holds files that coursebuild did not put there: "
+            "0/thesis.tex, 1/thesis.tex, 2/thesis.tex and 2 more"
+        )
+
+    def test_a_site_with_somebodys_file(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        (root / "public/lessons/CNAME").write_text("mine")
+        assert self.refused(root, root / "public").endswith("put there: lessons/CNAME")
+        assert tree(root / "public") == as_tree(site("one")) | {"lessons/CNAME": b"mine"}
+
+    @pytest.mark.parametrize("marker", [b"", b"something else\nindex.html\n", b"\xff"])
+    def test_a_folder_that_only_looks_like_a_site(self, root: Path, marker: bytes) -> None:
+        (root / "public").mkdir()
+        (root / "public/index.html").write_text("mine")
+        (root / "public" / MARKER).write_bytes(marker)
+        assert "did not put there" in self.refused(root, root / "public")
+
+    def test_a_mount_point(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        (root / "public").mkdir()
+        monkeypatch.setattr(Path, "is_mount", lambda path: path.name == "public")
+        assert "is a mount point" in self.refused(root, root / "public")
+
+    def test_said_before_the_work(self, root: Path) -> None:
+        assert check_out(root, root / "public") == root / "public"
+        with pytest.raises(PublishRefusedError):
+            check_out(root, root)
+
+
+class TestRecover:
+    def test_nothing_to_do(self, root: Path) -> None:
+        recover(root / "public")
+        publish(root, root / "public", site("one"))
+        (root / ".public.old-0123abcd").mkdir()
+        recover(root / "public")
+        assert tree(root / "public") == as_tree(site("one"))
+
+    def test_killed_between_two_renames(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        (root / "public").rename(root / ".public.old-0123abcd")
+        (root / ".public.old-ffffffff").mkdir()  # half removed
+        recover(root / "public")
+        assert tree(root / "public") == as_tree(site("one"))
+
+    def test_not_while_another_build_is_between_them(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        running = site_swap._Staging.make(root / "public")
+        (root / "public").rename(root / ".public.old-0123abcd")
+        recover(root / "public")
+        assert not (root / "public").exists()
+        os.close(running.fd)
+        recover(root / "public")
+        assert (root / "public").exists()
+
+
+BUILD = """
+import sys
+from pathlib import Path
+from coursebuild.effects import site_swap
+from coursebuild.results import OutputFile
+root, name, way = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
+if way == "renames":
+    site_swap.exchange = lambda a, b: False
+for i in range(40):
+    files = [OutputFile(f"{name}{k}/index.html", name.encode()) for k in range(20)]
+    site_swap.publish(root, root / "public", files)
+"""
+
+
+@pytest.mark.parametrize("way", ["exchange", "renames"])
+def test_two_builds_at_once(root: Path, way: str) -> None:
+    builds = [
+        subprocess.Popen(
+            [sys.executable, "-c", BUILD, str(root), name, way],
+            cwd=Path(locks.__file__).parents[2],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for name in ("a", "b")
+    ]
+    for build in builds:
+        _, errors = build.communicate(timeout=60)
+        assert build.returncode == 0, errors
+    assert len(set(tree(root / "public").values())) == 1
+    assert len(tree(root / "public")) == 20
+    publish(root, root / "public", site("one"))
+    assert sorted(p.name for p in root.iterdir()) == ["content", "models", "public"]

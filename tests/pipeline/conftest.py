@@ -1,0 +1,25 @@
+"""Scratch courses for the tests of the commands."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the kit
+
+from coursekit import Folder
+
+
+@pytest.fixture
+def make(tmp_path: Path, font_store: Path) -> Callable[..., Folder]:
+    """Makes a course of these lessons, in a folder with no simple name."""
+
+    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
+        folder = Folder(tmp_path / name)
+        folder.fill(lessons, font_store)
+        return folder
+
+    return make

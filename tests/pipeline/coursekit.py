@@ -1,0 +1,217 @@
+"""Scratch courses: making them, running commands on them, looking at what became of them."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from coursebuild.cli import main
+
+ROOT = Path(__file__).parents[2]
+SLUGS = ("one", "two", "three", "four", "five", "six")
+HELLO = 'print("hello", 3.14159)\n'
+
+
+def block(path: str, code: str, output: str | None = None, how: str = "", info: str = "") -> str:
+    """A script of a lesson and, with an output, what it prints."""
+    text = f"```python file=examples/{path}{info and ' '}{info}\n{code.rstrip()}\n```\n\n"
+    if output is not None:
+        text += f"Output:\n\n```text{how and ' '}{how}\n{output.rstrip()}\n```\n\n"
+    return text
+
+
+GOOD = "## Hello\n\n" + block("hello.py", HELLO, "hello 3.14159")
+"""A lesson in which everything holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What a command did."""
+
+    status: int
+    out: str
+    err: str
+
+
+@dataclass(frozen=True, slots=True)
+class Folder:
+    """A scratch course."""
+
+    root: Path
+
+    def fill(self, lessons: Sequence[str | bytes], fonts: Path) -> None:
+        """Write the map and the lessons 1.1, 1.2 and so on."""
+        self.write("content/course.toml", course_map(len(lessons)))
+        for number, text in enumerate(lessons, 1):
+            self.write(self.lesson(number), text)
+        (self.root / ".coursebuild").mkdir()
+        (self.root / ".coursebuild/fonts").symlink_to(fonts)
+        self.tmp.mkdir(exist_ok=True)
+
+    @property
+    def tmp(self) -> Path:
+        """Where the tool and all it starts put temporary files; by it they are found."""
+        return self.root.with_name(f"{self.root.name}.tmp")
+
+    def lesson(self, number: int = 1) -> str:
+        return f"content/lessons/1.{number}-{SLUGS[number - 1]}.md"
+
+    def write(self, path: str, data: str | bytes) -> None:
+        full = self.root / path
+        full.parent.mkdir(parents=True, exist_ok=True)
+        full.write_bytes(data.encode() if isinstance(data, str) else data)
+
+    def read(self, path: str) -> bytes:
+        return (self.root / path).read_bytes()
+
+    def text(self, path: str) -> str:
+        return self.read(path).decode()
+
+    def replace(self, path: str, old: str, new: str) -> None:
+        """An author's edit."""
+        text = self.text(path)
+        assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times in {path}"
+        self.write(path, text.replace(old, new))
+
+    def tree(self, top: str = ".") -> dict[str, bytes]:
+        """All files below a folder, but for caches, by path from there."""
+        base = self.root / top
+        return {
+            path.relative_to(base).as_posix(): path.read_bytes()
+            for path in sorted(base.rglob("*"))
+            if path.is_file() and ".coursebuild" not in path.relative_to(self.root).parts
+        }
+
+    def beside(self) -> list[str]:
+        """The names in the course's folder and in `content/lessons` and `examples`."""
+        return sorted(
+            path.relative_to(self.root).as_posix()
+            for top in (".", "content", "content/lessons", "examples")
+            if (self.root / top).is_dir()
+            for path in (self.root / top).iterdir()
+        )
+
+    # --- commands
+
+    def main(self, *arguments: str, cwd: Path | None = None) -> Done:
+        """Run a command in this process."""
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(cwd or self.root),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+        ):
+            try:
+                status = main(arguments)
+            except SystemExit as stop:  # argparse's way to say that it is over
+                assert isinstance(stop.code, int)
+                status = stop.code
+        return Done(status, out.getvalue(), err.getvalue())
+
+    def run(
+        self,
+        *arguments: str,
+        cwd: Path | None = None,
+        env: Mapping[str, str] | None = None,
+        seconds: float = 60.0,
+    ) -> Done:
+        """Run a command in a process of its own."""
+        done = subprocess.run(
+            command(*arguments),
+            cwd=cwd or self.root,
+            env=self.environment(env),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+        )
+        return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+    def start(
+        self, *arguments: str, env: Mapping[str, str] | None = None, **pipes: int
+    ) -> subprocess.Popen[bytes]:
+        """Begin a command, in a process group of its own."""
+        return subprocess.Popen(
+            command(*arguments),
+            cwd=self.root,
+            env=self.environment(env),
+            stdin=subprocess.DEVNULL,
+            preexec_fn=_as_from_a_shell,
+            **pipes,
+        )
+
+    def environment(self, more: Mapping[str, str] | None = None) -> dict[str, str]:
+        """Of a command: nothing of how the tests were started decides what it shows."""
+        unsaid = ("NO_COLOR", "FORCE_COLOR", "COLUMNS", "LINES", "TERM", "CI")
+        outer = {name: value for name, value in os.environ.items() if name not in unsaid}
+        ours = {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.tmp), "PYTHONWARNINGS": "error"}
+        return outer | ours | dict(more or {})
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "coursebuild", *arguments]
+
+
+def _as_from_a_shell() -> None:
+    os.setpgid(0, 0)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # ignored where the tests run in the background
+
+
+def course_map(lessons: int) -> str:
+    parts = ['[course]\ntitle = "Scratch"\n\n[[level]]\nid = "1"\ntitle = "Level"\n']
+    for number, slug in enumerate(SLUGS[:lessons], 1):
+        parts.append(
+            f'[[level.lesson]]\nid = "1.{number}"\nslug = "{slug}"\ntitle = "Lesson {slug}"\n'
+            'status = "complete"\n'
+        )
+    return "\n".join(parts)
+
+
+def processes(folder: Folder) -> list[str]:
+    """The command lines of live processes that work in a course or were started for it."""
+    marks = (os.fsencode(folder.root), os.fsencode(folder.tmp))
+    found = []
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdecimal() or int(entry.name) == os.getpid():
+            continue
+        with contextlib.suppress(OSError):
+            where = os.fsencode((entry / "cwd").readlink())
+            environment = (entry / "environ").read_bytes()
+            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
+            if state != "Z" and (where.startswith(marks) or any(m in environment for m in marks)):
+                found.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+    return found
+
+
+def wait_until_alone(folder: Folder, seconds: float = 10.0) -> None:
+    """Nothing of a course runs any more."""
+    until = time.monotonic() + seconds
+    while left := processes(folder):
+        assert time.monotonic() < until, f"still running: {left}"
+        time.sleep(0.02)
+
+
+@contextlib.contextmanager
+def ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that is gone afterwards, however the test ends."""
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+def without_seconds(text: str) -> str:
+    """A report with its times taken out."""
+    return re.sub(r"\d+\.\d\d s", "# s", text)

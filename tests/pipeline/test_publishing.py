@@ -1,0 +1,217 @@
+"""Drift is found at its place, nothing broken is published, and the old site stays."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from coursekit import GOOD, Folder, block
+
+Make = Callable[..., Folder]
+
+TABLE = """## Table
+
+```python file=examples/table.py
+for name, error in (("Euler", 1.25e-2), ("RK4", 3.5e-9)):
+    print(f"{name:8} {error:.2e}")
+```
+
+Output:
+
+| method | error |
+| --- | --- |
+| Euler | 1.25e-02 |
+| RK4 | 3.50e-09 |
+"""
+
+
+def drift_in(folder: Folder) -> tuple[int, int, str, str]:
+    """Line, column, rule and message of the only diagnostic."""
+    done = folder.main("check", "--format", "json")
+    assert done.status == 1
+    [found] = json.loads(done.out)["diagnostics"]
+    return found["line"], found["column"], found["rule"], found["message"]
+
+
+@pytest.mark.parametrize("how", ["exact", "digits", "rtol=1e-9", "ellipsis"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_one_digit_is_found_where_it_stands(make: Make, how: str, newline: str) -> None:
+    code = 'print("alpha", 1.25)\nprint("beta  2.50 and 3.75")'
+    lesson = "## One\n\n> " + block("one.py", code, "alpha 1.25\nbeta  2.50 and 3.75", how).replace(
+        "\n", "\n> "
+    )
+    folder = make(lesson.replace("\n", newline))
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "and 3.75" + newline, "and 3.85" + newline)
+    line = folder.text(folder.lesson()).split(newline).index("> beta  2.50 and 3.85") + 1
+    assert drift_in(folder) == (
+        line,
+        len("> beta  2.50 and ") + 1,
+        "output-drift",
+        "recorded output differs from this run",
+    )
+
+
+def test_one_digit_of_a_table(make: Make) -> None:
+    folder = make(TABLE)
+    assert folder.main("build").status == 0
+    folder.replace(folder.lesson(), "| 3.50e-09 |", "| 3.51e-09 |")
+    line = folder.text(folder.lesson()).splitlines().index("| RK4 | 3.51e-09 |") + 1
+    assert drift_in(folder)[:3] == (line, 9, "output-drift")
+
+
+def test_drift_is_not_published_and_update_puts_it_back(make: Make) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    good, site = folder.read(folder.lesson()), folder.tree("public")
+    folder.replace(folder.lesson(), "hello 3.14159\n", "hello 3.14158\n")
+    done = folder.main("build")
+    assert done.status == 1
+    line = folder.text(folder.lesson()).splitlines().index("hello 3.14158") + 1
+    assert f"--> {folder.lesson()}:{line}:7\n" in done.out
+    assert "nothing was published; public stays as it is\n" in done.out
+    assert "run `coursebuild update 1.1`" in done.out
+    assert folder.tree("public") == site
+    assert folder.main("update", "1.1").status == 0
+    assert folder.read(folder.lesson()) == good
+    assert folder.main("build").status == 0
+    assert folder.tree("public") == site
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        "[gone](lesson:7.7)\n",
+        "$\\frac{1$\n",
+        block("fails.py", "1/0"),
+        "```mjcf\n<mujoco><nosuch/></mujoco>\n```\n",
+        "![a](gone.png)\n",
+        '```quiz\n{"id": "q"}\n```\n',
+        "`3.15`{out}\n",
+        b"\xff\n",
+    ],
+    ids=["link", "math", "script", "mjcf", "image", "json", "binding", "encoding"],
+)
+def test_no_mistake_is_published(make: Make, mistake: str | bytes) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    site = folder.tree("public")
+    good = folder.read(folder.lesson())
+    folder.write(
+        folder.lesson(), good + (mistake if isinstance(mistake, bytes) else mistake.encode())
+    )
+    assert folder.main("build").status == 1
+    assert folder.tree("public") == site
+    folder.write(folder.lesson(), good)
+    assert folder.main("build").status == 0
+    assert folder.tree("public") == site
+
+
+def test_nothing_is_published_before_there_is_a_site(make: Make) -> None:
+    folder = make(GOOD + "[gone](lesson:7.7)\n")
+    done = folder.main("build")
+    assert done.status == 1
+    assert "\nnothing was published\n" in done.out
+    assert folder.beside() == [
+        ".coursebuild",
+        "content",
+        "content/course.toml",
+        "content/lessons",
+        "content/lessons/1.1-one.md",
+        "examples",
+        "examples/.extracted.json",
+        "examples/hello.py",
+    ]
+
+
+def test_what_is_gone_from_the_course_is_gone_from_the_site(make: Make) -> None:
+    folder = make(GOOD, "## Two\n\n" + block("two.py", "print(2)", "2"))
+    assert folder.main("build").status == 0
+    assert (folder.root / "public/examples/two.py").is_file()
+    map_ = folder.text("content/course.toml")
+    folder.write("content/course.toml", map_[: map_.rindex("[[level.lesson]]")])
+    (folder.root / folder.lesson(2)).unlink()
+    assert folder.main("build").status == 0
+    assert not [path for path in folder.tree() if "two" in path]
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_foreign_file_in_the_site_is_never_removed(make: Make, inside: bool) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    name = "public/lessons/mine.txt" if inside else "public/mine.txt"
+    folder.write(name, "precious")
+    before = folder.tree()
+    done = folder.main("build")
+    assert done.status == 2
+    assert "public holds files that coursebuild did not put there" in done.err
+    assert folder.tree() == before
+
+
+def test_a_folder_of_somebody_else_is_refused_before_any_script_runs(make: Make) -> None:
+    folder = make(GOOD)
+    folder.write("out/notes.txt", "mine")
+    done = folder.main("build", "--out", "out")
+    assert (done.status, done.out) == (2, "")
+    assert not (folder.root / "examples").exists()
+    assert folder.read("out/notes.txt") == b"mine"
+
+
+def test_an_empty_folder_and_a_linked_one_take_a_site(make: Make, tmp_path: Path) -> None:
+    folder = make(GOOD)
+    (folder.root / "public").mkdir(mode=0o711)
+    assert folder.main("build").status == 0
+    assert stat.S_IMODE((folder.root / "public").stat().st_mode) == 0o711
+    site = folder.tree("public")
+    (tmp_path / "elsewhere").mkdir()
+    (folder.root / "linked").symlink_to(tmp_path / "elsewhere")
+    assert folder.main("build", "--out", "linked").status == 0
+    assert (folder.root / "linked").is_symlink()
+    assert Folder(tmp_path / "elsewhere").tree() == site
+
+
+def test_deleting_the_caches_loses_nothing(make: Make) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    site = folder.tree()
+    shutil.rmtree(folder.root / ".coursebuild")
+    assert folder.main("build").status == 0
+    assert folder.tree() == site
+
+
+@pytest.mark.parametrize("damage", [b"", b"x", b"\0" * 4000])
+def test_a_damaged_cache_is_made_again(make: Make, font_store: Path, damage: bytes) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    site = folder.tree()
+    (folder.root / ".coursebuild/fonts").unlink()
+    shutil.copytree(font_store, folder.root / ".coursebuild/fonts")
+    smallest = min(
+        (folder.root / ".coursebuild/fonts").iterdir(), key=lambda path: path.stat().st_size
+    )
+    smallest.write_bytes(damage)
+    assert folder.main("build").status == 0
+    assert folder.tree() == site
+
+
+def test_caches_that_cannot_be_written(make: Make) -> None:
+    folder = make(GOOD)
+    shutil.rmtree(folder.root / ".coursebuild")
+    (folder.root / ".coursebuild").write_text("a file in their place")
+    assert folder.main("check").status == 0
+
+
+def test_files_of_the_site_can_be_read_by_a_web_server(make: Make) -> None:
+    folder = make(GOOD)
+    before = os.umask(0o077)
+    try:
+        assert folder.main("build").status == 0
+    finally:
+        os.umask(before)
+    for path in [folder.root / "public", *(folder.root / "public").rglob("*")]:
+        assert stat.S_IMODE(path.stat().st_mode) == (0o755 if path.is_dir() else 0o644), path

@@ -1,0 +1,389 @@
+"""Pages in a headless Chromium: what scripts add works, and nothing is lost without them."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import json
+import shutil
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from coursebuild.render import SiteOptions
+
+pytestmark = pytest.mark.browser
+
+Make = Callable[..., Any]
+MODULES = Path(__file__).parents[2] / "site" / "node_modules"
+
+BODY = "".join(f"def f{i}(x):\n" + "    x = x + 1\n" * 14 + "    return x\n\n\n" for i in range(8))
+WIDE = "a = " + " + ".join(["1.000"] * 40)
+TEXT = "A number, `-6.0`{out=examples/a.py}, a footnote[^n] and a [link](page:about)."
+LESSON = f"""## First part
+
+Text with $x = y + z$ in it. {TEXT}
+
+$$\\int_V x\\,dV$$
+
+| Quantity | Value |
+| --- | ---: |
+| mass | 1.0 |
+
+> [!established] Title
+> Text.
+
+> [!derivation]- Folded
+> Hidden at first.
+
+> [!warning]
+> Text.
+
+> [!unverified]
+> Text.
+
+```python file=examples/a.py
+\"\"\"Docstring.
+
+Of some
+length.
+\"\"\"
+
+import math
+import sys
+
+{BODY}
+{WIDE}
+```
+
+Output:
+
+```text
+{WIDE}
+-6.0
+```
+
+## Second part {{#second}}
+
+```io
+INPUT: a
+PROCESS: b
+OUTPUT: c
+```
+
+```mjcf fragment=worldbody
+<body name="a"/> <!-- note -->
+```
+
+```sh
+echo "x"  # said
+```
+
+```lab simlab
+{{"model": "box", "dock": true, "title": "A lab", "note": "A note.",
+ "controls": [{{"label": "m", "unit": "kg", "min": 0, "max": 1, "value": 0, "param": "m"}}],
+ "readouts": [{{"label": "E (J)", "expr": "1"}}]}}
+```
+
+After the lab.
+
+### Detail
+
+## Check
+
+```quiz
+{{"id": "q", "title": "Check", "questions": [
+ {{"kind": "mcq", "q": "Which?", "options": ["a", "b"], "answer": 1, "explain": "Because.",
+  "hints": ["Look."], "feedback": ["No.", "Yes."]}},
+ {{"kind": "numeric", "q": "How?", "answer": 1, "unit": "m^2", "explain": "So."}},
+ {{"kind": "order", "q": "Sort.", "items": ["a", "b", "c"], "explain": "So."}},
+ {{"kind": "open", "q": "Why?", "reference": "Since."}},
+ {{"kind": "output", "q": "What?", "of": "examples/a.py", "line": 1, "explain": "So."}}]}}
+```
+
+[^n]: A note.
+"""
+
+PAGES = (
+    "index.html",
+    "lessons/0.1-falling.html",
+    "lessons/1.2-later.html",
+    "levels/1.html",
+    "models/box.html",
+    "about.html",
+)
+LESSON_PAGE = PAGES[1]
+
+
+@pytest.fixture(scope="module")
+def root(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site on disk, below the path of its base address."""
+    folder = tmp_path_factory.mktemp("served")
+    for path, data in make(LESSON).site(SiteOptions()).items():
+        target = folder / "course" / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(data)
+    return folder
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """The page for missing addresses, as a host would send it."""
+        body = (Path(self.directory) / "course" / "404.html").read_bytes()
+        self.send_response(code)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.end_headers()
+        self.wfile.write(body)
+
+
+@pytest.fixture(scope="module")
+def base(root: Path) -> Iterator[str]:
+    handler = functools.partial(Quiet, directory=str(root))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://localhost:{server.server_address[1]}/course/"
+        server.shutdown()
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    chromium = shutil.which("chromium")
+    assert chromium is not None, "no chromium: install Debian's package `chromium`"
+    arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=arguments)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    with browser.new_context(viewport={"width": 1440, "height": 900}) as context:
+        yield context
+
+
+def watched(context: BrowserContext) -> tuple[Page, list[str]]:
+    """A page, and what it says to the console or asks of others."""
+    page, said = context.new_page(), list[str]()
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
+    return page, said
+
+
+def until(page: Page, expression: str) -> None:
+    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
+    for _ in range(200):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never true: {expression}")
+
+
+@pytest.mark.parametrize("place", ["http", "file"])
+def test_pages_load_without_a_word_and_without_others(
+    context: BrowserContext, base: str, root: Path, place: str
+) -> None:
+    page, said = watched(context)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    start = base if place == "http" else f"{root.as_uri()}/course/"
+    for path in PAGES:
+        page.goto(start + path)
+        until(page, "document.fonts.status === 'loaded'")
+        assert page.locator("[data-tools] select").count() == 1, "the page's script ran"
+    assert said == []
+    assert all(url.startswith(start) for url in asked)
+
+
+def test_text_code_and_formulas_are_set_in_the_fonts_of_the_site(
+    context: BrowserContext, base: str
+) -> None:
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    until(page, "document.fonts.status === 'loaded'")
+    loaded = page.evaluate(
+        "[...document.fonts].filter(f => f.status === 'loaded').map(f => f.family)"
+    )
+    assert {name.strip('"') for name in loaded} >= {
+        "Source Serif 4 Variable",
+        "Source Code Pro Variable",
+        "STIX Two Math",
+    }
+
+
+def test_the_page_for_missing_addresses_works_at_any_depth(
+    context: BrowserContext, base: str
+) -> None:
+    page, said = watched(context)
+    page.goto(base + "no/such/page.html")
+    assert page.locator("h1").inner_text() == "Page not found"
+    assert page.evaluate("getComputedStyle(document.body).display") == "flex", "it has its style"
+    page.get_by_role("link", name="Go to the course map").click()
+    page.wait_for_url(base)
+    assert [text for text in said if "404" not in text] == []
+
+
+def test_the_theme_is_kept_and_set_before_anything_is_drawn(
+    context: BrowserContext, base: str
+) -> None:
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    light = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
+    page.get_by_label("Colours").select_option("dark")
+    dark = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
+    assert light != dark
+    page.add_init_script(
+        "addEventListener('DOMContentLoaded',"
+        " () => window.early = document.documentElement.dataset.theme)"
+    )
+    page.goto(base + "about.html")
+    assert page.evaluate("window.early") == "dark"
+    assert page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == dark
+    assert page.get_by_label("Colours").input_value() == "dark"
+    page.get_by_label("Colours").select_option("auto")
+    assert page.evaluate("localStorage.length") == 0
+
+
+def test_copying_takes_the_whole_script_and_not_its_output(
+    context: BrowserContext, base: str, root: Path
+) -> None:
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    script = page.locator('.script[data-script="examples/a.py"]')
+    assert script.locator("details").count() >= 1
+    script.get_by_role("button", name="Copy").click()
+    script.get_by_role("button", name="Copied").wait_for()
+    text = page.evaluate("navigator.clipboard.readText()")
+    assert text == (root / "course" / "examples" / "a.py").read_text()
+
+
+def test_the_contents_list_follows_the_reader(context: BrowserContext, base: str) -> None:
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    current = page.locator(".toc [aria-current]")
+    for anchor, title in (
+        ("second", "Second part"),
+        ("first-part", "First part"),
+        ("check", "Check"),
+    ):
+        page.evaluate("id => document.getElementById(id).scrollIntoView()", anchor)
+        page.locator(f".toc [aria-current]:text-is('{title}')").wait_for()
+        assert current.count() == 1
+
+
+def test_boxes_that_scroll_can_be_reached_and_others_are_no_stop(
+    context: BrowserContext, base: str
+) -> None:
+    page = context.new_page()
+    page.set_viewport_size({"width": 400, "height": 800})
+    page.goto(base + LESSON_PAGE)
+    output = page.locator(".output pre")
+    until(page, "document.querySelector('.output pre').dataset.more === 'end'")
+    assert output.get_attribute("tabindex") == "0"
+    output.focus()
+    page.keyboard.press("End")
+    page.keyboard.press("ArrowRight")
+    until(page, "document.querySelector('.output pre').scrollLeft > 0")
+    until(page, "document.querySelector('.formula').tabIndex === -1")
+
+
+def test_without_scripts_everything_is_there(browser: Browser, base: str) -> None:
+    with browser.new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(base + LESSON_PAGE)
+        assert page.locator("main button, main select, main input").count() == 0
+        answer = page.locator("details.answer").first
+        assert not answer.get_by_text("Because.").is_visible()
+        answer.locator("summary").click()
+        assert answer.get_by_text("Because.").is_visible()
+        folded = page.get_by_text("Hidden at first.")
+        assert not folded.is_visible()
+        page.locator(".callout summary").click()
+        assert folded.is_visible()
+
+
+def test_on_paper_everything_is_open_and_the_frame_is_gone(
+    context: BrowserContext, base: str
+) -> None:
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    page.emulate_media(media="print")
+    for text in ("Hidden at first.", "Because.", "Look."):
+        assert page.get_by_text(text).is_visible(), text
+    for part in (".site-nav", ".toc", ".pager", ".copy"):
+        assert not page.locator(part).first.is_visible(), part
+
+
+def test_the_keyboard_gets_past_the_head_at_once(context: BrowserContext, base: str) -> None:
+    page = context.new_page()
+    page.goto(base + LESSON_PAGE)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    box = page.locator(".skip").bounding_box()
+    assert box is not None and box["x"] >= 0
+    page.keyboard.press("Enter")
+    assert page.evaluate("location.hash") == "#_main"
+
+
+@pytest.mark.parametrize("width", [320, 360, 800, 1200, 1440])
+def test_no_page_is_wider_than_its_window(browser: Browser, base: str, width: int) -> None:
+    with browser.new_context(viewport={"width": width, "height": 800}) as context:
+        page = context.new_page()
+        for path in PAGES:
+            page.goto(base + path)
+            page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, path
+
+
+AXE = """axe.run(document, {rules: {"color-contrast-enhanced": {enabled: true}}}).then(found =>
+    found.violations.map(v => [v.id, v.nodes[0].html, v.nodes[0].failureSummary]))"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 1440])
+def test_axe_finds_nothing(browser: Browser, base: str, scheme: Any, width: int) -> None:
+    """With text at 7 : 1, which is more than axe asks for by itself."""
+    axe = (MODULES / "axe-core" / "axe.min.js").read_text(encoding="utf-8")
+    viewport: Any = {"width": width, "height": 900}
+    with browser.new_context(viewport=viewport, color_scheme=scheme, bypass_csp=True) as context:
+        page = context.new_page()
+        for path in (*PAGES, "404.html"):
+            page.goto(base + path)
+            page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+            page.evaluate(axe)
+            assert page.evaluate(AXE) == [], path
+
+
+def test_the_nu_checker_finds_nothing(base: str) -> None:
+    """Over HTTP, so that `'self'` in the pages' policy means something."""
+    java = shutil.which("java")
+    assert java is not None, "no java: install Debian's package `default-jre-headless`"
+    jar = MODULES / "vnu-jar" / "build" / "dist" / "vnu.jar"
+    allow = "-Dnu.validator.servlet.allow-forbidden-hosts=true"
+    urls = [base + path for path in (*PAGES, "404.html")]
+    command = [
+        java,
+        allow,
+        "-jar",
+        str(jar),
+        "--format",
+        "json",
+        "--stdout",
+        "--exit-zero-always",
+        *urls,
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    messages = json.loads(done.stdout)["messages"]
+    assert [(m["url"], m.get("lastLine"), m["message"]) for m in messages] == []

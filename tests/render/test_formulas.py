@@ -1,0 +1,51 @@
+"""Where a line may break at a formula, and where not."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.render.formulas import breakable, glue
+
+ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
+END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
+
+
+@pytest.mark.parametrize("between", ["", "<mspace/>"])
+def test_a_long_formula_is_cut_between_its_outermost_rows(between: str) -> None:
+    cut = f"<math>{ROW}</math><math>{between}{END}</math>"
+    assert breakable(f"<math>{ROW}{between}{END}</math>") == cut
+
+
+@pytest.mark.parametrize(
+    "mathml",
+    [
+        f"<math>{ROW}</math>",
+        "<math><mrow><mi>a</mi><mo>=</mo></mrow><mrow><mi>b</mi></mrow></math>",
+        f'<math display="block">{ROW}{END}</math>',
+        f"<math>{ROW}{END}<mo>+</mo></math>",
+    ],
+)
+def test_other_formulas_stay_whole(mathml: str) -> None:
+    assert breakable(mathml) == mathml
+
+
+X = "<math><mi>x</mi></math>"
+Y = "<math><mi>y</mi></math>"
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        (f"axis {X}, {Y}.", f'axis <span class="held">{X},</span> <span class="held">{Y}.</span>'),
+        (f"({X})", f'<span class="held">({X})</span>'),
+        (f"“{X}”, so", f'<span class="held">“{X}”,</span> so'),
+        (f"{X} and {X}", f"{X} and {X}"),
+        (f"({X}{Y}{X})!", f'<span class="held">({X}</span>{Y}<span class="held">{X})!</span>'),
+        (f"{X}{Y},", f'{X}<span class="held">{Y},</span>'),
+        (f"<p>{X}</p>", f"<p>{X}</p>"),
+        (f'<math display="block">{X}</math>', f'<math display="block">{X}</math>'),
+        ("no formula, here", "no formula, here"),
+    ],
+)  # fmt: skip
+def test_punctuation_is_held(html: str, expected: str) -> None:
+    assert glue(html) == expected

@@ -1,0 +1,150 @@
+"""Quizzes before any script runs: every question and every answer is in the page."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from coursebuild.render.quizzes import letter, shuffle, unit_html
+from coursebuild.results import Outcome, ScriptRun
+
+Make = Callable[..., Any]
+
+SCRIPT = "```python file=examples/a.py\nprint(1)\n```\n\n"
+
+
+def quiz(*questions: dict[str, Any], title: str = "Check", id: str = "0.1-check") -> str:
+    data = {"id": id, "title": title, "questions": list(questions)}
+    return f"```quiz\n{json.dumps(data)}\n```\n"
+
+
+def test_multiple_choice(make: Make) -> None:
+    question = {
+        "kind": "mcq", "q": "Which *one*?", "options": ["A < B", "$x$"], "answer": 1,
+        "explain": "<p>Because.</p>", "feedback": ["No.", "Yes."], "hints": ["Look."],
+    }  # fmt: skip
+    assert make(quiz(question)).html() == (
+        '<section class="quiz" id="0.1-check" data-quiz="0.1-check" aria-label="Check">\n'
+        '<p class="quiz-title">Check</p>\n<ol class="questions">\n'
+        '<li class="question" data-question="1" data-kind="mcq">\n'
+        "<p>Which <em>one</em>?</p>\n"
+        '<ol class="options">\n<li>A &lt; B</li>\n'
+        '<li><math class="inline"><mi>x</mi></math></li>\n</ol>\n'
+        '<details class="hint">\n<summary>Hint 1</summary>\n<p>Look.</p>\n</details>\n'
+        '<details class="answer">\n<summary>Answer</summary>\n'
+        '<p class="key"><strong>B.</strong> <math class="inline"><mi>x</mi></math></p>\n'
+        "<p>Because.</p>\n"
+        '<div class="feedback">\n<p class="feedback-label">If you chose A</p>\n<p>No.</p>\n'
+        '</div>\n<div class="feedback">\n<p class="feedback-label">If you chose B</p>\n'
+        "<p>Yes.</p>\n</div>\n"
+        "</details>\n</li>\n</ol>\n</section>\n"
+    )  # fmt: skip
+
+
+def test_choose_all(make: Make) -> None:
+    options = ["a", "b", "c"]
+    question = {"kind": "mcq", "q": "Which?", "options": options, "answer": [0, 2], "explain": "E."}
+    html = make(quiz(question)).html()
+    assert 'data-kind="several"' in html
+    assert "Choose all that are right." in html
+    assert '<p class="key"><strong>A.</strong> a<br><strong>C.</strong> c</p>' in html
+
+
+def test_numbers_have_unit_and_tolerance(make: Make) -> None:
+    question = {"kind": "numeric", "q": "How much?", "answer": 0.08, "tol": 0.0001,
+                "unit": "kg m^2", "explain": "So."}  # fmt: skip
+    html = make(quiz(question)).html()
+    assert '<p class="question-how">Give the answer in kg m<sup>2</sup></p>' in html
+    assert (
+        '<p class="key"><strong>0.08 kg m<sup>2</sup></strong> '
+        '<span class="tolerance">within 0.0001 kg m<sup>2</sup></span></p>'
+    ) in html
+
+
+def test_a_prediction_keeps_its_simulation_behind_the_answer(make: Make) -> None:
+    sim = {"model": "box", "title": "The simulation"}
+    question = {"kind": "predict", "q": "What?", "options": ["a", "b"], "answer": 0, "sim": sim}
+    html = make(quiz(question)).html()
+    assert "Decide first, then open." in html
+    before, after = html.split("<summary>Answer</summary>")
+    assert "The simulation" not in before
+    assert 'data-lab="simlab"' in after.split("</details>")[0]
+
+
+def test_open_questions_have_a_reference(make: Make) -> None:
+    html = make(quiz({"kind": "open", "q": "Why?", "reference": "Since **so**."})).html()
+    assert '<p class="key">A good answer</p>\n<p>Since <strong>so</strong>.</p>' in html
+
+
+def output_question(line: int) -> str:
+    return SCRIPT + quiz(
+        {"kind": "output", "q": "What?", "of": "examples/a.py", "line": line, "explain": "E."}
+    )
+
+
+def test_the_key_of_an_output_question_is_what_the_script_printed(make: Make) -> None:
+    html = make(output_question(2)).html()
+    assert "What does examples/a.py print in line 2 of its output?" in html
+    assert "<samp>two</samp></pre>" in html
+
+
+@pytest.mark.parametrize("outcome", [Outcome.SKIPPED, Outcome.FAILED])
+def test_without_a_run_there_is_no_key(make: Make, outcome: Outcome) -> None:
+    run = ScriptRun("examples/a.py", outcome, 1, "one\ntwo\n", "", 0.0)
+    html = make(output_question(2), runs={"examples/a.py": run}).html()
+    assert "<samp>" not in html
+    assert "The answer is not known" in html
+
+
+def test_items_are_shown_shuffled_and_solved_in_order(make: Make) -> None:
+    items = ["first", "second", "third"]
+    html = make(quiz({"kind": "order", "q": "Sort.", "items": items, "explain": "E."})).html()
+    shown, solved = html.split("The right order")
+    assert re.findall(r"<li>(\w+)</li>", solved) == items
+    mixed = re.findall(r"<li>(\w+)</li>", shown)
+    assert sorted(mixed) == sorted(items) != mixed or mixed != items
+    assert mixed != items
+
+
+def test_a_title_that_a_heading_says_is_not_said_twice(make: Make) -> None:
+    question = {"kind": "open", "q": "Why?", "reference": "So."}
+    html = make("## Check\n\n" + quiz(question)).html()
+    assert 'aria-label="Check">\n<ol class="questions">' in html
+
+
+def test_questions_work_without_any_form_control(make: Make) -> None:
+    question = {"kind": "mcq", "q": "Which?", "options": ["a", "b"], "answer": 0, "explain": "E."}
+    html = make(quiz(question)).html()
+    assert not re.search("<(input|button|select|textarea|form)", html)
+
+
+@pytest.mark.parametrize("count", range(0, 9))
+def test_a_shuffle_is_a_permutation_and_never_the_right_order(count: int) -> None:
+    for key in ("a", "b", "4.2-check/3"):
+        order = shuffle(count, key)
+        assert sorted(order) == list(range(count))
+        assert order == shuffle(count, key)
+        assert count < 2 or order != tuple(range(count))
+    assert count < 4 or len({shuffle(count, str(i)) for i in range(20)}) > 3
+
+
+def test_letters_go_on_after_z() -> None:
+    assert [letter(i) for i in (0, 25, 26, 27, 701, 702)] == ["A", "Z", "AA", "AB", "ZZ", "AAA"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "html"),
+    [
+        ("kg m^2", "kg m<sup>2</sup>"),
+        ("m s^-1", "m s<sup>−1</sup>"),
+        ("N m^{-2}/x^10", "N m<sup>−2</sup>/x<sup>10</sup>"),
+        ("<b>^", "&lt;b&gt;^"),
+        ("", ""),
+    ],
+)
+def test_units(unit: str, html: str) -> None:
+    assert unit_html(unit) == html

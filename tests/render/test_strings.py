@@ -1,0 +1,53 @@
+"""The interface's words: complete, and all of them used."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from coursebuild.render import Assets
+from coursebuild.render.assets import strings_for
+from coursebuild.render.strings import parse_strings
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_values_plurals_and_fallback() -> None:
+    english = parse_strings(
+        '[a]\nb = "B {x}"\nc = "C"\n[a.n]\none = "{n} thing"\nother = "{n} things"\n'
+    )
+    german = parse_strings('[a]\nb = "B: {x}"\n', english)
+    assert (german("a.b", x="<i>"), german("a.c")) == ("B: <i>", "C")
+    assert (english("a.n", n=1), english("a.n", n=0)) == ("1 thing", "0 things")
+    with pytest.raises(KeyError, match=r"a\.z"):
+        english("a.z")
+
+
+def test_a_language_without_a_file_is_english(assets: Assets) -> None:
+    assert strings_for(assets.templates, "xx") == strings_for(assets.templates, "en")
+
+
+def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None:
+    templates = (
+        *assets.templates,
+        ("strings/pt.toml", '[site]\nmap = "Mapa"\nmenu = "Menu"\n'),
+        ("strings/pt-BR.toml", '[site]\nmenu = "Cardápio"\n'),
+    )
+    words = strings_for(templates, "pt-BR")
+    assert (words("site.map"), words("site.menu")) == ("Mapa", "Cardápio")
+    assert words("code.copy") == "Copy"
+
+
+def test_every_word_that_is_asked_for_is_there_and_every_one_there_is_used(assets: Assets) -> None:
+    """Keys that are put together at run time are named here by their beginning."""
+    made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
+    text = "".join(text for path, text in assets.templates if path.endswith(".html"))
+    text += "".join(p.read_text() for p in sorted((ROOT / "coursebuild" / "render").glob("*.py")))
+    words = strings_for(assets.templates, "en")
+    known = {re.sub(r"\.(one|other)$", "", key) for key in words.keys}
+    quoted = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
+    asked = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
+    assert asked - known == {key for key in asked if key.endswith(".")}
+    assert {key for key in known - quoted if not key.startswith(made)} == set()

@@ -1,0 +1,69 @@
+"""Addresses: relative at every depth, encoded; rooted only on the page for missing ones."""
+
+from __future__ import annotations
+
+from urllib.parse import unquote, urljoin, urlsplit
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.render.urls import Place, local_file
+
+PATHS = [
+    "index.html",
+    "about.html",
+    "404.html",
+    "lessons/4.2-mass-and-inertia.html",
+    "models/arms/left hand.xml",
+    "examples/l4_2.py",
+    "a:b.html",
+    "levels/ü%23.html",
+]
+
+
+@pytest.mark.parametrize("start", PATHS)
+@pytest.mark.parametrize("end", PATHS)
+def test_a_browser_resolves_an_address_to_its_path(start: str, end: str) -> None:
+    href = Place(start).href(end, "x y")
+    assert not href.startswith("/") and "//" not in href
+    for base in ("https://h/", "https://h/deep/er/", "file:///home/u/site/"):
+        page = base + Place("index.html").href(start) if start != "index.html" else base + start
+        found = urlsplit(urljoin(page, href))
+        assert unquote(found.path) == urlsplit(base).path + end
+        assert found.fragment == "x%20y"
+
+
+def test_the_short_forms() -> None:
+    place = Place("lessons/1-a.html")
+    assert place.href("lessons/1-a.html", "b") == "#b"
+    assert place.href("lessons/1-a.html") == "1-a.html"
+    assert place.href("lessons/2-b.html") == "2-b.html"
+    assert place.href("index.html") == "../index.html"
+
+
+def test_the_page_for_missing_addresses_starts_at_the_root() -> None:
+    place = Place("404.html", "/course/")
+    assert place.href("index.html") == "/course/"
+    assert place.href("assets/site.css") == "/course/assets/site.css"
+
+
+@pytest.mark.parametrize(
+    ("url", "path"),
+    [
+        ("sketch.svg", "content/lessons/sketch.svg"),
+        ("./a%20b.png", "content/lessons/a b.png"),
+        ("../pages/x.csv?raw#L3", "content/pages/x.csv"),
+        ("/content/x.png", "content/x.png"),
+    ],
+)
+def test_files_are_named_from_the_document(url: str, path: str) -> None:
+    assert local_file(url, "content/lessons/4.2-x.md") == path
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"], exclude_characters="/"), min_size=1))
+def test_any_name_survives(name: str) -> None:
+    path = f"files/{name}"
+    href = Place("lessons/1-a.html").href(path)
+    if name not in (".", ".."):
+        assert unquote(urlsplit(urljoin("https://h/lessons/1-a.html", href)).path) == f"/{path}"

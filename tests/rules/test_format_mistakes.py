@@ -1,0 +1,97 @@
+"""Each mistake that the lesson format names, tried alone through the command line, and the good beside it.
+
+The cases are fixtures in `tests/fixtures/mistakes/`. Where a mistake is expected its place is marked in
+the input by `‸`, which is taken out before the course is written; the expected text is the rule. A case
+whose expected text is empty must be found good. `(several)` in a title allows more than one rule.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from scratch import Case, Layout, put, read_cases
+
+from coursebuild.cli import main
+from coursebuild.rules import RULES
+
+FIXTURES = Path(__file__).parents[1] / "fixtures" / "mistakes"
+MARK = "‸"
+CASES = [
+    pytest.param(case, id=f"{path.stem}:{case.line}")
+    for path in sorted(FIXTURES.glob("*.md"))
+    for case in read_cases(path)
+]
+
+
+@dataclass(frozen=True, order=True)
+class Place:
+    """Where a mistake is, and which."""
+
+    path: str
+    line: int
+    column: int
+    rule: str
+
+    def __str__(self) -> str:
+        return f"{self.rule} {self.path}:{self.line}:{self.column}"
+
+
+def marked(layout: Layout) -> list[tuple[str, int, int]]:
+    """Take the marks out of the files, and give their places."""
+    places = []
+    for path, data in layout.files.items():
+        text = data.decode("utf-8", "surrogateescape")
+        clean, *rest = text.split(MARK)
+        for part in rest:
+            before = clean.replace("\r\n", "\n").replace("\r", "\n")
+            places.append((path, before.count("\n") + 1, len(before) - before.rfind("\n")))
+            clean += part
+        layout.files[path] = clean.encode("utf-8", "surrogateescape")
+    return sorted(places)
+
+
+def expected(case: Case, marks: list[tuple[str, int, int]]) -> list[Place]:
+    """The rules of a case at its marks, in order; `rule PATH:LINE:COLUMN` needs no mark."""
+    places, left = [], list(marks)
+    for line in case.expected.splitlines():
+        rule, _, place = line.partition(" ")
+        if place:
+            path, row, column = place.rsplit(":", 2)
+            places.append(Place(path, int(row), int(column), rule))
+        else:
+            places.append(Place(*left.pop(0), rule))
+    assert not left, "a mark without a rule"
+    return sorted(places)
+
+
+def run(root: Path, *arguments: str) -> tuple[int, dict[str, list[dict[str, object]]]]:
+    """The exit status and the report of a command."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+        status = main(["-C", str(root), *arguments])
+    return status, json.loads(out.getvalue())
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mistake_is_told_once_at_its_place(case: Case, tmp_path: Path) -> None:
+    layout = Layout.of(case.input)
+    places = marked(layout)
+    layout.write(tmp_path)
+    if layout.later:
+        run(tmp_path, "check", "--format", "json")
+        for path, data in layout.later.items():
+            put(tmp_path / path, data)
+    status, report = run(tmp_path, "check", "--format", "json")
+    found = sorted(
+        Place(str(d["path"]), int(str(d["line"])), int(str(d["column"])), str(d["rule"]))
+        for d in report["diagnostics"]
+    )
+    wanted = expected(case, places)
+    assert [str(place) for place in found] == [str(place) for place in wanted]
+    assert status == (1 if any(RULES[p.rule].severity == "error" for p in wanted) else 0)
+    assert "(several)" in case.title or len(wanted) <= 1
