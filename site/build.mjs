@@ -3,10 +3,11 @@
  *
  *   node build.mjs OUT
  *
- * Sources are the js/ and css/ folders beside this file. In OUT, in this order:
+ * Sources are the js/, css/ and licences/ folders beside this file. In OUT, in this order:
  *
- *   js/NAME.js           one ES module for each js/NAME.js
+ *   js/NAME.js           one ES module for each js/NAME.js; js/lab-trial.js is a classic script for V8 without a page
  *   css/site.css         css/site.css with its imports
+ *   mujoco/mujoco.wasm   the physics engine of js/lab-worker.js and js/lab-trial.js
  *   temml/temml.min.js   a classic script that defines the global `temml`
  *   fonts/*.woff2        and fonts.json, which says what each file holds (see `readFaces`)
  *   licences/NAME.txt    the licence of every package of which a part is in OUT
@@ -43,6 +44,9 @@ const FONTS = [
   },
   { name: '@fontsource/stix-two-math', sheets: { '400.css': ['latin'] }, whole: true },
 ]
+
+/** The script for an engine that knows neither modules nor addresses. */
+const TRIAL = 'lab-trial.js'
 
 /** A mistake in the sources or the packages: it is told without a stack. */
 class BuildError extends Error {}
@@ -86,18 +90,35 @@ async function bundle(options) {
   }
 }
 
+/** The engine's glue has a branch for Node, which no bundle needs, and which cannot be bundled for a page. */
+const withoutNode = {
+  name: 'without-node',
+  setup(building) {
+    building.onLoad({ filter: /@mujoco\/mujoco\/mujoco\.js$/ }, async ({ path }) => {
+      const source = await readFile(path, 'utf8')
+      const [start, end, ...more] = source.split(/^var ENVIRONMENT_IS_NODE = .*$/m)
+      if (end === undefined || more.length > 0) throw new Error('ENVIRONMENT_IS_NODE is not defined as expected')
+      return { contents: (start + end).replaceAll(/\bENVIRONMENT_IS_NODE\b/g, 'false'), loader: 'js' }
+    })
+  },
+}
+
 async function bundleScripts(out) {
   const folder = join(HERE, 'js')
   const files = existsSync(folder) ? (await readdir(folder)).sort() : []
   const entries = files.filter((file) => file.endsWith('.js') && !file.endsWith('.test.js'))
   if (entries.length === 0) throw new BuildError('site/js holds no script: nothing to bundle')
-  return bundle({
-    entryPoints: entries.map((file) => join('js', file)),
-    outdir: join(out, 'js'),
-    format: 'esm',
-    platform: 'browser',
-    target: 'es2022',
-  })
+  const options = { outdir: join(out, 'js'), platform: 'browser', target: 'es2022', plugins: [withoutNode] }
+  const names = new Set()
+  for (const [format, chosen, define] of [
+    ['esm', entries.filter((file) => file !== TRIAL), {}],
+    ['iife', entries.filter((file) => file === TRIAL), { 'import.meta.url': '"file:///engine.js"' }],
+  ]) {
+    if (chosen.length === 0) continue
+    const entryPoints = chosen.map((file) => join('js', file))
+    for (const name of await bundle({ ...options, entryPoints, format, define })) names.add(name)
+  }
+  return names
 }
 
 async function bundleStyles(out) {
@@ -116,6 +137,12 @@ async function copyTemml(out) {
   const target = join(out, 'temml', 'temml.min.js')
   await mkdir(dirname(target), { recursive: true })
   await copyFile(join(packageFolder('temml'), 'dist', 'temml.min.js'), target)
+}
+
+async function copyEngine(out) {
+  const target = join(out, 'mujoco', 'mujoco.wasm')
+  await mkdir(dirname(target), { recursive: true })
+  await copyFile(join(packageFolder('@mujoco/mujoco'), 'mujoco.wasm'), target)
 }
 
 /** The value of one descriptor of an @font-face rule. */
@@ -171,25 +198,27 @@ async function copyFonts(out) {
   await writeFile(join(out, 'fonts', 'fonts.json'), JSON.stringify(all, null, 2) + '\n')
 }
 
-/** One file for each package: "@scope/name" becomes scope-name.txt. */
+/** One file for each package: "@scope/name" becomes scope-name.txt. For a package without one, licences/ has it. */
 async function copyLicences(names, out) {
   await mkdir(join(out, 'licences'), { recursive: true })
   for (const name of [...names].sort()) {
     const folder = packageFolder(name)
     const file = (await readdir(folder)).sort().find((entry) => /^(licen[cs]e|copying)(\.(md|txt))?$/i.test(entry))
-    if (file === undefined) throw new BuildError(`the npm package ${name} has no licence file`)
     const target = name.replace('@', '').replace('/', '-') + '.txt'
-    await copyFile(join(folder, file), join(out, 'licences', target))
+    const source = file === undefined ? join(HERE, 'licences', target) : join(folder, file)
+    if (!existsSync(source)) throw new BuildError(`the npm package ${name} has no licence file`)
+    await copyFile(source, join(out, 'licences', target))
   }
 }
 
 async function main(args) {
   if (args.length !== 1) throw new BuildError('usage: node build.mjs OUT')
   const out = resolve(args[0])
-  const shipped = new Set(['temml', ...FONTS.map((font) => font.name)])
+  const shipped = new Set(['temml', '@mujoco/mujoco', ...FONTS.map((font) => font.name)])
   for (const name of await bundleScripts(out)) shipped.add(name)
   for (const name of await bundleStyles(out)) shipped.add(name)
   await copyTemml(out)
+  await copyEngine(out)
   await copyFonts(out)
   await copyLicences(shipped, out)
 }

@@ -45,7 +45,7 @@ OLDEST_NODE = 18
 
 _STAMP = "stamp.json"
 _SCRATCH = ".bundle-"
-_FOLDERS = ("css", "js")
+_FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
 _NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
 

@@ -42,6 +42,9 @@ from coursebuild.source import Span
 AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
 
 _HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ANCHOR = re.compile(
+    r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +104,23 @@ def check_links(course: Course) -> tuple[Diagnostic, ...]:
     found: list[Diagnostic] = []
     for document in course.documents:
         for block in document_blocks(document):
+            if isinstance(block, HtmlBlock):
+                found += _check_html(block.span, document, anchors_of)
             for inline in walk_inlines(block_inlines(block)):
                 if isinstance(inline, Link):
                     found += _check_link(inline, document, known, anchors_of)
                 elif isinstance(inline, Image):
                     found += _check_image(inline, document, known)
+                elif isinstance(inline, RawInline):
+                    found += _check_html(inline.span, document, anchors_of)
     return tuple(found)
+
+
+def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterator[Diagnostic]:
+    """Links of raw HTML to anchors of its own page."""
+    for link in _HTML_ANCHOR.finditer(span.text):
+        place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
+        yield from _anchor(place, link[1][1:], document, "this page", anchors_of)
 
 
 def _check_link(
@@ -228,14 +242,16 @@ def _check_image(image: Image, document: Document, known: Places) -> Iterator[Di
     if parts is None or parts.scheme or parts.netloc:
         yield diagnose(
             "image-remote",
-            image.span,
+            image.url_span,
             f"the image `{image.url}` is not a file of the course",
             help="put the file into content/ and name it relative to the lesson",
         )
         return
     path = local_file(image.url, document.source.path)
     if path not in known.files:
-        yield diagnose("link-file", image.span, f"no file `{path}`", help=_file_help(path, known))
+        yield diagnose(
+            "link-file", image.url_span, f"no file `{path}`", help=_file_help(path, known)
+        )
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

@@ -10,24 +10,13 @@ Entry points: `compile_all`, `compile_models`, `compile_texts`; `readable_error`
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import re
-import selectors
-import signal
-import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from coursebuild.effects import mjcf_worker
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.runner import clean_environment
+from coursebuild.effects.child import JsonChild
 from coursebuild.model import MjcfModel
 from coursebuild.results import CompileResult, ModelFacts
 
@@ -72,111 +61,29 @@ def compile_texts(
     return compile_all(root, (), texts, timeout=timeout)[1]
 
 
-class _Compiler:
-    """The child, started when it is needed and again when it died."""
+class _Compiler(JsonChild):
+    """The child that compiles."""
 
     def __init__(self, root: Path, timeout: float) -> None:
+        super().__init__(mjcf_worker.__file__, timeout)
         self.root = root
         self.timeout = timeout
-        self.folder = tempfile.TemporaryDirectory(prefix="coursebuild-mjcf-")
-        self.process: subprocess.Popen[bytes] | None = None
-        self.buffer = b""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.stop()
-        self.folder.cleanup()
 
     def compile(self, path: Path, text: str, on_disk: bool) -> CompileResult:
-        process = self.process or self._start()
         request: mjcf_worker.Request = {
             "path": str(path),
             "text": text,
             "limit": self.timeout,
             "on_disk": on_disk,
         }
-        assert process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
-            process.stdin.write(json.dumps(request).encode() + b"\n")
-            process.stdin.flush()
-        # The child stops itself; the margin is for one that cannot.
-        line = self._read_line(self.timeout + 10.0)
-        if line is None:
-            return CompileResult(f"MuJoCo's compiler {self._death()}")
-        reply: mjcf_worker.Reply = json.loads(line)
+        reply: mjcf_worker.Reply | None = self.ask(request)
+        if reply is None:
+            return CompileResult(f"MuJoCo's compiler {self.death()}")
         facts = reply["facts"]
         if facts is not None:
             return CompileResult("", facts=self._facts(facts))
         message = self._without_paths(reply["error"].strip())
         return CompileResult(message, error_line(message, text))
-
-    def stop(self) -> None:
-        """End the child, whatever it does."""
-        process, self.process, self.buffer = self.process, None, b""
-        if process is None:
-            return
-        process.kill()
-        process.wait()
-        for pipe in (process.stdin, process.stdout, process.stderr):
-            if pipe is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    pipe.close()
-
-    def _start(self) -> subprocess.Popen[bytes]:
-        with tempfile.TemporaryFile() as errors:
-            self.process = process = subprocess.Popen(
-                [sys.executable, "-E", "-P", mjcf_worker.__file__],
-                cwd=self.folder.name,
-                env=clean_environment(os.environ),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                start_new_session=True,
-            )
-            if self._read_line(120.0) != b"ready":
-                self.stop()
-                errors.seek(0)
-                said = errors.read().decode("utf-8", "replace").strip().splitlines()
-                raise EffectError(
-                    f"MuJoCo cannot be loaded: {said[-1] if said else 'the import crashed'}"
-                )
-        return process
-
-    def _read_line(self, seconds: float) -> bytes | None:
-        """The next line of the child; `None` if it died, or said nothing for so long."""
-        assert self.process is not None and self.process.stdout is not None
-        until = time.monotonic() + seconds
-        with selectors.DefaultSelector() as selector:
-            selector.register(self.process.stdout, selectors.EVENT_READ)
-            while b"\n" not in self.buffer:
-                if not selector.select(max(0.0, until - time.monotonic())):
-                    return None
-                data = os.read(self.process.stdout.fileno(), 1 << 16)
-                if not data:
-                    return None
-                self.buffer += data
-        line, _, self.buffer = self.buffer.partition(b"\n")
-        return line
-
-    def _death(self) -> str:
-        """What ended the child."""
-        assert self.process is not None
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(1.0)
-        status = self.process.returncode
-        self.stop()
-        if status is None or status == -signal.SIGALRM:
-            return f"took longer than {self.timeout:g} s"
-        if status < 0:
-            return f"crashed ({signal.Signals(-status).name})"
-        return f"ended with status {status}"
 
     def _without_paths(self, message: str) -> str:
         """The message as it would be on any machine."""

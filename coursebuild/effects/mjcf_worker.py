@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 
 _MEMORY = 8 << 30
 """Bytes of address space: a model that asks for more fails, and the machine does not."""
-_INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
+_INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 """In the order of mjtIntegrator, by their names in MJCF."""
 
 

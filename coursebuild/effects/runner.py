@@ -20,12 +20,14 @@ import selectors
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 from coursebuild.effects import supervisor
+from coursebuild.effects.errors import EffectError, reason
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
 _PASSED_ON = (
@@ -110,9 +112,16 @@ def run_scripts(
 
     Returns:
         What each did, in the order of the jobs.
+
+    Raises:
+        EffectError: there is no place for temporary files.
     """
     work = _Work(root.resolve(), jobs, on_event or (lambda event: None))
+    if not work.waiting:
+        return work.results()
     with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
+        work.scratch = _scratch()
+        stack.callback(supervisor.remove_folder, work.scratch)
         for _ in range(min(max(parallel, 1), len(work.waiting))):
             _start(stack, selector, work)
         while selector.get_map():
@@ -149,6 +158,7 @@ class _Work:
         self.tell = tell
         self.environment = clean_environment(os.environ)
         self.library = _library()
+        self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
             for i, job in enumerate(jobs)
@@ -175,6 +185,7 @@ class _Work:
             "timeout": job.timeout,
             "requires": list(job.requires),
             "environment": self.environment,
+            "scratch": self.scratch,
             "library": self.library,
         }
         data = json.dumps(request).encode()
@@ -195,14 +206,13 @@ class _Worker:
     def __init__(self, environment: Mapping[str, str]) -> None:
         self.job: int | None = None
         self.buffer = bytearray()
-        outer = {"TMPDIR": os.environ["TMPDIR"]} if "TMPDIR" in os.environ else {}
         self.process = subprocess.Popen(
             # -E and -P: its search path is a script's, without the script's folder.
             [sys.executable, "-E", "-P", supervisor.__file__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,
-            env={**environment, **outer},
+            env=dict(environment),
             start_new_session=True,  # Ctrl-C is for this process, which then ends it
         )
         assert self.process.stdin is not None and self.process.stdout is not None
@@ -321,6 +331,14 @@ def _lost(path: str, status: int) -> ScriptRun:
     name = signal.Signals(-status).name
     text = f"the process that supervises this script was ended by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)
+
+
+def _scratch() -> str:
+    """A folder for the scripts' temporary folders."""
+    try:
+        return tempfile.mkdtemp(prefix="coursebuild-")
+    except OSError as error:
+        raise EffectError(f"there is no place for temporary files: {reason(error)}") from None
 
 
 def _library() -> str:

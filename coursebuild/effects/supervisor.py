@@ -62,6 +62,8 @@ class Job(TypedDict):
     requires: list[str]
     """Modules without which it is not run."""
     environment: dict[str, str]
+    scratch: str
+    """Where the script's temporary folder is made; it goes when the last supervisor does."""
     library: str
     """A folder to import `mjcourse` from, where it is not installed."""
 
@@ -93,10 +95,18 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     os.chdir("/")
-    while (message := _receive(0)) is not None:
-        job: Job = json.loads(message)
-        report, stdout, stderr = _serve(job, awake)
-        _send(reply, json.dumps(report).encode(), stdout, stderr)
+    scratch, tool = "", os.getppid()
+    try:
+        while (message := _receive(0)) is not None:
+            job: Job = json.loads(message)
+            scratch = job["scratch"]
+            report, stdout, stderr = _serve(job, awake)
+            _send(reply, json.dumps(report).encode(), stdout, stderr)
+    finally:
+        # While the tool lives the folder is its own: another supervisor may be about to use it.
+        if scratch and os.getppid() != tool:
+            with contextlib.suppress(OSError):  # others still use it
+                Path(scratch).rmdir()
 
 
 def prctl(option: int, value: int) -> None:
@@ -121,9 +131,10 @@ def _serve(job: Job, awake: int) -> tuple[Report, bytes, bytes]:
     environment = dict(job["environment"])
     if missing_modules(["mjcourse"], None, ""):
         environment["PYTHONPATH"] = job["library"]
-    folder = tempfile.mkdtemp(prefix="coursebuild-")
+    folder = ""
     try:
         try:
+            folder = _temporary(job["scratch"])
             run = _Run(job, environment | {"TMPDIR": folder}, awake)
         except (OSError, ValueError) as error:  # a ValueError: an argument holds a null character
             text = f"the script cannot be started: {error}\n"
@@ -134,7 +145,18 @@ def _serve(job: Job, awake: int) -> tuple[Report, bytes, bytes]:
             run.end()
         return run.report(), bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
     finally:
-        _remove(folder)
+        if folder:
+            remove_folder(folder)
+
+
+def _temporary(scratch: str) -> str:
+    """A fresh folder in `scratch`, which another supervisor may have found empty and removed."""
+    while True:
+        try:
+            return tempfile.mkdtemp(prefix="", dir=scratch)
+        except FileNotFoundError:
+            with contextlib.suppress(FileExistsError):
+                Path(scratch).mkdir(mode=0o700)
 
 
 class _Run:
@@ -358,7 +380,7 @@ def _report(
     }
 
 
-def _remove(folder: str) -> None:
+def remove_folder(folder: str) -> None:
     """Remove a script's temporary folder, also where it took away its own permissions."""
     shutil.rmtree(folder, ignore_errors=True)
     if Path(folder).exists():

@@ -45,11 +45,12 @@ class Isolate:
     Close it: a process that ends with V8 running may hang.
     """
 
-    def __init__(self, *scripts: str) -> None:
+    def __init__(self, *scripts: str, memory: int = _MEMORY) -> None:
+        self._memory = memory
         self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
         self._context = self._runner.run(_make_context())
         self.close = weakref.finalize(self, _close, self._runner, self._context)
-        self._context.set_hard_memory_limit(_MEMORY)
+        self._context.set_hard_memory_limit(memory)
         for script in scripts:
             self._evaluate(script, _BATCH_SECONDS)
 
@@ -64,6 +65,13 @@ class Isolate:
             raise TypeError(f"{function} returned {type(result).__name__}, not a string")
         return result
 
+    def fill(self, name: str, data: bytes) -> None:
+        """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
+        place = self._evaluate(f"reserve({json.dumps(name)}, {len(data)})", _BATCH_SECONDS)
+        if not isinstance(place, memoryview):
+            raise TypeError(f"reserve returned {type(place).__name__}, not an ArrayBuffer")
+        place[:] = data
+
     def _evaluate(self, code: str, seconds: float) -> object:
         from py_mini_racer import JSOOMException
 
@@ -75,7 +83,7 @@ class Isolate:
         except TimeoutError:
             raise LimitError(f"ran for more than {seconds:g} s") from None
         except JSOOMException:
-            raise LimitError(f"took more than {_MEMORY >> 20} MiB") from None
+            raise LimitError(f"took more than {self._memory >> 20} MiB") from None
 
 
 async def _make_context() -> MiniRacer:

@@ -1,6 +1,6 @@
 """A picture of a scene, drawn without a graphics processor.
 
-Entry points: `draw(solids, camera, size, ground)` → pixels, `png(pixels)` → bytes.
+Entry points: `draw(solids, camera, size)` → pixels, `png(pixels)` → bytes.
 
 1. Every solid's triangles are taken into the camera's frame (MuJoCo's free camera) and projected.
 2. A depth buffer keeps the nearest surface of each sample; there are 2 × 2 samples a pixel.
@@ -57,25 +57,22 @@ class Camera:
     """Vertical field of view, degrees."""
 
 
-def draw(
-    solids: Sequence[Solid],
-    camera: Camera,
-    size: tuple[int, int],
-    ground: tuple[float, float, float],
-) -> NDArray[np.uint8]:
-    """The picture: (height, width, 3) bytes.
+def draw(solids: Sequence[Solid], camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The picture: (height, width, 4) bytes, RGBA, clear where there is nothing.
 
-    `size` is (width, height) in pixels; `ground` is the colour behind everything.
+    `size` is (width, height) in pixels.
     """
     width, height = size[0] * _SAMPLES, size[1] * _SAMPLES
-    canvas = _Canvas(width, height, camera, np.array(ground, dtype=float))
+    canvas = _Canvas(width, height, camera)
     opaque = [solid for solid in solids if solid.rgba[3] >= 0.999]
     through = [solid for solid in solids if 0.001 < solid.rgba[3] < 0.999]
     for solid in opaque:
         canvas.add(solid)
     for solid in sorted(through, key=lambda s: -canvas.depth_of(s)):
         canvas.add(solid)
-    mean = canvas.colour.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 3).mean(axis=(1, 3))
+    mean = canvas.colour.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 4).mean(axis=(1, 3))
+    # Colours were weighted with how much they cover.
+    mean[..., :3] /= np.where(mean[..., 3:] > 0, mean[..., 3:], 1.0)
     pixels: NDArray[np.uint8] = np.clip(np.rint(255 * mean), 0, 255).astype(np.uint8)
     return pixels
 
@@ -83,8 +80,9 @@ def draw(
 class _Canvas:
     """Colours and depths of the samples."""
 
-    def __init__(self, width: int, height: int, camera: Camera, ground: Array) -> None:
-        self.colour = np.tile(ground, (height, width, 1))
+    def __init__(self, width: int, height: int, camera: Camera) -> None:
+        self.colour = np.zeros((height, width, 4))
+        """RGB times how much is covered, and how much is covered."""
         self.depth = np.full((height, width), np.inf)
         self.width, self.height = width, height
         self.camera = camera
@@ -141,7 +139,7 @@ class _Canvas:
         facing = np.sign(np.einsum("ij,ij->i", normals, view))
         facing[facing == 0] = 1.0
         turned = normals * facing[:, None]
-        light = np.full(len(world), 0.3)
+        light = np.full(len(world), 0.35)
         for direction, strength in self.lights:
             light += strength * np.clip(turned @ direction, 0.0, None)
         return light
@@ -175,6 +173,7 @@ class _Canvas:
             )
             light = light * np.where(sum(squares) % 2 == 0, 1.0, 0.9)
         colour = np.clip(light[..., None] * np.array(solid.rgba[:3]), 0.0, 1.0)
+        colour = np.concatenate((colour, np.ones((*light.shape, 1))), axis=-1)
         alpha = solid.rgba[3]
         target = self.colour[window]
         target[inside] = (alpha * colour + (1 - alpha) * target)[inside]
@@ -183,13 +182,13 @@ class _Canvas:
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
-    """An RGB picture as PNG, losslessly, with the same bytes each time."""
+    """An RGBA picture as PNG, losslessly, with the same bytes each time."""
     height, width, _ = pixels.shape
-    rows = pixels.astype(np.int16).reshape(height, width * 3)
-    above = np.vstack((np.zeros((1, width * 3), np.int16), rows[:-1]))
+    rows = pixels.astype(np.int16).reshape(height, width * 4)
+    above = np.vstack((np.zeros((1, width * 4), np.int16), rows[:-1]))
     filtered = np.column_stack((np.full(height, 2, np.uint8), ((rows - above) & 255)))
     data = zlib.compress(filtered.astype(np.uint8).tobytes(), 9)
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(name, body) for name, body in chunks)
 

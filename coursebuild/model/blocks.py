@@ -213,6 +213,8 @@ class Recording:
     """`None`: the course's default."""
     script: str | None
     """The path of the nearest script above; `None` only in a document with an error."""
+    readable: bool = True
+    """Whether the fence says in a right way how to compare; if not, nothing is compared."""
 
 
 @dataclass(frozen=True, slots=True)

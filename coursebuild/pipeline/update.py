@@ -82,7 +82,7 @@ def _recordings(course: Course, chosen: Selection) -> list[Recording]:
         for document in course.documents
         if chosen.documents is None or document.source.path in chosen.documents
         for block in document_blocks(document)
-        if isinstance(block, Recording) and block.script is not None
+        if isinstance(block, Recording) and block.script is not None and block.readable
     ]
 
 

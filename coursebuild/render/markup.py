@@ -1,9 +1,11 @@
 """Blocks and inlines into HTML.
 
-Entry points: `render_blocks`, `render_inlines`, `render_footnotes`; `Context` (what a page decides), `Look` (details of the HTML).
+Entry points: `render_blocks`, `render_inlines`, `render_footnotes`; `Context` (what a page
+decides), `Look` (details of the HTML).
 
-What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like) is asked of the context, which
-may call back for what its blocks hold. All else is Markdown, and is written here.
+What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
+is asked of the context, which may call back for what its blocks hold. All else is Markdown, and is
+written here.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Markdown without a course: CommonMark's own HTML.
 
-Entry points: `PlainContext`, `plain_html` (a document on its own). Headings have no ids, code has no colours, formulas stay TeX, and a
-block of ours is shown as Markdown alone would show what it holds.
+Entry points: `PlainContext`, `plain_html` (a document on its own). Headings have no ids, code has
+no colours, formulas stay TeX, and a block of ours is shown as Markdown alone would show what it
+holds.
 """
 
 from __future__ import annotations
@@ -96,9 +97,8 @@ class PlainContext:
                 title = (
                     f"<p>{render_inlines(block.title, self, PLAIN)}</p>\n" if block.title else ""
                 )
-                return Markup(
-                    f"<blockquote>\n{title}{render_blocks(block.blocks, self, PLAIN)}</blockquote>\n"
-                )
+                inner = render_blocks(block.blocks, self, PLAIN)
+                return Markup(f"<blockquote>\n{title}{inner}</blockquote>\n")
             case Script() | PlainCode():
                 return self.code("python", block.code.text)
             case Mjcf():

@@ -30,8 +30,8 @@ class SiteOptions:
     """What is not in the course itself."""
 
     files: tuple[OutputFile, ...] = ()
-    """Files of `content/` that pages show or link to, by their path relative to the project
-    root."""
+    """Files that pages show or link to, and that models pull in, by their path relative to the
+    project root."""
     around: zips.Surroundings = field(default_factory=zips.Surroundings)
     """What downloaded scripts need."""
     subset: Callable[[fonts.FontJob], bytes] = fonts.subset_font

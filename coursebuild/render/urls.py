@@ -56,8 +56,11 @@ def page_path(page: Page) -> str:
 
 
 def file_path(path: str) -> str:
-    """`files/lessons/sketch.svg`: a file of `content/` that pages show or link to."""
-    return "files/" + path.removeprefix("content/")
+    """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
+
+    What a model pulls in lies beside the model, as in the course.
+    """
+    return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
 
 def local_file(url: str, document_path: str) -> str:

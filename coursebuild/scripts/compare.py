@@ -40,7 +40,7 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     """A verdict for every recording of the course that has a script, in order.
 
     Where two blocks have the same path only the first is run; what is recorded below the other is
-    not compared with its output.
+    not compared with its output. Nor is an output whose fence says in a wrong way how to compare.
     """
     by_path = {run.path: run for run in runs}
     first: dict[str, Script] = {}
@@ -54,7 +54,7 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
             elif isinstance(block, Recording) and block.script is not None:
                 same = nearest is not None and nearest.path == block.script
                 kept = not same or first[block.script] is nearest
-                run = by_path.get(block.script) if kept else None
+                run = by_path.get(block.script) if kept and block.readable else None
                 verdicts.append(_verdict(block, course.comparison, course.filters, run))
     return tuple(verdicts)
 

@@ -24,7 +24,7 @@ from coursebuild.source import Span
 
 _FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
 _WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
-_THREAD = re.compile(r"(?<=\b[Tt]hread )0x[0-9a-f]+ ")
+_THREAD = re.compile(r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
@@ -176,7 +176,7 @@ def _crash(
     where, span = lessons.innermost(stderr) or (extraction, fence)
     if rule == "script-failed" and not (_parses(where) and _parses(extraction)):
         return None
-    if where is not extraction:
+    if where.path != extraction.path:
         notes.append(Note(f"`{extraction.path}` was running", fence))
     return diagnose(
         rule,

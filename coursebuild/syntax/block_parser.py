@@ -1,6 +1,7 @@
 """The block parser: markdown-it's rules, chosen by the first character of a line.
 
-Entry point: `Blocks`. Its rules are markdown-it's own, with those for footnotes and formulas. Besides:
+Entry point: `Blocks`. Its rules are markdown-it's own, with those for footnotes and formulas.
+Besides:
 
 1. A line is only shown to the rules that can begin with its first character, and a paragraph only
    looks for its end where a rule could find one.
@@ -138,7 +139,7 @@ _ENDINGS = {
     "blockquote": _IN_PARAGRAPH,
     "list": _IN_LIST,
 }
-"""Which rules a line can end a block by, by its first character, for each of markdown-it's chains."""
+"""By chain of markdown-it's and by a line's first character: the rules that end a block there."""
 
 
 def _ends(chain: str, state: StateBlock, line: int, end: int, silent: bool) -> bool:
@@ -218,7 +219,7 @@ def _underlined(state: StateBlock, line: int, end: int) -> bool:
 
 
 def _place(state: BlockState, before: int, begin: int) -> None:
-    """Say where the block whose first token has the index `before` stands, while the state still knows."""
+    """Say where the block with its first token at `before` stands, while the state still knows."""
     opened = state.tokens[before]
     assert isinstance(opened, Placed)
     last = state.line - 1

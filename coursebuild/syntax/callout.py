@@ -1,4 +1,6 @@
-"""Callouts: blockquotes whose first line is `[!kind] Optional title`, or `[!kind]- Title` for one that starts folded.
+"""Callouts: blockquotes whose first line is `[!kind] Optional title`.
+
+`[!kind]- Title` makes one that starts folded.
 
 Entry points: `read_head` (what the first line says), `resolve` (the kind that it names).
 """

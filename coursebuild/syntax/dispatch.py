@@ -17,6 +17,12 @@ from coursebuild.syntax.session import Session
 from coursebuild.syntax.texts import TextParser
 
 
+_HEAD_RULES = frozenset(
+    {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
+)
+"""Mistakes that may have kept a block from being a script."""
+
+
 def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
     """The block of a fence that records no output."""
     if not fence.closed:
@@ -63,9 +69,7 @@ def _python(fence: Fence, session: Session) -> Block:
     session.diagnostics += parsed.diagnostics
     if isinstance(parsed.value, Script):
         session.script, session.script_wrong = parsed.value.path, False
-    elif not fence.nested and any(
-        word.key == "file" for word in parse_info(fence.info).value.words
-    ):
+    elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed.diagnostics):
         session.script, session.script_wrong = None, True
     return parsed.value
 

@@ -3,7 +3,8 @@
 Entry point: `parse_document`. It never raises, whatever the text:
 
 1. Line ends, NUL and a byte order mark are dealt with; front matter is reported and left out.
-2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own modules.
+2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own
+   modules.
 3. Footnotes are read last, in the order of their numbers.
 """
 
@@ -19,7 +20,9 @@ from coursebuild.syntax.spans import whole
 from coursebuild.syntax.tree import TextReader
 
 _YAML = re.compile(
-    r"---[ \t]*\n(?:[ \t]*(?:#.*)?\n)*[ \t]*[\w-]+[ \t]*:(?:[ \t].*)?\n(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
+    r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
+    r"[\w-]+[ \t]*:(?:[ \t].*)?\n"  # the first field
+    r"(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
 )
 _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
@@ -27,8 +30,8 @@ _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
     """Parse a lesson or a page.
 
-    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. Every mistake is a diagnostic, in the order
-    of its place; the document holds all that could be read.
+    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. All mistakes
+    are diagnostics, in the order of their places; the document holds all that could be read.
     """
     session = Session(source, callouts, lesson)
     base = _without_front_matter(whole(source), session)

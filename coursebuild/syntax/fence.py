@@ -1,7 +1,7 @@
 """Fences: a code block of the text, and what makes one of ours out of it.
 
-Entry points: `read_fence` (a token into a `Fence`), `OURS` (the kinds of fences that are more than code), `near_kind` (a kind that
-looks misspelt).
+Entry points: `read_fence` (a token into a `Fence`), `OURS` (the kinds of fences that are more than
+code), `near_kind` (a kind that looks misspelt).
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class Fence:
     body: Excerpt
     """The lines inside, each with its line end."""
     body_span: Span
-    """Those lines in the source, from the start of the first to the start of the line that closes the fence."""
+    """Those lines in the source, from the start of the first to that of the closing line."""
     prefix: str
     """What stands before each of those lines in the source."""
     closed: bool
     nested: bool
-    """Whether it stands in a text of a quiz or lab, where there are no lines of the lesson to extract or update."""
+    """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
 
     @property
     def kind(self) -> str:

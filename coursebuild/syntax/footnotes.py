@@ -1,6 +1,7 @@
 """Footnotes: which are written, which are referred to, and their numbers.
 
-Entry point: `Notes`. Numbers follow the order of first reference; labels are the same without regard to case.
+Entry point: `Notes`. Numbers follow the order of first reference; labels are the same without
+regard to case.
 """
 
 from __future__ import annotations
@@ -49,10 +50,10 @@ class Notes:
         """A reference, or `None` (and a diagnostic) where no such footnote is written."""
         key = label.casefold()
         if key not in self.written:
-            known = [note.label for note in islice(self.written.values(), 100)]
+            known = [f"[^{note.label}]" for note in islice(self.written.values(), 100)]
             message = f"footnote `[^{label}]` is not written anywhere"
             hint = (
-                did_you_mean(label, known)
+                did_you_mean(f"[^{label}]", known)
                 or f"write it as a paragraph that begins with `[^{label}]:`"
             )
             self.report(diagnose("footnote-undefined", span, message, help=hint))
@@ -63,7 +64,7 @@ class Notes:
         return FootnoteRef(span, label, number, occurrence)
 
     def finish(self) -> tuple[Footnote, ...]:
-        """Read the footnotes, those that only footnotes refer to included; warn of those that nothing refers to."""
+        """Read the footnotes, also those that only footnotes refer to, and warn of the unused."""
         blocks: dict[str, tuple[Block, ...]] = {}
         while missing := [key for key in self.numbers if key not in blocks]:
             for key in missing:

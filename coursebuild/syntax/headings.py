@@ -19,7 +19,10 @@ _ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
 _CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
 _NO_SLUG = re.compile(r"[^\w\s-]")
 _SPACES = re.compile(r"\s")
-_HELP = "write `{#id}`, `{.class}` or `{#id .class}`: letters, digits, `-`, `_`, and in an id also `:` and `.`"
+_HELP = (
+    "write `{#id}`, `{.class}` or `{#id .class}`, "
+    "of letters, digits, `-` and `_`, and in an id also `:` and `.`"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +69,7 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
 
 
 def slug(text: str) -> str:
-    """The anchor that a heading's text gives: lower case, letters and digits of any script, hyphens for spaces."""
+    """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
     return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-") or "section"
 
 
@@ -112,7 +115,7 @@ class Anchors:
 def heading_mistakes(
     span: Span, level: int, above: int | None, children: tuple[Inline, ...], *, lesson: bool
 ) -> list[Diagnostic]:
-    """What is wrong with a heading; `above` is the level of the one before it, where that counts."""
+    """What is wrong with a heading; `above` is the level before it, where that counts."""
     found: list[Diagnostic] = []
     if not plain_text(children).strip() and not any(
         isinstance(inline, Image) for inline in walk_inlines(children)

@@ -1,9 +1,11 @@
-"""Raw HTML: its tags, whether they balance, and HTML in quiz texts, where math between the tags is still math.
+"""Raw HTML: its tags, whether they balance, and HTML with formulas in quiz texts.
 
-Entry points: `tags` (scan), `Balance` (what is open), `html_flow` (a piece of HTML into an `HtmlFlow`).
+Entry points: `tags` (scan), `Balance` (what is open), `html_flow` (a piece of HTML into an
+`HtmlFlow`).
 
-Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw text never give a false alarm.
-An element must be closed in the block, list item or emphasis that it was opened in, as the page would be torn otherwise.
+Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw
+text never give a false alarm. An element must be closed in the block, list item or emphasis that it
+was opened in, as the page would be torn otherwise.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
-"""Info strings of fences: `kind [name] [key=value | key="value with spaces" | flag]…`.
+r"""Info strings of fences: `kind [name] [key=value | key="value with spaces" | flag]…`.
 
-Entry points: `parse_info` (an info string into words with spans), `read_keys` (those words against the keys of a kind).
+Entry points: `parse_info` (an info string into words with spans), `read_keys` (those words against
+the keys of a kind).
 
-In a quoted value `\\"` is a quote and `\\\\` a backslash. Mistakes are diagnostics at the word that is wrong; the rest is still read.
+In a quoted value `\"` is a quote and `\\` a backslash. Mistakes are diagnostics at the word that
+is wrong; the rest is still read.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import joined
 
 _WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
+_SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
 _SPACES = re.compile(r"\s*")
 _NEXT_SPACE = re.compile(r"\s|$")
 _ESCAPE = re.compile(r"""\\(["\\])""")
@@ -66,7 +69,12 @@ def parse_info(info: Excerpt) -> Parsed[Info]:
         found = _WORD.match(text, at)
         assert found is not None
         end = found.end()
-        if end < len(text) and not text[end].isspace():
+        spaced = _SPACED.match(text, at)
+        if spaced is not None:
+            equals, end = spaced.start(spaced.lastindex or 0), spaced.end()
+            message = "no space may stand beside the `=` of a key"
+            diagnostics.append(diagnose("fence-info", info.span(equals, equals + 1), message))
+        elif end < len(text) and not text[end].isspace():
             wrong, end = _malformed(info, at, end)
             diagnostics.append(wrong)
         elif not found[1]:

@@ -1,7 +1,8 @@
 """The inline parser: markdown-it's rules, chosen by the first character of a piece of text.
 
-Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes and bound
-numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks are text.
+Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes and
+bound numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks are
+text.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def _like_out(key: str) -> bool:
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
-    """A code span; with `{out}` after it a bound number (`number_binding`, the script's path in `info`)."""
+    """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`."""
     start = state.pos
     if not backtick(state, silent):
         return False
@@ -162,7 +163,7 @@ class Inlines(ParserInline):
         if state.pending:
             state.pushPending()
 
-    def skipToken(self, state: StateInline) -> None:
+    def skipToken(self, state: StateInline) -> None:  # noqa: N802
         """Move past one token without making it."""
         assert isinstance(state, InlineState)
         pos = state.pos
@@ -225,7 +226,10 @@ def _place_inline(state: InlineState, before: int, at: int) -> None:
 
 
 def _order_lone_tildes(tokens: Sequence[Token]) -> None:
-    """Of `~~a~~~` markdown-it makes the last tilde text and moves it behind the closing tag; let places follow."""
+    """Give places to the tilde that markdown-it moves behind a closing tag.
+
+    Of `~~a~~~` it makes the first tilde of the closing run text, and the two after it the tag.
+    """
     for i, token in enumerate(tokens):
         if (
             token.type != "text"

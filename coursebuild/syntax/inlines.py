@@ -1,10 +1,14 @@
 """Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
 
-Entry point: `InlineReader.read`. One pass over the flat tokens with a stack of open emphasis, strong, strikethrough and links:
+Entry point: `InlineReader.read`. One pass over the flat tokens with a stack of open emphasis,
+strong, strikethrough and links:
 
-1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak` and mentions (`mention`).
-2. An opening token puts a frame on the stack, its closing token makes the node from what was gathered since.
-3. Mistakes are reported on the way: bindings, schemes, images without text, footnotes that are not written, open formulas.
+1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
+   and mentions (`mention`).
+2. An opening token puts a frame on the stack, its closing token makes the node from what was
+   gathered since.
+3. Mistakes are reported on the way: bindings, schemes, images without text, footnotes that are not
+   written, open formulas.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Io blocks: what a script takes, does and gives.
 
-Entry point: `parse_io`. A line that begins with `INPUT:`, `PROCESS:` or `OUTPUT:` starts a part; the lines after it continue it. All
-three must be there, once, in this order.
+Entry point: `parse_io`. A line that begins with `INPUT:`, `PROCESS:` or `OUTPUT:` starts a part;
+the lines after it continue it. All three must be there, once, in this order.
 """
 
 from __future__ import annotations
@@ -109,5 +109,5 @@ def _missing(label: str, parts: _Parts, fence: Fence) -> Diagnostic:
 
 
 def _text(lines: list[Excerpt]) -> Excerpt | None:
-    """The lines of a part as one text, without indentation and empty lines; `None` where there is no text."""
+    """The lines of a part as one text without indentation and empty lines; `None` where none is."""
     return joined((trimmed(line) for line in lines if line.text.strip()), between="\n")

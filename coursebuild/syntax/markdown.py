@@ -33,7 +33,10 @@ _MARKDOWN = _configured()
 
 
 def block_tokens(base: Excerpt, definitions: Definitions) -> list[Placed]:
-    """The block tokens of a text (LF line ends, no NUL); link definitions in it are added to `definitions`."""
+    """The block tokens of a text with LF line ends and no NUL.
+
+    Its link definitions are added to `definitions`.
+    """
     env: EnvType = {**definitions.environment(), "definitions": definitions, "base": base}
     state = BlockState(base.text, _MARKDOWN, env)
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)

@@ -1,11 +1,13 @@
-"""Formulas: the inline rule for `$…$` and `$$…$$`, and the block rule for `$$` on lines of their own.
+"""Formulas: the inline rule for `$…$` and `$$…$$`, and the block rule for `$$` on its own lines.
 
-Entry points: `math_inline`, `math_block` (rules of the parser in `markdown`), `find_formula` (also for HTML in quiz texts).
+Entry points: `math_inline`, `math_block` (rules of the parser in `markdown`), `find_formula` (also
+for HTML in quiz texts).
 
-A `$` opens a formula when something other than white space follows; the next `$` that no backslash escapes must close it,
-with something other than white space before it and no digit after it. So "costs $5 and $6" holds no formula. Code spans bind
-tighter than formulas, formulas tighter than emphasis and links. A block of math ends at a `$$` with nothing after it; an empty line
-before that means that it was never closed.
+A `$` opens a formula when something other than white space follows; the next `$` that no backslash
+escapes must close it, with something other than white space before it and no digit after it. So
+"costs $5 and $6" holds no formula. Code spans bind tighter than formulas, formulas tighter than
+emphasis and links. A block of math ends at a `$$` with nothing after it; an empty line before that
+means that it was never closed.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ _DIGITS = "0123456789"
 
 
 class Formula(NamedTuple):
-    """A formula found in a text: its TeX reaches from `start` to `end`, and with its dollars up to `after`."""
+    """A formula found in a text: its TeX is at `[start, end)`; its dollars end at `after`."""
 
     start: int
     end: int
@@ -38,9 +40,10 @@ class Formula(NamedTuple):
 def find_formula(
     text: str, at: int, limit: int, last_runs: dict[int, int] | None = None
 ) -> Formula | None:
-    """The formula that begins with the `$` at `at` and closes before `limit`; none where that dollar is a dollar.
+    """The formula that begins with the `$` at `at` and closes before `limit`, if it is one.
 
-    `last_runs` says where the last run of each number of backticks begins; by it a code span inside is recognised.
+    `last_runs` says where the last run of each number of backticks begins; by it a code span inside
+    is recognised.
     """
     width = 2 if text.startswith("$$", at) else 1
     start = at + width
@@ -65,7 +68,10 @@ def find_formula(
 
 
 def math_inline(state: StateInline, silent: bool) -> bool:
-    """The inline rule: a token `math` (its place without dollars in `map`), or `math_unclosed` for a `$$` without end."""
+    """The inline rule: a token `math`, or `math_unclosed` for a `$$` without end.
+
+    The TeX stands where `map` says.
+    """
     assert isinstance(state, InlineState)
     at = state.pos
     run = _DOLLARS.match(state.src, at, state.posMax)

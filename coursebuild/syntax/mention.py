@@ -5,8 +5,8 @@ Entry points: `Item` (a stretch of text between other inlines), `may_mention`, `
 
 1. Text and soft line ends that follow each other make one run, so that a mention may be broken over
    two lines.
-2. Each mention becomes a `Link`, whose `target_span` is the number; what is around it becomes `Text`
-   and `SoftBreak`.
+2. Each mention becomes a `Link`, whose `target_span` is the number; what is around it becomes
+   `Text` and `SoftBreak`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """MJCF blocks: a model or a fragment of one, or a model that must not compile.
 
-Entry point: `parse_mjcf`. Keys: `fragment="worldbody"` (where the fragment goes; `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
+Entry point: `parse_mjcf`. Keys: `fragment="worldbody"` (where the fragment goes; `worldbody/body`
+names nested elements), `error="…"` (the message it must fail with).
 """
 
 from __future__ import annotations

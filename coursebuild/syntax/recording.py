@@ -58,6 +58,7 @@ def record_fence(
         fence.prefix,
         how.value,
         _script(caption_span, session),
+        readable=not how.diagnostics,
     )
 
 

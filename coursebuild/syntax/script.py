@@ -1,6 +1,7 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
-Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun` of a script; `fragment` of code that need not parse.
+Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun` of a script;
+`fragment` of code that need not parse.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     diagnostics = [*info.diagnostics, *keys.diagnostics]
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
     misspelt = any(word.key == "file" for word in info.value.words)
-    if file is None and not misspelt:
+    if file is None and not diagnostics:
         diagnostics += [_needs_file(word) for key in _RUNNING if (word := keys.value.get(key))]
     if fragment is not None and misspelt:
         message = "a block with `file` is run, so it cannot be a `fragment`"
@@ -181,7 +182,7 @@ def path_mistake(path: str) -> str:
     if reserved := next((part for part in parts if _DEVICE.fullmatch(part)), None):
         return f"`{reserved}` is a reserved name on some systems"
     if stem in _SHADOWED:
-        return f"`{path}` would be imported in place of the module `{stem}` by every script in its folder"
+        return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""
 
 

@@ -1,6 +1,7 @@
-"""What the readers of one document share: diagnostics, anchors, footnotes, and the script that an output belongs to.
+"""What the readers of one document share: diagnostics, anchors, footnotes, the script above.
 
-Entry point: `Session`. A document is read once, from its first line to its last; texts inside quizzes and labs are read where they stand.
+Entry point: `Session`. A document is read once, from its first line to its last; texts inside
+quizzes and labs are read where they stand.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Session:
         self.diagnostics.append(diagnostic)
 
     def apart(self, read: Callable[[], T]) -> Parsed[T]:
-        """What `read` gives, with the diagnostics that it raised; they are the caller's to pass on."""
+        """What `read` gives, with the diagnostics that it raised, for the caller to pass on."""
         before, self.diagnostics = self.diagnostics, []
         try:
             return Parsed(read(), tuple(self.diagnostics))

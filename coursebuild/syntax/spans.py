@@ -1,11 +1,14 @@
 """Where markdown-it's tokens stand: tokens, parser states and excerpts that keep positions.
 
-Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are `Placed`), `locate` (content rows
-into an `Excerpt`), `Placer` (positions in an excerpt into spans).
+Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are `Placed`),
+`locate` (content rows into an `Excerpt`), `Placer` (positions in an excerpt into spans).
 
-1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows began.
-2. `locate` joins such rows to an excerpt of the source, through the excerpt that was parsed (a whole file, or a text in JSON).
-3. Inline rules work on one block's content; `InlineState` notes from where to where each token reaches in it.
+1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows
+   began.
+2. `locate` joins such rows to an excerpt of the source, through the excerpt that was parsed (a
+   whole file, or a text in JSON).
+3. Inline rules work on one block's content; `InlineState` notes from where to where each token
+   reaches in it.
 """
 
 from __future__ import annotations
@@ -37,7 +40,7 @@ class Row(NamedTuple):
 
 @dataclass(slots=True)
 class Placed(Token):
-    """A token that knows its place: in the parsed text for block tokens, in the block's content for inline ones."""
+    """A token that knows its place: in the parsed text, or for inline tokens in the content."""
 
     start: int = -1
     end: int = -1
@@ -53,7 +56,7 @@ class BlockState(StateBlock):
         self.rows: list[Row] = []
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
-        """Add a token; an item of a list notes where its marker stands, as no rule of its own makes it."""
+        """Add a token; that of an item of a list, which has no rule of its own, gets its place."""
         token = Placed(ttype, tag, nesting, block=True)
         if nesting < 0:
             self.level -= 1
@@ -65,7 +68,7 @@ class BlockState(StateBlock):
         self.tokens.append(token)
         return token
 
-    def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:
+    def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:  # noqa: N802
         """The lines from `begin` to `end` without `indent` columns of their indentation."""
         self.rows = [
             self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
@@ -100,7 +103,7 @@ class InlineState(StateInline):
         self.last_runs: dict[int, int] | None = None
         """Where the last run of each number of backticks begins, once somebody asked."""
 
-    def pushPending(self) -> Token:
+    def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
         content = self.pending
         token = Placed("text", "", 0, content=content, level=self.pendingLevel)
@@ -110,7 +113,7 @@ class InlineState(StateInline):
         return token
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
-        """Add a token that begins at the current position; the tokenizer sets its end when the rule is through."""
+        """Add a token that begins here; the tokenizer sets its end when the rule is through."""
         if self.pending:
             self.pushPending()
         token = Placed(ttype, tag, nesting)
@@ -208,7 +211,7 @@ class Placer:
 
 
 def whole(source: Source) -> Excerpt:
-    """All of a file as Markdown sees it: line ends are LF, NUL is U+FFFD, a byte order mark is skipped."""
+    """All of a file as Markdown sees it: LF, U+FFFD for NUL, no byte order mark."""
     if "\r" in source.text:
         excerpt = source.excerpt()
     else:

@@ -1,4 +1,4 @@
-"""Where links lead: a destination as written becomes a `Target`, or a diagnostic where a page must not link there.
+"""Where links lead: destinations as targets, and schemes that a page must not have.
 
 Entry points: `classify`, `check_scheme`, `check_raw_scheme`.
 """
@@ -55,7 +55,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
             "link-scheme",
             span,
             f"`{scheme}:` must not stand in a page",
-            help="link to an address with `https:`, to a file of the course, or to `lesson:`, `page:` or `model:`",
+            help="link to an address with `https:`, to a file, or by `lesson:`, `page:`, `model:`",
         )
     near = nearest(scheme, _OURS, cutoff=0.75)
     if near is None:

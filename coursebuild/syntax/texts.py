@@ -1,7 +1,7 @@
 """What the parsers of quizzes and labs need from Markdown, without knowing how it is parsed.
 
-Entry point: `TextParser`. The parser of a document hands itself in this shape to `parse_quiz` and `parse_lab`, so that
-their texts share the document's footnotes, anchors and rules.
+Entry point: `TextParser`. The parser of a document hands itself in this shape to `parse_quiz` and
+`parse_lab`, so that their texts share the document's footnotes, anchors and rules.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class TextParser(Protocol):
     """Markdown inside another language: every node's span points at the lesson's own text."""
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
-        """The blocks of a text; HTML in it is kept, and math between its tags is math. Never raises."""
+        """The blocks of a text; math between the tags of HTML is math. Never raises."""
         ...
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
-        """The inlines of a text that is one paragraph at most; line ends in it are soft breaks. Never raises."""
+        """The inlines of a text of at most one paragraph; line ends are soft. Never raises."""
         ...

@@ -1,9 +1,12 @@
 """Block content: markdown-it's block tokens become `Block` nodes with spans.
 
-Entry points: `TextReader` (one text into blocks), `Texts` (the `TextParser` that quizzes and labs get).
+Entry points: `TextReader` (one text into blocks), `Texts` (the `TextParser` that quizzes and labs
+get).
 
-1. `prepare` makes the tokens and notes the explicit ids and the footnotes in them, which must be known before the first reference.
-2. `blocks` walks the flat tokens once, a method for each kind of block; containers call back for what they hold.
+1. `prepare` makes the tokens and notes the explicit ids and the footnotes in them, which must be
+   known before the first reference.
+2. `blocks` walks the flat tokens once, a method for each kind of block; containers call back for
+   what they hold.
 3. A paragraph looks at what follows it: `Output:` and the block below it are one `Recording`.
 """
 

@@ -111,7 +111,7 @@ class TestFacts:
             ),
         )
 
-    @pytest.mark.parametrize("name", ["Euler", "RK4", "implicit", "implicitfast"])
+    @pytest.mark.parametrize("name", ["Euler", "RK4", "implicit", "implicitfast", "discrete"])
     def test_integrators_by_their_names(self, root: Path, name: str) -> None:
         facts = text(root, f'<mujoco><option integrator="{name}"/></mujoco>').facts
         assert facts is not None and facts.integrator == name

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.effects import runner
+from coursebuild.effects.errors import EffectError
 from coursebuild.effects.runner import (
     RunEvent,
     RunFinished,
@@ -180,6 +182,13 @@ class TestOutcomes:
             (result,) = run_scripts(root, [job(path)], parallel=1)
             assert (result.outcome, result.stdout) == (Outcome.FAILED, "")
             assert result.stderr == f"there is no file {path}\n"
+
+    def test_no_place_for_temporary_files(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+        with pytest.raises(EffectError, match="no place for temporary files: no such file"):
+            run("print(1)")
 
     def test_impossible_argument(self, run: Run) -> None:
         result = run("print(1)", args=["a\0b"])
@@ -428,7 +437,11 @@ class TestNothingStaysBehind:
 
     def test_kills_its_supervisor(self, root: Path) -> None:
         for name, code in (
-            ("a", f"{ME}import time\nos.kill(os.getppid(), 9)\ntime.sleep(60)\n"),
+            (
+                "a",
+                f"{ME}import time\nopen('examples/tmp', 'w').write(os.environ['TMPDIR'])\n"
+                "os.kill(os.getppid(), 9)\ntime.sleep(60)\n",
+            ),
             ("b", "print('b')\n"),
         ):
             (root / f"examples/{name}.py").write_text(code)
@@ -438,6 +451,7 @@ class TestNothingStaysBehind:
         assert "the process that supervises this script was ended by SIGKILL" in a.stderr
         assert [r.stdout for r in others] == ["b\n", "b\n"]
         assert gone(wait_for(root / "examples/me"))
+        assert not Path((root / "examples/tmp").read_text()).parent.exists()
 
     def tool(self, root: Path, code: str) -> subprocess.Popen[str]:
         (root / "examples/x.py").write_text(code)
@@ -463,9 +477,9 @@ class TestNothingStaysBehind:
         assert all(gone(pid) for pid in pids)
         folder = Path((root / "examples/tmp").read_text())
         until = time.monotonic() + 10
-        while folder.exists() and time.monotonic() < until:
+        while folder.parent.exists() and time.monotonic() < until:
             time.sleep(0.01)
-        assert not folder.exists()
+        assert folder.parent.name.startswith("coursebuild-") and not folder.parent.exists()
 
     def test_whoever_listens_fails(self, root: Path) -> None:
         (root / "examples/x.py").write_text(

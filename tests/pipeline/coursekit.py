@@ -153,6 +153,9 @@ class Folder:
         unsaid = ("NO_COLOR", "FORCE_COLOR", "COLUMNS", "LINES", "TERM", "CI")
         outer = {name: value for name, value in os.environ.items() if name not in unsaid}
         ours = {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.tmp), "PYTHONWARNINGS": "error"}
+        ours["LOGNAME"] = str(
+            self.tmp
+        )  # of what is passed on to children, that which nothing reads
         return outer | ours | dict(more or {})
 
 

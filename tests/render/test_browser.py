@@ -35,6 +35,10 @@ $$\\int_V x\\,dV$$
 | --- | ---: |
 | mass | 1.0 |
 
+| Wide | Table |
+| --- | --- |
+| https://example.org/an/address/that/cannot/be/broken | supercalifragilisticexpialidocious |
+
 > [!established] Title
 > Text.
 

@@ -56,6 +56,7 @@ After.
 
 FILES = (
     OutputFile("content/lessons/data.csv", b"1,2\n"),
+    OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),
     OutputFile("content/img/s.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>"),
 )
 
@@ -91,6 +92,7 @@ def test_the_files(site: dict[str, bytes]) -> None:
         "levels/1.html",
         "models/box.html",
         "models/box.xml",
+        "models/meshes/hand.obj",
         "robots.txt",
         "sitemap.xml",
     ]
@@ -264,6 +266,7 @@ def test_the_lesson_page(site: dict[str, bytes]) -> None:
         "<li>20 minutes</li>",
         "<li>Say what falls</li>\n<li>Measure it</li>",
         '<li><a href="#first-part">First part</a>\n<ol>\n<li><a href="#detail">Detail</a></li>\n'
+        "</ol>",
         '<a class="pager-next" rel="next" href="1.1-spinning.html">',
         'href="https://example.org/repo/edit/main/content/lessons/0.1-falling.md"',
         '<a href="0.1-falling.zip" download>',

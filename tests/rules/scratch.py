@@ -1,6 +1,6 @@
 """Scratch courses, written out of the input of a fixture, and the fixture files themselves.
 
-Entry points: `read_cases` (a fixture file), `Layout.of` (an input as files), `Layout.write`.
+Entry points: `read_cases` (a fixture file), `Layout.of` (an input as files), `parts` (the same as texts).
 
 A fixture file holds cases: a title, the input and the expected text, each ended by a line that holds
 only `.`; what stands before a case's title on lines that begin with `#` is for its readers.
@@ -130,7 +130,7 @@ class Layout:
     def of(cls, text: str) -> Layout:
         """The files that an input names, and those that every scratch course has."""
         layout = cls({path: default.encode() for path, default in DEFAULTS.items()})
-        for kind, path, body in _parts(text):
+        for kind, path, body in parts(text):
             layout._add(kind, path, body)
         return layout
 
@@ -176,7 +176,7 @@ def put(path: Path, data: bytes) -> None:
     path.write_bytes(data)
 
 
-def _parts(text: str) -> Iterator[tuple[str, str, str]]:
+def parts(text: str) -> Iterator[tuple[str, str, str]]:
     """The kind, the path and the body of each file."""
     if not _HEADER.match(text):
         yield "", FIRST, text

@@ -119,10 +119,10 @@ def test_an_exception_group_ends_with_its_last_exception() -> None:
         '  |   File "/x/examples/a.py", line 5, in <module>\n  |     go()\n'
         "  | ExceptionGroup: two (1 sub-exception)\n  +-+---------------- 1 ----------------\n"
         '    | Traceback (most recent call last):\n    |   File "/x/examples/a.py", line 4, in go\n'
-        "    |     helper.fall()\n    | ValueError: bad\n    +------------------------------------\n"
+        "    |     helper.fall()\n    | ValueError: bad\n    +------------------------\n"
     )
     assert said(stderr).split("\n")[1:4] == [
-        "script-failed at 7:1 `    helper.fall()`",
+        "script-failed at 7:5 `helper.fall()`",
         "  `examples/a.py` exited with status 1",
         "  ^ ValueError: bad",
     ]

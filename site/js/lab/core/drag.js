@@ -46,8 +46,9 @@ export class Drag {
 
   /** Where the held point is drawn to (m, world). */
   move(target) {
+    if (!this.active) return
     this.handle.refselpos.set(target)
-    if (!this.active || this.mocap < 0) return
+    if (this.mocap < 0) return
     const offset = fromLocal(this.data, this.body, this.handle.localpos)
     this.data.mocap_pos.set(target.map((x, i) => x - offset[i]), 3 * this.mocap)
   }

@@ -34,9 +34,14 @@ export async function createEngine(loadMujoco, instantiate, log = () => {}) {
     print: log,
     printErr: log,
     instantiateWasm(imports, done) {
+      const started = readableBooleans(imports.env)
+      const use = ({ instance, module }) => {
+        started(instance)
+        done(instance, module)
+      }
       const result = instantiate(imports)
-      if (typeof result.then === 'function') result.then((made) => done(made.instance, made.module), fail)
-      else done(result.instance, result.module)
+      if (typeof result.then === 'function') result.then(use, fail)
+      else use(result)
     },
   })
   try {
@@ -44,6 +49,39 @@ export async function createEngine(loadMujoco, instantiate, log = () => {}) {
   } catch (error) {
     throw new EngineError(`the engine does not start: ${error.message ?? error}`, true)
   }
+}
+
+/**
+ * Arrays of booleans (`data.eq_active`, `model.light_active`, …) have a type that the bindings forget to register, so that reading
+ * one throws. It is registered here, as bytes, when it is first met.
+ *
+ * @param {object} env the functions that the engine imports; one is replaced
+ * @returns {(instance: WebAssembly.Instance) => void} to be called with the instance
+ */
+function readableBooleans(env) {
+  const take = env._emval_take_value
+  let memory = null
+  let known = false
+  const UNSIGNED_BYTES = 1
+  env._emval_take_value = (type, argument) => {
+    if (known) return take(type, argument)
+    try {
+      return take(type, argument)
+    } catch (error) {
+      // A C++ type_info: a pointer to its methods, then one to its name.
+      const name = new Uint32Array(memory.buffer)[(type >> 2) + 1]
+      if (textAt(memory, name) !== 'N10emscripten11memory_viewIbEE') throw error
+      env._embind_register_memory_view(type, UNSIGNED_BYTES, name)
+      known = true
+      return take(type, argument)
+    }
+  }
+  return (instance) => (memory = instance.exports.memory)
+}
+
+function textAt(memory, address) {
+  const bytes = new Uint8Array(memory.buffer)
+  return String.fromCharCode(...bytes.subarray(address, bytes.indexOf(0, address)))
 }
 
 /** A running engine: `mj` are the bindings, `version` is MuJoCo's, `k` the numbers of its enumerations. */

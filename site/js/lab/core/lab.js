@@ -30,6 +30,7 @@ export class Lab {
     this.config = config
     this.code = code
     this.host = host
+    this.recorder = null // of each step, for the trial
     this.handles = engine.load(bytes)
     try {
       this.build()
@@ -46,11 +47,11 @@ export class Lab {
     Watch.keep(engine, model)
     this.model = model
     this.data = data
+    this.option = model.opt // every access through the model would make a new object
     this.paused = !config.autoplay
     this.key = keyframe(engine, model, config.key)
     this.ctx = {}
     this.scratch = { force: handles.own(new mj.DoubleBuffer(6)) }
-    this.random = () => this.draw()
     this.watch = new Watch(engine, model, data)
     this.sampler = new Sampler(config, code, siteOf(engine, model, config.trail))
     this.pictures = new Pictures(engine, handles, config, this.sampler)
@@ -58,39 +59,37 @@ export class Lab {
     this.signature = k.state.INTEGRATION
     this.stateSize = mj.mj_stateSize(model, this.signature)
     this.stateBuffer = handles.own(new mj.DoubleBuffer(Math.max(1, this.stateSize)))
-    this.env = this.environment(data, this.sim(data, true))
-    this.view = this.environment(shown, this.sim(shown, false))
+    this.env = this.environment(data, true)
+    this.view = this.environment(shown, false)
     this.warnings = []
     this.forget()
   }
 
-  environment(data, sim) {
-    const { engine, model, ctx, scratch, random } = this
-    return Object.freeze({ model, data, mj: engine.mj, sim, ctx, lib: createLib(engine, model, data, scratch, random) })
-  }
-
-  /** What lab code sees as `sim`; what is only looking may not act. */
-  sim(data, acting) {
+  /** What lab code sees; code that only looks (`acts` is false) may not act. */
+  environment(data, acts) {
+    const { engine, model, ctx, scratch } = this
     const act = (name, action) =>
-      acting
+      acts
         ? action
         : () => {
-            throw new Error(`sim.${name}() is not for code that only looks`)
+            throw new Error(`${name}() is not for code that only looks`)
           }
+    const random = act('lib.random', () => this.draw())
     const lab = this
-    return Object.freeze({
+    const sim = Object.freeze({
       get time() {
         return data.time
       },
       get paused() {
         return lab.paused
       },
-      play: act('play', () => this.setPaused(false)),
-      pause: act('pause', () => this.setPaused(true)),
-      reset: act('reset', () => this.reset()),
-      step: act('step', (n = 1) => void this.step(n)),
-      contacts: () => contactList(this.engine, this.model, data, this.scratch),
+      play: act('sim.play', () => this.setPaused(false)),
+      pause: act('sim.pause', () => this.setPaused(true)),
+      reset: act('sim.reset', () => this.reset()),
+      step: act('sim.step', (n = 1) => void this.step(n)),
+      contacts: () => contactList(engine, model, data, scratch),
     })
+    return Object.freeze({ model, data, mj: engine.mj, sim, ctx, lib: createLib(engine, model, data, scratch, random) })
   }
 
   // --- life
@@ -235,12 +234,15 @@ export class Lab {
   }
 
   one() {
-    const { engine, model, data, drag } = this
+    const { engine, model, data, drag, recorder } = this
+    recorder?.begin()
     if (this.code.controller) call(['controller'], () => this.code.controller(this.env))
+    recorder?.controlled()
     const before = data.time
     drag.push()
     engine.mj.mj_step(model, data)
     drag.pop()
+    recorder?.end()
     this.steps += 1
     this.dirty = true
     const findings = this.watch.look(before)
@@ -248,7 +250,7 @@ export class Lab {
       findings.warnings.forEach((finding) => this.note(finding))
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
     }
-    const timestep = model.opt.timestep
+    const timestep = this.option.timestep
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
     const { stopAt } = this.config
     const late = stopAt === null ? Infinity : stopAt - timestep / 2
@@ -306,11 +308,17 @@ export class Lab {
 
   // --- dragging
 
-  /** Hold `body` at the world point `point` and draw it to `target`; nothing lets go. */
+  /**
+   * Drag a body by a spring.
+   *
+   * @param {{body?: number, point?: number[], target: number[]} | null} request with a `point` (m, world) the body is taken hold of
+   *   there; the spring draws it to `target`; `null` lets go
+   */
   perturb(request) {
     if (request === null) return this.drag.release()
-    if (request.body !== undefined && !(this.drag.active && request.body === this.drag.body && !request.point)) {
-      if (!this.drag.grab(request.body, request.point ?? request.target)) return
+    if (request.point) {
+      this.engine.mj.mj_forward(this.model, this.data)
+      this.drag.grab(request.body, request.point)
     }
     this.drag.move(request.target)
     this.dirty = true

@@ -15,8 +15,8 @@ export class LabError extends Error {
   }
 }
 
-/** The entry whose code runs now; outlives an engine that was stopped from outside. */
-export const current = { entry: null }
+/** The entry whose code runs now, and the entry that is being tried; they outlive an engine that was stopped from outside. */
+export const current = { entry: null, trying: null }
 
 /** Call `code` for `entry`; what it throws becomes a LabError. */
 export function call(entry, code) {

@@ -1,0 +1,74 @@
+"""The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
+
+Entry point: `LabEngine.trial`. See docs/labs.md for what is asked and answered.
+
+The engine is started when it is first needed, and again after a trial that ran too long or took too
+much memory: such a trial is told as what it is, and takes no other along.
+"""
+
+from __future__ import annotations
+
+import json
+from types import TracebackType
+from typing import Any, Self
+
+from coursebuild.effects.resources import assets_dir
+from coursebuild.effects.v8 import Isolate, LimitError
+
+_MEMORY = 1 << 30
+"""Bytes: the engine's WebAssembly memory counts."""
+_START_SECONDS = 60.0
+_MARGIN = 15.0
+"""A trial ends itself when its time is over; this is for code that never returns."""
+
+
+class LabEngine:
+    """Tries labs, one after the other; a context manager for use in one thread."""
+
+    def __init__(self) -> None:
+        self._isolate: Isolate | None = None
+        self.version = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free V8's memory; the engine can be used again."""
+        if self._isolate is not None:
+            self._isolate.close()
+            self._isolate = None
+
+    def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
+        """The reply to a trial's request; `wall` is how many seconds it may take.
+
+        A trial that had to be stopped gives a reply with one failure, of the kind `timeout`.
+        """
+        isolate = self._isolate or self._start()
+        try:
+            isolate.fill("mjb", mjb)
+            text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + _MARGIN)
+        except LimitError as error:
+            self.close()
+            failure: dict[str, Any] = {"entry": [], "kind": "timeout", "message": str(error), "at": None}
+            return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
+        reply: dict[str, Any] = json.loads(text)
+        if any(failure["kind"] == "engine" for failure in reply["failures"]):
+            self.close()  # what ended in the middle of something cannot be trusted with the rest
+        return reply
+
+    def _start(self) -> Isolate:
+        folder = assets_dir()
+        script = (folder / "js" / "lab-trial.js").read_text(encoding="utf-8")
+        self._isolate = isolate = Isolate(script, memory=_MEMORY)
+        isolate.fill("wasm", (folder / "mujoco" / "mujoco.wasm").read_bytes())
+        isolate.call("boot", "", _START_SECONDS)
+        self.version = isolate.call("booted", "", _START_SECONDS)
+        return isolate

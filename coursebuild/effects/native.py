@@ -1,0 +1,53 @@
+"""MuJoCo natively, for labs: models as MJB files, and runs repeated beside WebAssembly's.
+
+Entry point: `NativeEngine`, a context manager around a child process.
+"""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any
+
+from coursebuild.effects import native_worker
+from coursebuild.effects.child import JsonChild
+from coursebuild.effects.errors import EffectError
+
+_TIMEOUT = 120.0
+"""Seconds for one model, or one run."""
+
+
+class NativeEngine(JsonChild):
+    """The child that runs MuJoCo."""
+
+    def __init__(self, root: Path) -> None:
+        super().__init__(native_worker.__file__, _TIMEOUT)
+        self._root = root.resolve()
+
+    def save(self, path: str, text: str) -> bytes:
+        """A model as an MJB file, of a text that stands, or would stand, at a path of the course.
+
+        Raises:
+            EffectError: it does not compile (which has been found before), or the child died.
+        """
+        request = {"task": "save", "path": str(self._root / path), "text": text}
+        return base64.b64decode(self._told(request, path)["mjb"])
+
+    def parity(self, mjb: bytes, run: dict[str, Any], name: str) -> dict[str, Any]:
+        """A recorded run of the browser's engine, repeated: where and by how much it differs.
+
+        `run` is the `parity` part of a trial's reply.
+
+        Raises:
+            EffectError: the child died.
+        """
+        model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
+        return self._told({"task": "parity", "mjb": model, "run": run}, name)
+
+    def _told(self, request: dict[str, Any], name: str) -> dict[str, Any]:
+        reply: dict[str, Any] | None = self.ask({**request, "limit": _TIMEOUT})
+        if reply is None:
+            raise EffectError(f"{name}: MuJoCo {self.death()}")
+        if reply["error"]:
+            raise EffectError(f"{name}: {reply['error']}")
+        return reply

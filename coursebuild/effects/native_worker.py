@@ -1,0 +1,129 @@
+"""The child process that runs MuJoCo natively for labs: saves models, steps beside WebAssembly.
+
+Entry point: run as a file by `native`, in a temporary folder, where MuJoCo may leave its log.
+
+The protocol: JSON lines, binary data in base64. First this process says that it is ready; then it
+answers each request with one line. A request that takes longer than its limit ends this process by
+SIGALRM.
+
+- `save`: compile a text (as if it stood at a path) and give the model as an MJB file.
+- `parity`: load an MJB file, set the state, step, and compare with the states that were recorded.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import signal
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+_MODEL = "model.mjb"
+
+
+def main() -> None:
+    """Serve until the input closes."""
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)  # MuJoCo prints its warnings
+    import mujoco
+    import numpy
+
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    tasks = {"save": _save, "parity": _parity}
+    print("ready", file=replies, flush=True)
+    for line in sys.stdin:
+        request = json.loads(line)
+        signal.setitimer(signal.ITIMER_REAL, request["limit"])
+        try:
+            reply = {"error": "", **tasks[request["task"]](mujoco, numpy, request)}
+        except (ValueError, mujoco.FatalError, MemoryError) as error:
+            reply = {"error": str(error) or type(error).__name__}
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        print(json.dumps(reply), file=replies, flush=True)
+
+
+def _save(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+    path = request["path"]
+    model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
+    buffer = numpy.zeros(mujoco.mj_sizeModel(model), numpy.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return {"mjb": base64.b64encode(buffer.tobytes()).decode()}
+
+
+def _array(numpy: Any, packed: Any) -> Any:
+    kinds = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
+    return numpy.frombuffer(base64.b64decode(packed["data"]), kinds[packed["type"]])
+
+
+def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+    """Repeat a run natively.
+
+    The checksum of each step tells the first that differs; the states recorded at every `stride`-th
+    step tell by how much.
+    """
+    run = request["run"]
+    Path(_MODEL).write_bytes(base64.b64decode(request["mjb"]))
+    model = mujoco.MjModel.from_binary_path(_MODEL)
+    data = mujoco.MjData(model)
+    signature = run["signature"]
+    mujoco.mj_setState(model, data, _array(numpy, run["start"]), signature)
+    sums = _array(numpy, run["checksums"])
+    states = _array(numpy, run["states"]).reshape(-1, max(run["width"], 1))
+    writes = _Writes(mujoco, numpy, model, run, signature)
+    first, worst, relative, at = None, 0.0, 0.0, 0
+    for step in range(run["steps"]):
+        writes.apply(step, data)
+        mujoco.mj_step(model, data)
+        checksum = 0
+        for part in (data.qpos, data.qvel, data.act):
+            checksum = zlib.crc32(part.tobytes(), checksum)
+        if first is None and checksum != sums[step]:
+            first = step + 1
+        if first is None or (step + 1) % run["stride"]:
+            continue
+        mine = numpy.concatenate((data.qpos, data.qvel, data.act))
+        gap = float(numpy.abs(mine - states[(step + 1) // run["stride"] - 1]).max())
+        gap = gap if gap == gap else 1e300  # NaN is as far apart as can be
+        if gap > worst:
+            worst, at = gap, step + 1
+            relative = gap / max(float(numpy.abs(mine).max()), 1.0)
+    return {
+        "first": first,
+        "worst": worst,
+        "relative": relative,
+        "at": at,
+        "timestep": float(model.opt.timestep),
+    }
+
+
+class _Writes:
+    """What a controller wrote into the state before each step."""
+
+    def __init__(self, mujoco: Any, numpy: Any, model: Any, run: Any, signature: int) -> None:
+        self.set_state, self.get_state = mujoco.mj_setState, mujoco.mj_getState
+        self.model, self.signature = model, signature
+        packed = run["writes"]
+        self.steps = _array(numpy, packed["steps"])
+        self.indices = _array(numpy, packed["indices"])
+        self.values = _array(numpy, packed["values"])
+        self.state = numpy.zeros(mujoco.mj_stateSize(model, signature))
+        self.next = 0
+
+    def apply(self, step: int, data: Any) -> None:
+        end = self.next
+        while end < len(self.steps) and self.steps[end] == step:
+            end += 1
+        if end == self.next:
+            return
+        self.get_state(self.model, data, self.state, self.signature)
+        self.state[self.indices[self.next : end]] = self.values[self.next : end]
+        self.set_state(self.model, data, self.state, self.signature)
+        self.next = end
+
+
+if __name__ == "__main__":
+    main()

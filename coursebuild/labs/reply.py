@@ -1,0 +1,67 @@
+"""The reply of a trial, read: plain values with arrays.
+
+Entry point: `read_trial(reply)`. docs/labs.md says what a reply holds.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from coursebuild.labs.compile import Entry
+
+_KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Something that went wrong in a trial."""
+
+    entry: Entry
+    kind: str
+    """`throws`, `nan`, `type`, `warning`, `diverged`, `expect`, `stopAt`, `timeout` or `engine`."""
+    message: str
+    time: float | None
+    """Simulated time, s."""
+    during: str
+    """What was being tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A reply. `main` is what the main run recorded, `None` where it did not come to its end."""
+
+    version: str
+    tried: tuple[str, ...]
+    failures: tuple[Failure, ...]
+    main: dict[str, Any] | None
+
+
+def read_trial(reply: dict[str, Any]) -> Trial:
+    """A reply of the trial's JavaScript."""
+    failures = tuple(
+        Failure(
+            tuple(failure["entry"]),
+            failure["kind"],
+            failure["message"],
+            failure["at"],
+            (failure.get("during") or {}).get("what", ""),
+        )
+        for failure in reply["failures"]
+    )
+    tried = tuple(step["what"] for step in reply["tried"])
+    return Trial(reply["version"], tried, failures, reply["main"])
+
+
+def unpacked(value: Any) -> Any:
+    """The value with arrays in place of base64."""
+    if isinstance(value, list):
+        return [unpacked(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if set(value) == {"type", "data"} and value["type"] in _KINDS:
+        return np.frombuffer(base64.b64decode(value["data"]), _KINDS[value["type"]])
+    return {key: unpacked(item) for key, item in value.items()}

@@ -1,0 +1,53 @@
+/**
+ * The labs' trial, one classic script for a bare V8 in the process that builds the site. docs/labs.md says how it is called:
+ *
+ *   reserve(name, size) → ArrayBuffer    to be filled from outside: 'wasm', and 'mjb' before each trial
+ *   boot('')            → ''             compiles and starts the engine; ends before the next call
+ *   booted('')          → version        or throws why it did not start
+ *   trial(requestJson)  → replyJson
+ *   trying('')          → JSON           the entry whose code ran last, for a trial that was stopped from outside
+ */
+
+import './lab/trial/shims.js'
+import loadMujoco from '@mujoco/mujoco'
+import { createEngine } from './lab/core/engine.js'
+import { current } from './lab/core/piece.js'
+import { fromBase64 } from './lab/trial/base64.js'
+import { runTrial } from './lab/trial/trial.js'
+
+const buffers = new Map()
+const printed = []
+let engine = null
+let failure = 'the engine has not been started'
+
+globalThis.reserve = (name, size) => {
+  const buffer = new ArrayBuffer(size)
+  buffers.set(name, buffer)
+  return buffer
+}
+
+globalThis.boot = () => {
+  const module = new WebAssembly.Module(buffers.get('wasm'))
+  buffers.delete('wasm')
+  const instantiate = (imports) => ({ instance: new WebAssembly.Instance(module, imports), module })
+  createEngine(loadMujoco, instantiate, (text) => printed.push(text)).then(
+    (started) => (engine = started),
+    (error) => (failure = error.message),
+  )
+  return ''
+}
+
+globalThis.booted = () => {
+  if (engine === null) throw new Error(failure)
+  return engine.version
+}
+
+globalThis.trial = (json) => {
+  const request = JSON.parse(json)
+  const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : fromBase64(request.mjb)
+  printed.length = 0
+  const reply = runTrial(engine, request, bytes, () => performance.now())
+  return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
+}
+
+globalThis.trying = () => JSON.stringify({ entry: current.entry, trying: current.trying ?? null })

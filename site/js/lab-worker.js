@@ -1,0 +1,34 @@
+/**
+ * The labs' worker: physics, lab code and plots, away from the page's thread. docs/labs.md has the protocol.
+ */
+
+import loadMujoco from '@mujoco/mujoco'
+import { Host } from './lab/worker/host.js'
+
+const host = new Host({
+  loadMujoco,
+  post: (message, transfer) => self.postMessage(message, transfer),
+  now: () => performance.now(),
+  later: (action, ms) => setTimeout(action, ms),
+  importModule: (url) => import(url),
+  async fetchBytes(url) {
+    const response = await get(url)
+    return new Uint8Array(await response.arrayBuffer())
+  },
+  async instantiate(imports, url) {
+    const response = await get(url)
+    // Compiling while it arrives needs the right media type, which not every server sends.
+    if (/^application\/wasm\b/.test(response.headers.get('Content-Type') ?? '')) {
+      return WebAssembly.instantiateStreaming(response, imports)
+    }
+    return WebAssembly.instantiate(await response.arrayBuffer(), imports)
+  },
+})
+
+async function get(url) {
+  const response = await fetch(url)
+  if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`)
+  return response
+}
+
+self.onmessage = ({ data }) => host.receive(data)

@@ -1,0 +1,163 @@
+/**
+ * Pictures of a lab: what moves, as one Float32Array that can be handed to another thread.
+ *
+ * Layout, in floats; `describe().layout` names the start of each part:
+ *
+ *   0           8                     [0] floats in use, [1] decorations, [2] points of the trail, [3] 1 while a body is dragged
+ *   geoms       19 for each geom      position 3, rotation matrix 9 (by rows), size 3, colour 4 (RGBA)
+ *   sites       19 for each site      the same
+ *   lights      7 for each light      position 3, direction 3, 1 if it is on
+ *   cameras     13 for each camera    position 3, matrix 9 (by rows; it looks along its -z, up is its y), vertical field of view (°)
+ *   flex        3 for each flex vertex
+ *   skin        6 for each skin vertex: position 3, normal 3
+ *   trail       3 for each point, from the oldest to the newest
+ *   decorations 24 each               type (mjtGeom), data id, object type (mjtObj), object id, size 3, position 3, matrix 9,
+ *                                     colour 4, emission; they begin where the trail ends
+ *
+ * Decorations are what MuJoCo's own visualizer adds: tendons, the overlays that are on, the spring of a drag.
+ */
+
+import { describeScene } from './scene.js'
+import { SceneGeoms } from './structs.js'
+
+const HEADER = 8
+const GEOM = 19
+const LIGHT = 7
+const CAMERA = 13
+const DECORATION = 24
+const MOST_DECORATIONS = 2000
+const DEFAULT_COLOUR = [0.5, 0.5, 0.5, 1] // MuJoCo's default colour: a geom that has it takes that of its material
+
+/** The overlays that a lab can offer, and what they switch on in MuJoCo's visualizer. */
+export const OVERLAYS = ['frames', 'contacts', 'forces', 'com', 'inertia', 'joints']
+
+export class Pictures {
+  /**
+   * @param {import('./engine.js').Engine} engine
+   * @param {import('./engine.js').Handles} handles `shown` is what is drawn
+   * @param {object} config the lab's data
+   * @param {import('./sampler.js').Sampler} sampler keeps the trail
+   */
+  constructor(engine, handles, config, sampler) {
+    const { mj } = engine
+    this.engine = engine
+    this.model = handles.model
+    this.data = handles.shown
+    this.config = config
+    this.sampler = sampler
+    this.scene = handles.own(new mj.MjvScene(this.model, MOST_DECORATIONS))
+    this.option = handles.own(new mj.MjvOption())
+    this.camera = handles.own(new mj.MjvCamera())
+    this.still = handles.own(new mj.MjvPerturb())
+    this.geoms = new SceneGeoms(this.scene, this.data)
+    this.layout = layoutOf(this.model, sampler.capacity)
+    if (config.forceScale) this.model.vis.map.force = config.forceScale
+    // Geoms, sites, skins and flexes are drawn from the model; the visualizer adds the rest.
+    for (const group of ['geomgroup', 'sitegroup', 'skingroup', 'flexgroup']) this.option[group].fill(0)
+    this.option.flags[engine.k.vis.PERTFORCE] = 1
+    for (const name of OVERLAYS) this.setOverlay(name, config.overlays.includes(name))
+  }
+
+  /** Switch an overlay on or off. */
+  setOverlay(name, on) {
+    const { vis, frame } = this.engine.k
+    const flags = { contacts: vis.CONTACTPOINT, forces: vis.CONTACTFORCE, com: vis.COM, inertia: vis.INERTIA, joints: vis.JOINT }
+    if (name === 'frames') this.option.frame = on ? frame.BODY : frame.NONE
+    else if (name in flags) this.option.flags[flags[name]] = on ? 1 : 0
+    else throw new RangeError(`there is no overlay "${name}"`)
+  }
+
+  /** What does not move. */
+  describe() {
+    return describeScene(this.engine, this.model, this.config, this.camera, this.layout)
+  }
+
+  /**
+   * Write a frame of the data as it is.
+   *
+   * @param {ArrayBuffer | null | undefined} buffer is used when it is large enough, else a new one is made
+   * @param {import('./drag.js').Drag} drag
+   * @returns {Float32Array} of exactly the floats in use
+   */
+  write(buffer, drag) {
+    const { engine, model, data, layout } = this
+    const perturb = drag.active ? drag.handle : this.still
+    engine.mj.mjv_updateScene(model, data, this.option, perturb, this.camera, engine.k.category.ALL, this.scene)
+    const decorations = this.geoms.update()
+    const most = layout.trail + 3 * this.sampler.capacity + DECORATION * decorations
+    const target = new Float32Array(buffer && buffer.byteLength >= 4 * most ? buffer : new ArrayBuffer(4 * (most + 10 * DECORATION)))
+    this.writePoses(target)
+    this.writeVertices(target)
+    const points = this.sampler.writeTrail(target, layout.trail)
+    const start = layout.trail + 3 * points
+    this.writeDecorations(target, start, decorations)
+    const length = start + DECORATION * decorations
+    target.set([length, decorations, points, drag.active ? 1 : 0, 0, 0, 0, 0])
+    return target.subarray(0, length)
+  }
+
+  writePoses(target) {
+    const { model, data, layout } = this
+    const materials = model.mat_rgba
+    writeGeoms(target, layout.geoms, data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rgba, model.geom_matid, materials)
+    writeGeoms(target, layout.sites, data.site_xpos, data.site_xmat, model.site_size, model.site_rgba, model.site_matid, materials)
+    const { light_xpos, light_xdir, cam_xpos, cam_xmat } = data
+    const { light_active, cam_fovy } = model
+    for (let i = 0, at = layout.lights; i < model.nlight; i++, at += LIGHT) {
+      target.set(light_xpos.subarray(3 * i, 3 * i + 3), at)
+      target.set(light_xdir.subarray(3 * i, 3 * i + 3), at + 3)
+      target[at + 6] = light_active[i]
+    }
+    for (let i = 0, at = layout.cameras; i < model.ncam; i++, at += CAMERA) {
+      target.set(cam_xpos.subarray(3 * i, 3 * i + 3), at)
+      target.set(cam_xmat.subarray(9 * i, 9 * i + 9), at + 3)
+      target[at + 12] = cam_fovy[i]
+    }
+  }
+
+  writeVertices(target) {
+    const { engine, model, data, layout, scene } = this
+    if (model.nflexvert > 0) target.set(data.flexvert_xpos, layout.flex)
+    if (model.nskinvert === 0) return
+    engine.mj.mjv_updateSkin(model, data, scene)
+    const { skinvert, skinnormal } = scene
+    for (let i = 0, at = layout.skin; i < 3 * model.nskinvert; i += 3, at += 6) {
+      for (let j = 0; j < 3; j++) {
+        target[at + j] = skinvert[i + j]
+        target[at + 3 + j] = skinnormal[i + j]
+      }
+    }
+  }
+
+  writeDecorations(target, start, count) {
+    const { ints, floats } = this.geoms
+    for (let i = 0, at = start; i < count; i++, at += DECORATION) {
+      const from = this.geoms.at(i)
+      for (let j = 0; j < 4; j++) target[at + j] = ints[from + j]
+      target.set(floats.subarray(from + 10, from + 30), at + 4) // size, position, matrix, colour, emission
+    }
+  }
+}
+
+/** One row for each geom or site; the colour is resolved as MuJoCo does. */
+function writeGeoms(target, start, positions, matrices, sizes, colours, materialIds, materialColours) {
+  const count = materialIds.length
+  for (let i = 0, at = start; i < count; i++, at += GEOM) {
+    target.set(positions.subarray(3 * i, 3 * i + 3), at)
+    target.set(matrices.subarray(9 * i, 9 * i + 9), at + 3)
+    target.set(sizes.subarray(3 * i, 3 * i + 3), at + 12)
+    const material = materialIds[i]
+    const own = material < 0 || DEFAULT_COLOUR.some((x, j) => colours[4 * i + j] !== x)
+    target.set(own ? colours.subarray(4 * i, 4 * i + 4) : materialColours.subarray(4 * material, 4 * material + 4), at + 15)
+  }
+}
+
+function layoutOf(model, trail) {
+  const geoms = HEADER
+  const sites = geoms + GEOM * model.ngeom
+  const lights = sites + GEOM * model.nsite
+  const cameras = lights + LIGHT * model.nlight
+  const flex = cameras + CAMERA * model.ncam
+  const skin = flex + 3 * model.nflexvert
+  return Object.freeze({ geoms, sites, lights, cameras, flex, skin, trail: skin + 6 * model.nskinvert, longestTrail: trail })
+}

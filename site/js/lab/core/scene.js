@@ -1,0 +1,197 @@
+/**
+ * What of a model's appearance does not move: plain values and copies of arrays, ready to be sent to another thread.
+ *
+ * The page builds its meshes, textures and lights from it once; where they are, and what colour and size they have, is in every
+ * frame (see `frame.js`). Ids are MuJoCo's; -1 means none. Angles are in degrees, lengths in metres.
+ */
+
+const TEXTURE_ROLES = 10 // mjNTEXROLE
+const ROLE_USER = 0
+const ROLE_RGB = 1
+
+/**
+ * @param {import('./engine.js').Engine} engine
+ * @param {object} model MjModel
+ * @param {object} config the lab's data
+ * @param {object} camera an MjvCamera to work with
+ * @param {object} layout of the frames
+ */
+export function describeScene(engine, model, config, camera, layout) {
+  const { mj, k } = engine
+  const name = (type, i) => mj.mj_id2name(model, type, i) ?? ''
+  const each = (count, make) => Array.from({ length: count }, (_, i) => make(i))
+  const { stat, vis } = model
+  return {
+    layout: { ...layout },
+    timestep: model.opt.timestep,
+    camera: freeCamera(mj, model, config.camera, camera),
+    center: Array.from(stat.center),
+    extent: stat.extent,
+    visual: visual(vis),
+    bodies: each(model.nbody, (i) => ({
+      name: name(k.obj.BODY, i),
+      parent: model.body_parentid[i],
+      movable: model.body_weldid[i] !== 0 || model.body_mocapid[i] >= 0,
+    })),
+    geoms: each(model.ngeom, (i) => ({
+      name: name(k.obj.GEOM, i),
+      type: model.geom_type[i],
+      body: model.geom_bodyid[i],
+      group: model.geom_group[i],
+      material: model.geom_matid[i],
+      data: model.geom_dataid[i],
+    })),
+    sites: each(model.nsite, (i) => ({
+      name: name(k.obj.SITE, i),
+      type: model.site_type[i],
+      body: model.site_bodyid[i],
+      group: model.site_group[i],
+      material: model.site_matid[i],
+    })),
+    joints: each(model.njnt, (i) => ({ name: name(k.obj.JOINT, i), type: model.jnt_type[i], body: model.jnt_bodyid[i] })),
+    materials: each(model.nmat, (i) => material(model, i, name(k.obj.MATERIAL, i))),
+    textures: each(model.ntex, (i) => texture(model, i, name(k.obj.TEXTURE, i))),
+    meshes: each(model.nmesh, (i) => mesh(model, i, name(k.obj.MESH, i))),
+    hfields: each(model.nhfield, (i) => hfield(model, i, name(k.obj.HFIELD, i))),
+    lights: each(model.nlight, (i) => light(model, i, name(k.obj.LIGHT, i))),
+    cameras: each(model.ncam, (i) => ({ name: name(k.obj.CAMERA, i), projection: model.cam_projection[i] })),
+    flexes: each(model.nflex, (i) => flex(model, i, name(k.obj.FLEX, i))),
+    skins: each(model.nskin, (i) => skin(model, i, name(k.obj.SKIN, i))),
+  }
+}
+
+const part = (array, start, count) => array.slice(start, start + count)
+const row = (array, i, n) => Array.from(array.subarray(n * i, n * i + n))
+
+/** MuJoCo's free camera for the model, with what the lab says instead. */
+function freeCamera(mj, model, wanted, camera) {
+  mj.mjv_defaultFreeCamera(model, camera)
+  return {
+    azimuth: wanted?.azimuth ?? camera.azimuth,
+    elevation: wanted?.elevation ?? camera.elevation,
+    distance: wanted?.distance ?? camera.distance,
+    target: wanted?.target ?? Array.from(camera.lookat),
+    orthographic: camera.orthographic !== 0,
+    fovy: model.vis.global.fovy,
+  }
+}
+
+function visual({ headlight, map, rgba, scale }) {
+  return {
+    headlight: {
+      ambient: Array.from(headlight.ambient),
+      diffuse: Array.from(headlight.diffuse),
+      specular: Array.from(headlight.specular),
+      active: headlight.active !== 0,
+    },
+    znear: map.znear,
+    zfar: map.zfar,
+    fog: { start: map.fogstart, end: map.fogend, rgba: Array.from(rgba.fog) },
+    haze: { size: map.haze, rgba: Array.from(rgba.haze) },
+    framewidth: scale.framewidth,
+  }
+}
+
+function material(model, i, name) {
+  const roles = model.mat_texid.subarray(TEXTURE_ROLES * i, TEXTURE_ROLES * (i + 1))
+  return {
+    name,
+    rgba: row(model.mat_rgba, i, 4),
+    texture: roles[ROLE_RGB] >= 0 ? roles[ROLE_RGB] : roles[ROLE_USER],
+    texuniform: model.mat_texuniform[i] !== 0,
+    texrepeat: row(model.mat_texrepeat, i, 2),
+    emission: model.mat_emission[i],
+    specular: model.mat_specular[i],
+    shininess: model.mat_shininess[i],
+    reflectance: model.mat_reflectance[i],
+    metallic: model.mat_metallic[i],
+    roughness: model.mat_roughness[i],
+  }
+}
+
+/** `type`: 0 2d, 1 cube (six faces, one above the other, unless square), 2 skybox; rows from the bottom, as OpenGL has them. */
+function texture(model, i, name) {
+  const width = model.tex_width[i]
+  const height = model.tex_height[i]
+  const channels = model.tex_nchannel[i]
+  const data = part(model.tex_data, Number(model.tex_adr[i]), width * height * channels)
+  return { name, type: model.tex_type[i], width, height, channels, srgb: model.tex_colorspace[i] === 2, data }
+}
+
+/** Each corner of a face has its own index of vertex, normal and texture coordinate. */
+function mesh(model, i, name) {
+  const faces = model.mesh_facenum[i]
+  const face = 3 * model.mesh_faceadr[i]
+  const textured = model.mesh_texcoordadr[i] >= 0
+  return {
+    name,
+    vertices: part(model.mesh_vert, 3 * model.mesh_vertadr[i], 3 * model.mesh_vertnum[i]),
+    normals: part(model.mesh_normal, 3 * model.mesh_normaladr[i], 3 * model.mesh_normalnum[i]),
+    texcoords: textured ? part(model.mesh_texcoord, 2 * model.mesh_texcoordadr[i], 2 * model.mesh_texcoordnum[i]) : null,
+    faces: part(model.mesh_face, face, 3 * faces),
+    faceNormals: part(model.mesh_facenormal, face, 3 * faces),
+    faceTexcoords: textured ? part(model.mesh_facetexcoord, face, 3 * faces) : null,
+  }
+}
+
+/** `size`: half-lengths in x and y, height of 1, thickness below 0; `data` by rows, from -y to y, in [0, 1]. */
+function hfield(model, i, name) {
+  const rows = model.hfield_nrow[i]
+  const columns = model.hfield_ncol[i]
+  const data = part(model.hfield_data, model.hfield_adr[i], rows * columns)
+  return { name, rows, columns, size: row(model.hfield_size, i, 4), data }
+}
+
+function light(model, i, name) {
+  return {
+    name,
+    body: model.light_bodyid[i],
+    type: model.light_type[i],
+    castshadow: model.light_castshadow[i] !== 0,
+    ambient: row(model.light_ambient, i, 3),
+    diffuse: row(model.light_diffuse, i, 3),
+    specular: row(model.light_specular, i, 3),
+    attenuation: row(model.light_attenuation, i, 3),
+    cutoff: model.light_cutoff[i],
+    exponent: model.light_exponent[i],
+    intensity: model.light_intensity[i],
+    range: model.light_range[i],
+    bulbradius: model.light_bulbradius[i],
+  }
+}
+
+/** `elements`: vertices of each line (dim 1) or triangle (dim 2); of a volume (dim 3) it is the surface. Indices within the flex. */
+function flex(model, i, name) {
+  const dim = model.flex_dim[i]
+  const elements =
+    dim === 3
+      ? part(model.flex_shell, model.flex_shelldataadr[i], 3 * model.flex_shellnum[i])
+      : part(model.flex_elem, model.flex_elemdataadr[i], (dim + 1) * model.flex_elemnum[i])
+  return {
+    name,
+    dim,
+    elements,
+    start: model.flex_vertadr[i],
+    count: model.flex_vertnum[i],
+    radius: model.flex_radius[i],
+    flat: model.flex_flatskin[i] !== 0,
+    group: model.flex_group[i],
+    material: model.flex_matid[i],
+    rgba: row(model.flex_rgba, i, 4),
+  }
+}
+
+function skin(model, i, name) {
+  const count = model.skin_vertnum[i]
+  const at = model.skin_texcoordadr[i]
+  return {
+    name,
+    faces: part(model.skin_face, 3 * model.skin_faceadr[i], 3 * model.skin_facenum[i]),
+    texcoords: at >= 0 ? part(model.skin_texcoord, 2 * at, 2 * count) : null,
+    start: model.skin_vertadr[i],
+    count,
+    group: model.skin_group[i],
+    material: model.skin_matid[i],
+    rgba: row(model.skin_rgba, i, 4),
+  }
+}

@@ -1,0 +1,62 @@
+/**
+ * MuJoCo's free camera, and how the mouse moves it (mjv_moveCamera). No DOM, no drawing.
+ *
+ * The camera looks at `target` from `distance`; `azimuth` turns about z and `elevation` is negative where it looks down, both
+ * in degrees. World lengths in metres, z up. Movements are in parts of the view's height, as in MuJoCo.
+ */
+
+const RADIANS = Math.PI / 180
+const STEEPEST = 90
+
+export class OrbitCamera {
+  /** @param {{azimuth: number, elevation: number, distance: number, target: number[], fovy?: number}} start degrees, metres */
+  constructor(start) {
+    this.start = { ...start, target: [...start.target] }
+    this.reset()
+  }
+
+  reset() {
+    const { azimuth, elevation, distance, target, fovy = 45 } = this.start
+    Object.assign(this, { azimuth, elevation, distance, fovy, target: [...target] })
+  }
+
+  /** Unit vectors of the picture in the world: to the right, up, and into it. */
+  axes() {
+    const a = this.azimuth * RADIANS
+    const e = this.elevation * RADIANS
+    return {
+      right: [Math.sin(a), -Math.cos(a), 0],
+      up: [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)],
+      forward: [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)],
+    }
+  }
+
+  /** Where the camera is (m). */
+  position() {
+    const { forward } = this.axes()
+    return this.target.map((x, i) => x - this.distance * forward[i])
+  }
+
+  /** Turn about the target: a view's height of movement is half a turn. */
+  rotate(dx, dy) {
+    this.azimuth = wrap(this.azimuth - 180 * dx)
+    this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation - 180 * dy))
+  }
+
+  /** Move with the picture: what is at the target's depth follows the pointer. */
+  pan(dx, dy) {
+    const height = 2 * this.distance * Math.tan((this.fovy * RADIANS) / 2)
+    const { right, up } = this.axes()
+    this.target = this.target.map((x, i) => x + height * (dy * up[i] - dx * right[i]))
+  }
+
+  /** Come nearer (`factor` below 1) or go away. */
+  zoom(factor) {
+    const { distance } = this.start
+    this.distance = Math.min(1000 * distance, Math.max(0.01 * distance, this.distance * factor))
+  }
+}
+
+function wrap(degrees) {
+  return ((((degrees + 180) % 360) + 360) % 360) - 180
+}

@@ -1,0 +1,61 @@
+/** Making elements: no markup in strings, no style attributes, so that a page's strict policy has nothing to forbid. */
+
+const SVG = 'http://www.w3.org/2000/svg'
+
+/**
+ * An element. Properties that start with `on` are listeners, `class` and whatever has a dash are attributes, the rest are
+ * properties of the element.
+ *
+ * @param {string} tag
+ * @param {object} [properties] undefined and null are left out
+ * @param {...(Node | string | null)} children
+ */
+export function h(tag, properties = {}, ...children) {
+  const element = document.createElement(tag)
+  for (const [name, value] of Object.entries(properties)) {
+    if (value === undefined || value === null) continue
+    if (name.startsWith('on')) element.addEventListener(name.slice(2), value)
+    else if (name === 'class' || name === 'role' || name === 'for' || name.includes('-')) element.setAttribute(name, value)
+    else element[name] = value
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined))
+  return element
+}
+
+/** Shapes of the buttons, in a square of 16. */
+const ICONS = {
+  play: 'M4 2.5v11l9-5.5z',
+  pause: 'M3.5 2.5h3v11h-3zM9.5 2.5h3v11h-3z',
+  step: 'M3 2.5v11l7.5-5.5zM11 2.5h2v11h-2z',
+  reset: 'M8 2.2a5.8 5.8 0 1 1-5.5 4h1.7a4.2 4.2 0 1 0 3.8-2.4v2.1L3.9 3 8 .2z',
+  full: 'M2 2h4.5v1.6H3.6v2.9H2zM9.500 2H14v4.500h-1.600V3.600H9.500zM2 9.500h1.600v2.900h2.900V14H2zM12.400 9.500H14V14H9.500v-1.600h2.900z',
+}
+
+/** A small picture in the colour of the text; what it means is said by the button that holds it. */
+export function icon(name) {
+  const svg = document.createElementNS(SVG, 'svg')
+  svg.setAttribute('viewBox', '0 0 16 16')
+  svg.setAttribute('aria-hidden', 'true')
+  const path = document.createElementNS(SVG, 'path')
+  path.setAttribute('d', ICONS[name])
+  svg.append(path)
+  return svg
+}
+
+let count = 0
+
+/** A new id, for what refers to an element. */
+export function freshId(prefix) {
+  count += 1
+  return `_${prefix}-${count}`
+}
+
+/** Hand a text to the reader as a file. */
+export function download(name, text, type = 'text/plain') {
+  const address = URL.createObjectURL(new Blob([text], { type: `${type};charset=utf-8` }))
+  const link = h('a', { href: address, download: name })
+  document.body.append(link)
+  link.click()
+  link.remove()
+  setTimeout(() => URL.revokeObjectURL(address), 10_000)
+}

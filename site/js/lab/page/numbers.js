@@ -1,0 +1,75 @@
+/** Numbers as a reader sees them: a real minus sign, fixed digits, no width that changes with the sign. */
+
+const FIGURE_SPACE = '\u2007'
+const MINUS = '\u2212'
+
+/**
+ * A readout's value.
+ *
+ * @param {number | string | {error: string}} value
+ * @param {number | null} digits after the point; null: six significant figures
+ */
+export function formatReadout(value, digits) {
+  if (typeof value === 'string') return value
+  if (typeof value !== 'number') return '–'
+  return formatNumber(value, digits)
+}
+
+/** A number with `digits` after the point, or to six significant figures; a plus takes as much room as a minus. */
+export function formatNumber(value, digits) {
+  if (Number.isNaN(value)) return 'NaN'
+  if (!Number.isFinite(value)) return value > 0 ? '∞' : `${MINUS}∞`
+  const size = Math.abs(value)
+  let text
+  if (digits === null || digits === undefined) text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
+  else text = size < 1e9 ? size.toFixed(digits) : scientific(size, Math.max(2, digits))
+  // What is rounded to zero has no sign.
+  const sign = value < 0 && /[1-9]/.test(text) ? MINUS : FIGURE_SPACE
+  return sign + text
+}
+
+/** A number without padding, for a label: `−0.5`. */
+export function formatLabel(value) {
+  return (value < 0 ? MINUS : '') + trimmed(Math.abs(value))
+}
+
+/** Digits after the point that tell all steps of a slider apart. */
+export function digitsOfStep(step) {
+  if (!(step > 0)) return 2
+  for (let digits = 0; digits < 10; digits++) {
+    const scaled = step * 10 ** digits
+    if (Math.abs(scaled - Math.round(scaled)) < 1e-6 * scaled) return digits
+  }
+  return 10
+}
+
+/** Simulated time: milliseconds below ten seconds' worth of steps are of no use to the eye. */
+export function formatTime(seconds) {
+  return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(2)}`
+}
+
+/** `0.4` for 0.412, `0.03` for 0.0312: enough to see how slow. */
+export function formatRatio(ratio) {
+  return ratio >= 0.1 ? ratio.toFixed(1) : ratio.toPrecision(1)
+}
+
+function plain(size) {
+  return String(Number(size.toPrecision(6)))
+}
+
+function trimmed(size) {
+  return size !== 0 && (size < 1e-4 || size >= 1e7) ? scientific(size, 3) : String(Number(size.toPrecision(10)))
+}
+
+function scientific(size, digits) {
+  const [mantissa, exponent] = size.toExponential(digits).split('e')
+  return `${mantissa}·10${superscript(Number(exponent))}`
+}
+
+const RAISED = '⁰¹²³⁴⁵⁶⁷⁸⁹'
+
+/** An exponent in small raised figures. */
+export function superscript(exponent) {
+  const digits = [...String(Math.abs(exponent))].map((digit) => RAISED[digit]).join('')
+  return exponent < 0 ? `⁻${digits}` : digits
+}

@@ -1,0 +1,130 @@
+/**
+ * The page's one WebGL context, and who may draw with it when.
+ *
+ * A browser gives a page few contexts, and a reader's machine may draw without a graphics processor. So all labs draw with one
+ * renderer. Its canvas stands in the view that moves: nothing is copied and nobody waits for the drawing, which goes on in the
+ * browser's own process. A view at rest shows a copy on a 2-D canvas, made when the renderer's canvas moves away. When several
+ * views move at once the canvas stands in none of them and each picture is copied.
+ *
+ * Pictures are drawn from requestAnimationFrame, and only where something changed.
+ */
+
+import { ColorManagement, LinearSRGBColorSpace, PCFShadowMap, WebGLRenderer } from 'three'
+
+const SHARPEST = 2 // device pixels per CSS pixel
+const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
+
+// MuJoCo computes with colours as they are written: no conversion to light intensities and back.
+ColorManagement.enabled = false
+
+export class Stage {
+  constructor() {
+    this.renderer = null
+    this.views = new Set()
+    this.moving = new Set()
+    this.dirty = new Set()
+    this.holder = null
+    this.request = 0
+    this.tick = (now) => this.paint(now)
+  }
+
+  /** Start WebGL; throws where there is none. */
+  start() {
+    if (this.renderer !== null) return
+    const canvas = document.createElement('canvas')
+    canvas.className = 'lab-canvas'
+    const software = drawsInSoftware()
+    this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true, powerPreference: 'low-power' })
+    this.renderer.outputColorSpace = LinearSRGBColorSpace
+    this.renderer.shadowMap.enabled = !software
+    this.renderer.shadowMap.type = PCFShadowMap
+    this.software = software
+    canvas.addEventListener('webglcontextrestored', () => this.views.forEach((view) => this.invalidate(view)))
+  }
+
+  /** Device pixels per CSS pixel. */
+  get sharpness() {
+    return this.software ? 1 : Math.min(SHARPEST, window.devicePixelRatio || 1)
+  }
+
+  add(view) {
+    this.start()
+    this.views.add(view)
+  }
+
+  remove(view) {
+    if (this.holder === view) this.give(null)
+    for (const set of [this.views, this.moving, this.dirty]) set.delete(view)
+    this.choose()
+    if (this.views.size === 0 && this.renderer !== null) this.renderer.renderLists.dispose()
+  }
+
+  /** Say that a view moves, or has come to rest. */
+  setMoving(view, moving) {
+    if (moving) this.moving.add(view)
+    else this.moving.delete(view)
+    this.choose()
+  }
+
+  /** The picture of a view is out of date. */
+  invalidate(view) {
+    this.dirty.add(view)
+    if (this.request === 0) this.request = requestAnimationFrame(this.tick)
+  }
+
+  // The canvas goes to the one view that moves, and stays with the last one that did.
+  choose() {
+    const next = this.moving.size === 0 ? this.holder : this.moving.size === 1 ? [...this.moving][0] : null
+    if (next !== this.holder) this.give(next)
+  }
+
+  give(view) {
+    const before = this.holder
+    this.holder = view
+    const canvas = this.renderer.domElement
+    if (before !== null && this.views.has(before)) {
+      this.draw(before)
+      before.keep(canvas)
+    }
+    if (view === null) canvas.remove()
+    else {
+      view.hold(canvas)
+      this.draw(view)
+    }
+  }
+
+  paint(now) {
+    this.request = 0
+    const views = [...this.dirty]
+    this.dirty.clear()
+    for (const view of views) {
+      if (!view.prepare(now)) continue
+      this.draw(view)
+      if (this.holder !== view) view.keep(this.renderer.domElement)
+    }
+  }
+
+  draw(view) {
+    const { width, height } = view
+    if (width === 0 || height === 0 || !view.scene) return
+    const { renderer } = this
+    if (this.width !== width || this.height !== height || this.ratio !== this.sharpness) {
+      Object.assign(this, { width, height, ratio: this.sharpness })
+      renderer.setPixelRatio(this.ratio)
+      renderer.setSize(width, height, false)
+    }
+    renderer.render(view.scene, view.lens)
+  }
+}
+
+function drawsInSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl2')
+  if (gl === null) throw new Error('this browser has no WebGL 2')
+  const info = gl.getExtension('WEBGL_debug_renderer_info')
+  const name = info === null ? '' : String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL))
+  gl.getExtension('WEBGL_lose_context')?.loseContext()
+  return SOFTWARE.test(name)
+}
+
+/** The page's stage. */
+export const stage = new Stage()

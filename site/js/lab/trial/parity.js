@@ -1,0 +1,116 @@
+/**
+ * What native MuJoCo needs to repeat a run of a lab, and what it has to arrive at.
+ *
+ * Recorded are the model as the lab changed it, the state at the start, and every number of the state that the lab's controller
+ * wrote, with the step before which it wrote it. Of each step there is a CRC-32 of the positions, velocities and activations,
+ * and of every `stride`-th the numbers themselves.
+ */
+
+import { packed } from './base64.js'
+
+const MOST_NUMBERS = 200_000 // of recorded states
+const MOST_WRITES = 1_000_000
+
+export class ParityRecorder {
+  /** @param {import('../core/lab.js').Lab} lab; @param {Uint8Array} sent the model that it was made of; @param {number} steps at most */
+  constructor(lab, sent, steps) {
+    const { mj } = lab.engine
+    this.lab = lab
+    this.model = lab.model
+    this.before = lab.handles.own(new mj.DoubleBuffer(Math.max(1, lab.stateSize)))
+    this.after = lab.handles.own(new mj.DoubleBuffer(Math.max(1, lab.stateSize)))
+    this.mjb = saveModel(lab)
+    this.asSent = equalBytes(this.mjb, sent)
+    this.start = lab.state().physics
+    this.width = lab.model.nq + lab.model.nv + lab.model.na
+    this.stride = Math.max(1, Math.ceil((steps * this.width) / MOST_NUMBERS))
+    this.rows = []
+    this.sums = []
+    this.writes = { steps: [], indices: [], values: [] }
+    this.complete = true
+  }
+
+  /** Before the controller. */
+  begin() {
+    const { lab } = this
+    if (lab.code.controller) lab.engine.mj.mj_getState(lab.model, lab.data, this.before, lab.signature)
+  }
+
+  /** Between the controller and the step. */
+  controlled() {
+    const { lab, writes } = this
+    if (!lab.code.controller) return
+    lab.engine.mj.mj_getState(lab.model, lab.data, this.after, lab.signature)
+    const old = bits(this.before.GetView())
+    const view = this.after.GetView()
+    const now = bits(view)
+    for (let i = 0; i < lab.stateSize; i++) {
+      if (old[2 * i] === now[2 * i] && old[2 * i + 1] === now[2 * i + 1]) continue
+      writes.steps.push(this.sums.length)
+      writes.indices.push(i)
+      writes.values.push(view[i])
+    }
+    if (writes.steps.length > MOST_WRITES) this.complete = false
+  }
+
+  /** After the step. */
+  end() {
+    const { qpos, qvel, act } = this.lab.data
+    this.sums.push(crc32(act, crc32(qvel, crc32(qpos, 0))))
+    if (this.sums.length % this.stride === 0) this.rows.push(...qpos, ...qvel, ...act)
+  }
+
+  /** What was recorded. `mjb` is null where the lab has not changed the model that it was given. */
+  result() {
+    const { writes } = this
+    return packed({
+      mjb: this.asSent ? null : this.mjb,
+      modelChanged: !equalBytes(this.mjb, saveModel(this.lab)),
+      complete: this.complete,
+      signature: this.lab.signature,
+      start: this.start,
+      steps: this.sums.length,
+      stride: this.stride,
+      width: this.width,
+      states: Float64Array.from(this.rows),
+      checksums: Uint32Array.from(this.sums),
+      writes: {
+        steps: Int32Array.from(writes.steps),
+        indices: Int32Array.from(writes.indices),
+        values: Float64Array.from(writes.values),
+      },
+    })
+  }
+}
+
+/** The model as an MJB file. */
+export function saveModel({ engine, model }) {
+  const { mj } = engine
+  const buffer = new mj.Uint8Buffer(Number(mj.mj_sizeModel(model)))
+  try {
+    mj.mj_saveModel(model, null, buffer)
+    return buffer.GetView().slice()
+  } finally {
+    buffer.delete()
+  }
+}
+
+const bits = (view) => new Int32Array(view.buffer, view.byteOffset, 2 * view.length)
+
+function equalBytes(a, b) {
+  return a.length === b.length && a.every((byte, i) => byte === b[i])
+}
+
+const TABLE = Uint32Array.from({ length: 256 }, (_, i) => {
+  let c = i
+  for (let k = 0; k < 8; k++) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1
+  return c
+})
+
+/** The CRC-32 of zlib, continued from `start`, over the bytes of an array. */
+export function crc32(view, start) {
+  const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength)
+  let c = ~start
+  for (let i = 0; i < bytes.length; i++) c = TABLE[(c ^ bytes[i]) & 255] ^ (c >>> 8)
+  return ~c >>> 0
+}

@@ -1,0 +1,317 @@
+/**
+ * A lab's trial: it is taken through everything that a reader can do with it, and what fails is told with its entry.
+ *
+ *   runTrial(engine, request, bytes, now) → reply          (both plain values, see docs/labs.md)
+ *
+ * 1. The main run: from the start, stepping as Play does. It gives the lab's static form and the material for parity.
+ * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.
+ * 3. Every claim (`expect`), from a fresh start; claims after the same act share a run.
+ *
+ * The same request gives the same reply, but for `stepsPerSecond`, and for what did not fit into `wall`.
+ */
+
+import { Lab } from '../core/lab.js'
+import { LabError, call, current, numeric } from '../core/piece.js'
+import { packed } from './base64.js'
+import { ParityRecorder } from './parity.js'
+
+const SECONDS = 5 // of simulated time, unless the lab says otherwise
+const STEPS = 20_000 // at most, unless the lab says for how long
+const PROBE = { seconds: 0.5, steps: 500 } // after each act
+const SLICE = 64 // steps between two looks at the clock
+const POINTS = 1000 // of a recorded trace, at most
+const CHECKS = 100 // looks at the readouts during the main run
+
+class OutOfTime extends Error {}
+
+export function runTrial(engine, request, bytes, now) {
+  return new Trial(engine, request, bytes, now).run()
+}
+
+class Trial {
+  constructor(engine, { config, code, seconds = null, wall = 60, parity = true }, bytes, now) {
+    this.engine = engine
+    this.config = config
+    this.bytes = bytes
+    this.now = now
+    this.deadline = now() + 1000 * wall
+    this.seconds = seconds
+    this.parity = parity
+    this.tried = []
+    this.failures = []
+    this.told = new Set()
+    this.code = null
+    this.text = code
+    this.steps = 0
+    this.took = 0
+  }
+
+  run() {
+    const reply = { version: this.engine.version, main: null }
+    try {
+      this.code = call([], () => new Function(`"use strict"; return ${this.text}`)())
+      reply.main = this.attempt([], 'start', (lab) => this.mainRun(lab))
+      for (const { entry, what, act } of this.acts()) {
+        this.attempt(entry, what, (lab) => {
+          act(lab)
+          this.probe(lab)
+        })
+      }
+      this.claims()
+    } catch (error) {
+      if (error instanceof OutOfTime) this.fail(current.trying ?? [], 'timeout', 'did not finish in time', null)
+      else this.fail([], 'engine', String(error.message ?? error), null)
+    }
+    const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
+    return { ...reply, tried: this.tried, failures: this.failures, stepsPerSecond }
+  }
+
+  // --- one attempt
+
+  /** Do something with a fresh lab; what goes wrong is noted under its own entry. */
+  attempt(entry, what, action) {
+    this.during = { entry, what }
+    current.trying = entry
+    let lab = null
+    let result = null
+    try {
+      lab = new Lab(this.engine, this.bytes, this.config, this.code)
+      lab.start()
+      this.state(lab)
+      result = action(lab)
+    } catch (error) {
+      if (error instanceof OutOfTime) throw error
+      this.failed(error, lab)
+    } finally {
+      lab?.dispose()
+    }
+    this.tried.push({ entry, what })
+    return result
+  }
+
+  failed(error, lab) {
+    if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, lab?.time ?? null)
+    else this.fail(this.during.entry, error.name === 'EngineError' ? 'engine' : 'throws', error.message, lab?.time ?? null)
+    // An engine that ended in the middle of something cannot be trusted with the rest.
+    if (error.kind === 'engine' || error.fatal || error instanceof WebAssembly.RuntimeError) throw error
+  }
+
+  fail(entry, kind, message, at) {
+    const key = JSON.stringify([entry, kind, message])
+    if (this.told.has(key)) return
+    this.told.add(key)
+    this.failures.push({ entry, kind, message, at, during: this.during ?? null })
+  }
+
+  /** Note what the lab itself says: divergence, warnings. */
+  state(lab) {
+    const { entry } = this.during
+    for (const { kind, message, time } of lab.takeWarnings()) this.fail(entry, 'warning', `${kind}: ${message}`, time)
+    if (lab.diverged !== null) this.fail(entry, 'diverged', lab.diverged.message, lab.diverged.time)
+  }
+
+  /** Evaluate all that is shown; a wrong value does not keep the rest from being tried. */
+  look(lab) {
+    const env = lab.sync()
+    this.code.readouts.forEach((run, i) => {
+      this.value(['readouts', i, 'expr'], run, env, lab, (value) => typeof value === 'string' || typeof value === 'number')
+    })
+    this.code.plots.forEach((traces, i) =>
+      traces.forEach((run, j) => {
+        this.value(['plots', i, 'traces', j, 'expr'], run, env, lab, (value) => typeof value === 'number')
+      }),
+    )
+  }
+
+  value(entry, run, env, lab, fits) {
+    try {
+      const value = call(entry, () => run(env))
+      if (!fits(value)) call(entry, () => numeric(entry, value))
+      else if (typeof value === 'number' && !Number.isFinite(value)) this.fail(entry, 'nan', `is ${value}`, lab.time)
+    } catch (error) {
+      this.failed(error, lab)
+    }
+  }
+
+  /** Step until simulated time `t`, or for `most` steps; returns why it ended early. */
+  advance(lab, t, most = Infinity, stops = []) {
+    let left = most
+    const begun = lab.time
+    while (left > 0) {
+      const timestep = lab.option.timestep
+      const due = Math.round((t - lab.time) / timestep)
+      if (!(due > 0)) return null
+      const started = this.now()
+      const { steps, stopped } = lab.step(Math.min(due, left, SLICE))
+      this.measure(lab, steps, this.now() - started)
+      left -= steps
+      this.state(lab)
+      if (stopped === 'diverged' || stops.includes(stopped)) return stopped
+      if (this.now() > this.deadline) throw new OutOfTime()
+      if (steps === 0) throw new Error(`no step can be made at t = ${begun}`)
+    }
+    return 'steps'
+  }
+
+  /** Recording costs time of its own, so those steps do not count. */
+  measure(lab, steps, ms) {
+    if (lab.recorder !== null) return
+    this.steps += steps
+    this.took += ms / 1000
+  }
+
+  probe(lab) {
+    this.state(lab)
+    this.look(lab)
+    this.advance(lab, lab.time + PROBE.seconds, PROBE.steps)
+    if (lab.diverged === null) this.look(lab)
+  }
+
+  // --- the main run
+
+  mainRun(lab) {
+    const { stopAt } = this.config
+    const timestep = lab.option.timestep
+    const wanted = this.seconds ?? stopAt ?? SECONDS
+    const most = this.seconds === null ? STEPS : Infinity
+    const due = Math.min(most, Math.ceil(wanted / timestep))
+    this.look(lab)
+    const start = this.picture(lab)
+    const atStart = lab.state().physics
+    if (this.parity) lab.recorder = new ParityRecorder(lab, this.bytes, due)
+    const end = lab.time + wanted
+    let stopped = null
+    for (let i = 1; i <= CHECKS && lab.diverged === null && stopped === null; i++) {
+      const t = lab.time + (end - lab.time) / (CHECKS + 1 - i)
+      const result = this.advance(lab, t, Math.ceil(most / CHECKS), ['stopAt', 'code'])
+      if (result === 'stopAt' || result === 'code') stopped = result
+      if (lab.diverged === null) this.look(lab)
+    }
+    if (stopAt !== null && stopped !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
+      this.fail(['stopAt'], 'stopAt', `the lab does not stop at ${stopAt} s`, lab.time)
+    }
+    const parity = lab.recorder?.result() ?? null
+    lab.recorder = null
+    return {
+      seconds: lab.time,
+      steps: lab.steps,
+      stopped,
+      timestep,
+      scene: packed(withoutTextures(lab.scene())),
+      pictures: packed([start, this.picture(lab)]),
+      plots: this.record(lab),
+      parity,
+      resetDiffers: this.resetDiffers(lab, atStart),
+    }
+  }
+
+  picture(lab) {
+    const readouts = lab.diverged === null ? this.quietly(() => lab.readouts()) : null
+    return { time: lab.time, frame: lab.frame(null).slice(), readouts }
+  }
+
+  /** What has been told as a failure already. */
+  quietly(look) {
+    try {
+      return look()
+    } catch (error) {
+      if (error instanceof LabError && error.kind !== 'engine') return null
+      throw error
+    }
+  }
+
+  /** The samples of the run, thinned: {times, plots: [[values of each trace]]}. */
+  record(lab) {
+    const { times, values } = lab.sampler.take()
+    const width = lab.sampler.traces.length
+    const stride = Math.max(1, Math.ceil(times.length / POINTS))
+    const picked = Array.from({ length: Math.ceil(times.length / stride) }, (_, i) => i * stride)
+    let column = 0
+    const plots = this.code.plots.map((traces) =>
+      traces.map(() => {
+        const at = column++
+        return picked.map((i) => values[i * width + at])
+      }),
+    )
+    return { times: picked.map((i) => times[i]), plots }
+  }
+
+  /** Whether a reset leads back to where the lab started; it does not when lab code uses chance of its own. */
+  resetDiffers(lab, before) {
+    lab.reset()
+    const after = lab.state().physics
+    const i = after.findIndex((x, j) => !Object.is(x, before[j]))
+    return i < 0 ? null : `number ${i} of the state is ${after[i]} after a reset, and was ${before[i]}`
+  }
+
+  // --- controls and claims
+
+  *acts() {
+    for (const [i, control] of this.config.controls.entries()) {
+      const entry = ['controls', i]
+      if (control.type === 'button') {
+        yield { entry, what: `button "${control.label}"`, act: (lab) => lab.press(i) }
+      } else if (control.type === 'select') {
+        for (const [label, value] of control.options) {
+          yield { entry, what: `"${control.label}" at "${label}"`, act: (lab) => lab.setControl(i, value) }
+        }
+      } else {
+        for (const [name, value] of [['minimum', control.min], ['maximum', control.max], ['value', control.value]]) {
+          if (value === null) continue
+          const what = `"${control.label}" at its ${name} ${value}`
+          yield { entry, what, act: (lab) => lab.setControl(i, value) }
+        }
+      }
+    }
+  }
+
+  claims() {
+    const groups = new Map()
+    this.config.expect.forEach((claim, i) => {
+      const key = JSON.stringify(claim.after)
+      groups.set(key, [...(groups.get(key) ?? []), { ...claim, i }])
+    })
+    for (const claims of groups.values()) {
+      claims.sort((a, b) => a.t - b.t)
+      this.attempt(['expect', claims[0].i], this.describe(claims[0].after), (lab) => this.prove(lab, claims))
+    }
+  }
+
+  describe(after) {
+    if (after === null) return 'claims from the start'
+    if (typeof after === 'string') return `claims after "${after}"`
+    return `claims with ${Object.entries(after).map(([label, value]) => `"${label}" at ${JSON.stringify(value)}`).join(', ')}`
+  }
+
+  prove(lab, claims) {
+    this.act(lab, claims[0].after)
+    for (const { i, t, min, max } of claims) {
+      const entry = ['expect', i, 'expr']
+      this.during.entry = current.trying = ['expect', i]
+      this.advance(lab, t)
+      if (lab.diverged !== null) return
+      this.value(entry, this.code.expect[i], lab.sync(), lab, (value) => {
+        if (typeof value !== 'number') return false
+        if (min !== null && value < min) this.fail(entry, 'expect', `is ${value} at ${t} s, less than ${min}`, lab.time)
+        if (max !== null && value > max) this.fail(entry, 'expect', `is ${value} at ${t} s, more than ${max}`, lab.time)
+        return true
+      })
+    }
+  }
+
+  act(lab, after) {
+    if (after === null) return
+    const index = (label) => {
+      const i = this.config.controls.findIndex((control) => control.label === label)
+      if (i < 0) throw new RangeError(`there is no control "${label}"`)
+      return i
+    }
+    if (typeof after === 'string') lab.press(index(after))
+    else for (const [label, value] of Object.entries(after)) lab.setControl(index(label), value)
+  }
+}
+
+/** Pictures without a GPU show no textures, which can be large. */
+function withoutTextures(scene) {
+  return { ...scene, textures: scene.textures.map((texture) => ({ ...texture, data: null })) }
+}

@@ -1,0 +1,74 @@
+"""The examples of the CommonMark specification, through our parser and our renderer."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from coursebuild.render.plain import plain_html
+from coursebuild.source import Source
+from coursebuild.syntax.document import parse_document
+
+ROOT = Path(__file__).parents[2]
+SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
+EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
+
+
+class Example(NamedTuple):
+    number: int
+    markdown: str
+    html: str
+
+
+@pytest.fixture(scope="module")
+def examples() -> list[Example]:
+    if not SPECIFICATION.is_file():
+        pytest.fail(f"no {SPECIFICATION.relative_to(ROOT)}: run `npm ci` in {ROOT / 'site'}")
+    text = SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t")
+    found = EXAMPLE.findall(text)
+    return [Example(i, markdown, html) for i, (markdown, html) in enumerate(found, start=1)]
+
+
+@pytest.fixture(scope="module")
+def differences() -> dict[int, str]:
+    text = (Path(__file__).parent / "differences.toml").read_text(encoding="utf-8")
+    listed: dict[str, str] = tomllib.loads(text)["examples"]
+    return {int(number): reason for number, reason in listed.items()}
+
+
+def rendered(markdown: str) -> str:
+    source = Source("spec.md", markdown)
+    return str(plain_html(parse_document(source, frozenset(), lesson=False).value))
+
+
+def test_all_examples_are_read(examples: list[Example]) -> None:
+    assert len(examples) == 652
+
+
+def test_examples(examples: list[Example], differences: dict[int, str]) -> None:
+    wrong = [
+        f"example {e.number}: {e.markdown!r}\n  wanted {e.html!r}\n  got    {rendered(e.markdown)!r}"
+        for e in examples
+        if e.number not in differences and rendered(e.markdown) != e.html
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_line_ends_make_no_difference(examples: list[Example]) -> None:
+    for line_end in ("\r\n", "\r"):
+        for e in examples:
+            html = rendered(e.markdown.replace("\n", line_end))
+            assert html == rendered(e.markdown), f"example {e.number} with {line_end!r}"
+
+
+def test_listed_differences_differ_and_have_reasons(
+    examples: list[Example], differences: dict[int, str]
+) -> None:
+    for number, reason in differences.items():
+        assert len(reason) > 20, f"example {number} is listed without a reason"
+        example = examples[number - 1]
+        assert rendered(example.markdown) != example.html, f"example {number} does not differ"

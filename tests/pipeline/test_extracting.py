@@ -1,0 +1,206 @@
+"""`extract`: the files in `examples/`, and edits made there brought back into the lesson."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import pytest
+from coursekit import GOOD, Folder, block
+
+Make = Callable[..., Folder]
+
+TWO = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
+SHAPES = {
+    "plain": "```python file=examples/x.py\nprint(1)\n```\n\nAfter.\n",
+    "quote": "> ```python file=examples/x.py\n> print(1)\n> ```\n>\n> After.\n",
+    "list": "1. item\n\n   ~~~python file=examples/x.py\n   print(1)\n   ~~~\n\n   After.\n",
+    "indented": "  ```python file=examples/x.py\n  print(1)\n  ```\n\nAfter.\n",
+    "deep": "> - item\n>\n>   ````python file=examples/x.py\n>   print(1)\n>   ````\n>\n> After.\n",
+    "last": "```python file=examples/x.py\nprint(1)\n```",
+}
+EDITED = (
+    'def f():\n\t"""A text\n\n      with ``` inside\n    """\n'
+    '\tif True:\n\t\treturn "ü"\n\n\n# end\n'
+)
+
+
+def test_files_are_written_once(make: Make) -> None:
+    folder = make(TWO)
+    done = folder.main("extract")
+    assert done.status == 0
+    assert "wrote examples/a.py\nwrote examples/sub/b.py\n" in done.out
+    assert folder.read("examples/a.py") == b"print('a')\n"
+    times = {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in folder.tree("examples")}
+    done = folder.main("extract")
+    assert done.status == 0
+    assert "every script is extracted already" in done.out
+    assert times == {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in times}
+
+
+def test_a_script_that_is_gone_is_removed(make: Make) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.write("examples/mine.txt", "not extracted")
+    folder.write(folder.lesson(), GOOD)
+    done = folder.main("extract")
+    assert done.status == 0
+    assert "removed examples/sub/b.py, which no lesson has any more" in done.out
+    assert set(folder.tree("examples")) == {".extracted.json", "hello.py", "mine.txt"}
+    assert not (folder.root / "examples/sub").exists()
+
+
+@pytest.mark.parametrize("command", ["extract", "check", "build", "update"])
+def test_an_edited_file_is_never_overwritten(make: Make, command: str) -> None:
+    folder = make(TWO)
+    assert folder.main("build").status == 0
+    site = folder.tree("public")
+    folder.write("examples/a.py", "print('a')  # by hand\n")
+    folder.replace(folder.lesson(), "print('a')", "print('A')")
+    lesson = folder.read(folder.lesson())
+    done = folder.main(command)
+    assert done.status == 1
+    assert "error[example-edited]: examples/a.py was edited by hand" in done.out
+    assert "+print('a')  # by hand" in done.out
+    assert "`coursebuild extract --adopt` brings what the file holds into the lesson" in done.out
+    assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
+    assert folder.read(folder.lesson()) == lesson
+    assert folder.tree("public") == site
+
+
+def test_a_file_that_was_there_before_is_never_overwritten(make: Make) -> None:
+    folder = make(TWO)
+    folder.write("examples/a.py", "something of mine\n")
+    done = folder.main("extract")
+    assert done.status == 1
+    assert "examples/a.py holds something else than this block" in done.out
+    assert folder.read("examples/a.py") == b"something of mine\n"
+    assert folder.read("examples/sub/b.py") == b"print('b')\n"
+
+
+def test_an_edited_file_whose_script_is_gone_stays(make: Make) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.write("examples/a.py", "edited\n")
+    folder.write(folder.lesson(), GOOD)
+    done = folder.main("extract")
+    assert done.status == 1
+    assert "no lesson has this script any more" in done.out
+    assert folder.read("examples/a.py") == b"edited\n"
+    (folder.root / "examples/a.py").unlink()
+    assert folder.main("extract").status == 0
+
+
+def test_deleting_the_file_drops_the_edit(make: Make) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.write("examples/a.py", "edited\n")
+    (folder.root / "examples/a.py").unlink()
+    assert folder.main("extract").status == 0
+    assert folder.read("examples/a.py") == b"print('a')\n"
+
+
+@pytest.mark.parametrize("manifest", [b"", b"{", b"[]", b'{"files": {"../x": []}}', None])
+def test_a_lost_manifest_only_makes_it_careful(make: Make, manifest: bytes | None) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    if manifest is None:
+        (folder.root / "examples/.extracted.json").unlink()
+    else:
+        folder.write("examples/.extracted.json", manifest)
+    folder.replace(folder.lesson(), "print('a')", "print('A')")
+    done = folder.main("extract")
+    assert done.status == 1
+    assert done.out.count("error[example-edited]") == 1
+    assert folder.read("examples/a.py") == b"print('a')\n"
+
+
+# --- adopting
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize("saved", ["plain", "crlf", "bom", "no end", "long end"])
+def test_an_edit_is_brought_into_the_lesson(
+    make: Make, shape: str, newline: str, saved: str
+) -> None:
+    text = ("## One\n\n" + SHAPES[shape]).replace("\n", newline)
+    folder = make(text)
+    assert folder.main("extract").status == 0
+    before, _, after = text.partition("print(1)" + newline)
+    lead = before.rpartition(newline)[2]
+    edited = EDITED
+    forms = {
+        "plain": edited,
+        "crlf": edited.replace("\n", "\r\n"),
+        "bom": "\ufeff" + edited,
+        "no end": edited.rstrip("\n"),
+        "long end": edited + "\n\n",
+    }
+    folder.write("examples/x.py", forms[saved])
+    done = folder.main("extract", "--adopt")
+    assert done.status == 0, done.out
+    assert f"updated {folder.lesson()}\n" in done.out
+    assert "+" in done.out
+    body = [(lead + line if line else lead.rstrip()) + newline for line in edited.splitlines()]
+    kept = before[: len(before) - len(lead)] if lead else before
+    assert folder.text(folder.lesson()) == kept + "".join(body) + after
+    assert folder.text("examples/x.py") == edited
+    assert folder.main("extract").status == 0
+    assert "every script is extracted already" in folder.main("extract", "--adopt").out
+
+
+def test_several_edits_of_one_lesson_at_once(make: Make) -> None:
+    folder = make(TWO, GOOD)
+    folder.main("extract")
+    folder.write("examples/a.py", "print('a')\nprint('more')\n")
+    folder.write("examples/sub/b.py", "# b\n\nprint('b')\n")
+    done = folder.main("extract", "--adopt")
+    assert done.status == 0
+    assert folder.text(folder.lesson()) == TWO.replace(
+        "print('a')\n", "print('a')\nprint('more')\n"
+    ).replace("print('b')\n", "# b\n\nprint('b')\n")
+    assert folder.main("check", "1.1").status == 1  # more is printed than recorded
+    assert folder.main("update", "1.1").status == 0
+    assert folder.main("check").status == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"caf\xe9\n", "it is not UTF-8"),
+        (b"\n\n", "it is empty"),
+        (b"x = '''\n```\n'''\n", "one of its lines would close the fence"),
+        (b"a\0b\n", "it holds a NUL"),
+    ],
+)
+def test_what_a_block_cannot_hold_is_left_alone(make: Make, data: bytes, says: str) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.write("examples/a.py", data)
+    done = folder.main("extract", "--adopt")
+    assert done.status == 1
+    assert f"examples/a.py cannot be brought into the lesson: {says}" in done.out
+    assert folder.read("examples/a.py") == data
+    assert folder.text(folder.lesson()) == TWO
+
+
+def test_only_edits_are_adopted(make: Make) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.replace(folder.lesson(), "print('b')", "print('B')")
+    folder.write("examples/a.py", "print('edited')\n")
+    assert folder.main("extract", "--adopt").status == 0
+    assert "print('B')" in folder.text(folder.lesson())
+    assert "print('edited')" in folder.text(folder.lesson())
+    assert folder.read("examples/sub/b.py") == b"print('B')\n"
+
+
+def test_adopting_without_edits_is_extracting(make: Make) -> None:
+    folder = make(TWO)
+    assert folder.main("extract", "--adopt").status == 0
+    assert folder.text(folder.lesson()) == TWO
+    assert set(json.loads(folder.text("examples/.extracted.json"))["files"]) == {
+        "examples/a.py",
+        "examples/sub/b.py",
+    }

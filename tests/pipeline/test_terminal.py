@@ -1,0 +1,295 @@
+"""Terminals, pipes and signals: the real command in a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import termios
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from coursekit import (
+    GOOD,
+    Folder,
+    block,
+    command,
+    ended,
+    processes,
+    wait_until_alone,
+    without_seconds,
+)
+
+Make = Callable[..., Folder]
+ERASE = "\r\x1b[K"
+SLOW = """
+import subprocess, sys, time
+from pathlib import Path
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+Path(sys.argv[0]).with_suffix(".running").touch()
+time.sleep(60)
+"""
+
+
+# --- a terminal
+
+
+class Terminal:
+    """A pseudo-terminal with a command in it."""
+
+    def __init__(self, folder: Folder, *arguments: str, columns: int = 80, **env: str) -> None:
+        self.master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        self.process = subprocess.Popen(
+            command(*arguments),
+            cwd=folder.root,
+            env=folder.environment({"TERM": "xterm-256color", **env}),
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            start_new_session=True,
+            preexec_fn=_controlling,
+        )
+        os.close(slave)
+        self.shown = ""
+
+    def read(self, until: str | None = None, seconds: float = 30.0) -> str:
+        """What is shown, up to a text or the end."""
+        end = time.monotonic() + seconds
+        while until is None or until not in self.shown:
+            left = end - time.monotonic()
+            assert left > 0, f"{until!r} was not shown, but {self.shown!r}"
+            if not select.select([self.master], [], [], left)[0]:
+                continue
+            try:
+                data = os.read(self.master, 1 << 16)
+            except OSError:  # EIO: nobody has the terminal open any more
+                break
+            self.shown += data.decode()
+        return self.shown
+
+    def type(self, keys: bytes) -> None:
+        os.write(self.master, keys)
+
+
+def _controlling() -> None:
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
+def terminal(folder: Folder, *arguments: str, columns: int = 80, **env: str) -> Iterator[Terminal]:
+    made = Terminal(folder, *arguments, columns=columns, **env)
+    try:
+        with ended(made.process):
+            yield made
+    finally:
+        os.close(made.master)
+
+
+def screen(shown: str) -> str:
+    """What stays on a terminal: an erased line does not."""
+    lines = []
+    for line in shown.replace("\r\n", "\n").split("\n"):
+        lines.append(line.rpartition(ERASE)[2])
+    return re.sub(r"\x1b\[[0-9;]*m", "", "\n".join(lines))
+
+
+def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> None:
+    slow = "import time\ntime.sleep(1.2)\nprint(1)"
+    folder = make("## One\n\n" + block("a.py", slow, "1") + block("b.py", "print(2)", "2"))
+    with terminal(folder, "check", "--jobs", "2") as shown:
+        text = shown.read()
+        assert shown.process.wait(10) == 0, text
+    assert "running scripts 0/2  " in text
+    assert "running scripts 1/2  examples/a.py 1 s" in text
+    assert without_seconds(screen(text)) == (
+        "ok       examples/a.py  # s\n"
+        "ok       examples/b.py  # s\n"
+        "\n"
+        "1 lesson, 2 scripts run: everything holds\n"
+    )
+    assert "\x1b[32m" in text
+
+
+def test_the_live_line_fits_the_terminal(make: Make) -> None:
+    slow = "import time\ntime.sleep(0.3)"
+    names = [f"{'長い名前' * 4}_{n}.py" for n in range(3)]
+    folder = make("## One\n\n" + "".join(block(name, slow) for name in names))
+    with terminal(folder, "check", "--jobs", "3", columns=44) as shown:
+        text = shown.read()
+        assert shown.process.wait(10) == 0
+    live = [part.partition("\r")[0] for part in text.split(ERASE) if part.startswith("running")]
+    assert live
+    assert max(sum(2 if ch > "⺀" else 1 for ch in line) for line in live) <= 43
+
+
+@pytest.mark.parametrize("env", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
+def test_without_colours(make: Make, env: dict[str, str]) -> None:
+    folder = make(GOOD + "[gone](lesson:7.7)\n")
+    with terminal(folder, "check", **env) as shown:
+        text = shown.read()
+        assert shown.process.wait(10) == 1
+    assert "error[link-lesson]: " in text
+    left = text.replace(ERASE, "")
+    assert "\x1b" not in left
+    if "TERM" in env:
+        assert "\x1b" not in text
+        assert "  examples/hello.py\r\n" in text
+
+
+def test_an_empty_no_color_counts_as_none(make: Make) -> None:
+    with terminal(make(GOOD), "check", NO_COLOR="") as shown:
+        assert "\x1b[32m" in shown.read()
+
+
+def test_quiet_on_a_terminal_shows_nothing(make: Make) -> None:
+    with terminal(make(GOOD), "build", "--quiet") as shown:
+        assert shown.read() == ""
+        assert shown.process.wait(10) == 0
+
+
+def test_ctrl_c_in_a_terminal(make: Make) -> None:
+    folder = make("## One\n\n" + block("slow.py", SLOW))
+    with terminal(folder, "check") as shown:
+        shown.read("examples/slow.py 1 s")
+        shown.type(b"\x03")
+        text = shown.read()
+        assert shown.process.wait(10) == 130
+    assert screen(text).replace("^C", "").strip() == "interrupted"
+    wait_until_alone(folder)
+
+
+# --- pipes
+
+
+@pytest.mark.parametrize(
+    "arguments", [["check"], ["check", "--format", "json"], ["schema", "lab"], ["--help"]]
+)
+def test_a_reader_that_has_seen_enough(make: Make, arguments: list[str]) -> None:
+    mistakes = "".join(f"[gone](lesson:7.{n}) " for n in range(400))
+    folder = make(GOOD + (mistakes if "json" in arguments else ""))
+    read, write = os.pipe()
+    os.close(read)  # nobody will ever read
+    with ended(folder.start(*arguments, stdout=write, stderr=subprocess.PIPE)) as process:
+        os.close(write)
+        errors = process.communicate(timeout=30)[1].decode()
+        expected = 1 if "json" in arguments else 0
+        assert process.returncode in ((0, 1, 120) if "--help" in arguments else (expected,))
+    assert "Traceback" not in errors
+    assert "--help" in arguments or "BrokenPipe" not in errors
+
+
+def test_the_verdict_stands_when_the_reader_stops_early(make: Make) -> None:
+    mistakes = "".join(f"[gone](lesson:7.{n})\n" for n in range(2000))
+    folder = make(GOOD + mistakes)
+    line = 'set -o pipefail; "$@" | head -1'
+    shell = ["bash", "-c", line, "bash", *command("check")]
+    done = subprocess.run(
+        shell, cwd=folder.root, env=folder.environment(), capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1)
+    assert "Traceback" not in done.stderr
+
+
+def test_a_disk_that_is_full(make: Make) -> None:
+    folder = make(GOOD)
+    with Path("/dev/full").open("wb") as full:
+        process = folder.start("check", stdout=full.fileno(), stderr=subprocess.PIPE)
+    with ended(process):
+        errors = process.communicate(timeout=30)[1].decode()
+        assert process.returncode == 1
+    assert errors.endswith(
+        "coursebuild: standard output cannot be written: no space left on device\n"
+    )
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&-", ">&- 2>&- <&-"])
+def test_closed_streams(make: Make, closed: str) -> None:
+    folder = make(GOOD)
+    line = ["bash", "-c", f'"$@" {closed}', "bash", *command("build")]
+    done = subprocess.run(line, cwd=folder.root, env=folder.environment(), capture_output=True)
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stdout + done.stderr
+    assert (folder.root / "public/index.html").is_file()
+    assert folder.read(folder.lesson()).decode() == GOOD
+
+
+# --- signals
+
+
+def begun(folder: Folder, process: subprocess.Popen[bytes], mark: str) -> None:
+    """Wait until a script runs."""
+    until = time.monotonic() + 20
+    while not (folder.root / mark).exists():
+        assert time.monotonic() < until and process.poll() is None
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("command_", ["check", "build", "update"])
+@pytest.mark.parametrize(
+    ("number", "status"),
+    [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)],
+)
+def test_a_signal_while_scripts_run(make: Make, command_: str, number: int, status: int) -> None:
+    folder = make("## One\n\n" + block("slow.py", SLOW, "1") + block("b.py", SLOW, "1"))
+    before = folder.read(folder.lesson())
+    process = folder.start(command_, "--jobs", "2", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    with ended(process):
+        begun(folder, process, "examples/slow.running")
+        begun(folder, process, "examples/b.running")
+        assert len(processes(folder)) >= 5
+        os.killpg(process.pid, number)  # as a terminal does
+        out, err = process.communicate(timeout=20)
+        assert process.returncode == status
+    wait_until_alone(folder)
+    assert (out, b"Traceback" in err) == (b"", False)
+    assert folder.read(folder.lesson()) == before
+    assert not (folder.root / "public").exists()
+    if number != signal.SIGKILL:
+        assert err.decode().endswith("interrupted\n" if status == 130 else "terminated\n")
+        assert list(folder.tmp.iterdir()) == []
+
+
+def test_a_closed_terminal_ends_the_scripts(make: Make) -> None:
+    folder = make("## One\n\n" + block("slow.py", SLOW))
+    process = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with ended(process):
+        begun(folder, process, "examples/slow.running")
+        os.kill(process.pid, signal.SIGHUP)
+        assert process.wait(20) == -signal.SIGHUP
+    wait_until_alone(folder)
+
+
+def test_interrupted_while_waiting_for_another_run(make: Make) -> None:
+    folder = make("## One\n\n" + block("slow.py", SLOW))
+    first = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with ended(first):
+        begun(folder, first, "examples/slow.running")
+        second = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        with ended(second):
+            assert second.stderr is not None
+            said = second.stderr.readline().decode()
+            assert f"another coursebuild (process {first.pid}) is at work" in said
+            os.killpg(second.pid, signal.SIGINT)
+            assert second.wait(20) == 130
+        os.killpg(first.pid, signal.SIGINT)
+        assert first.wait(20) == 130
+    wait_until_alone(folder)
+
+
+def test_the_folder_of_a_course_may_vanish(make: Make, tmp_path: Path) -> None:
+    code = "import os, shutil\nshutil.rmtree(os.getcwd())"
+    folder = make("## One\n\n" + block("x.py", code))
+    folder.main("extract")
+    done = folder.run("-C", str(folder.root), "check", cwd=tmp_path)
+    assert "Traceback" not in done.err
+    assert done.status in (0, 1)

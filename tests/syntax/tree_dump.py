@@ -1,0 +1,85 @@
+"""A document as text: a node a line with its place, then what the author is told.
+
+Spans are `line:column-line:column`, from 1, the end exclusive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from coursebuild.diagnostics import Diagnostic, Parsed
+from coursebuild.model import Block, Comparison, Document, Inline, ListItem, Table
+from coursebuild.source import Excerpt, Span
+
+HIDDEN = {"span", "children", "blocks", "items", "header", "rows"}
+
+
+def where(span: Span) -> str:
+    return f"{span.line}:{span.column}-{span.end_line}:{span.end_column}"
+
+
+def dump(parsed: Parsed[Document]) -> str:
+    lines = list(_nodes(parsed.value.blocks, 0))
+    for note in parsed.value.footnotes:
+        head = f"Footnote {where(note.span)} {note.number} {note.label!r}"
+        lines += [f"{head} references={note.references}", *_nodes(note.blocks, 1)]
+    return "".join(f"{line}\n" for line in lines) + told(parsed.diagnostics)
+
+
+def told(diagnostics: tuple[Diagnostic, ...]) -> str:
+    lines = []
+    for d in diagnostics:
+        lines.append(f"! {where(d.span)} {d.severity.value}[{d.rule}]: {d.message}")
+        lines += [f"!   = help: {d.help}"] if d.help else []
+        for note in d.notes:
+            place = f" at {where(note.span)}" if note.span else ""
+            lines.append(f"!   = note: {note.message}{place}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _nodes(nodes: tuple[Block | Inline, ...], depth: int) -> Iterator[str]:
+    for node in nodes:
+        yield from _node(node, depth)
+
+
+def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
+    indent = "  " * depth
+    values = [_value(f.name, getattr(node, f.name)) for f in fields(node) if f.name not in HIDDEN]
+    words = [type(node).__name__, where(node.span), *filter(None, values)]
+    yield indent + " ".join(words)
+    if isinstance(node, Table):
+        for cells in (node.header, *node.rows):
+            for cell in cells:
+                yield f"{indent}  Cell {where(cell.span)} {cell.text.text!r}"
+                yield from _nodes(cell.children, depth + 2)
+        return
+    for name in ("title", "caption", "input", "process", "output"):
+        content = getattr(node, name, None)
+        if content and isinstance(content, tuple):
+            yield f"{indent}  {name}:"
+            yield from _nodes(content, depth + 2)
+    body = getattr(node, "body", None)
+    if isinstance(body, Table):
+        yield from _node(body, depth + 1)
+    for item in getattr(node, "items", ()):
+        yield from _node(item, depth + 1)
+    yield from _nodes(getattr(node, "children", getattr(node, "blocks", ())), depth + 1)
+
+
+def _value(name: str, value: object) -> str:
+    """What a field adds to its node's line."""
+    if isinstance(value, Span):
+        return f"{name}={where(value)}"
+    if isinstance(value, Excerpt):
+        return f"{name}={where(value.span())} {value.text!r}"
+    if isinstance(value, Comparison):
+        tolerances = f" rtol={value.rtol} atol={value.atol}" if value.mode.value == "rtol" else ""
+        return f"[{value.mode.value}{tolerances}{' ellipsis' if value.ellipsis else ''}]"
+    if name == "checked" and value is not None:
+        return f"checked={value}"
+    if value is None or value is False or value == () or value == "" or isinstance(value, Table):
+        return ""
+    if isinstance(value, tuple) and not all(isinstance(v, str | None) for v in value):
+        return ""
+    return repr(value) if name in ("text", "html") else f"{name}={value!r}"
