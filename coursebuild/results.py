@@ -162,6 +162,54 @@ class ModelFacts:
 
 
 @dataclass(frozen=True, slots=True)
+class StaticForm:
+    """What a page shows of a lab before it starts, on paper and without JavaScript."""
+
+    picture: bytes
+    """PNG with a clear ground."""
+    size: tuple[int, int]
+    """Width and height in pixels."""
+    time: float
+    """Simulated time of the picture, s."""
+    readouts: tuple[tuple[str, str], ...]
+    """Label and value at the end of the main run."""
+    end: float
+    """Simulated time of the readouts and of the end of the plots, s."""
+    plots: tuple[str, ...]
+    """SVG elements, one a plot."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabResult:
+    """A lab as it was tried, and what its page needs."""
+
+    span: Span
+    """The lab in its lesson, by which it is found again."""
+    name: str
+    """Unique in the course: `4.2-lab-1`."""
+    lesson: str
+    """Id of its lesson or page."""
+    title: str
+    status: str
+    """`ok`, or `failed`."""
+    seconds: float
+    """Wall time of the trial."""
+    steps_per_second: int | None
+    """Of the main run, in V8; `None` where it did not come to its end."""
+    tried: tuple[str, ...]
+    parity: str
+    """How the run compares with native MuJoCo, in words; empty where it was not compared."""
+    module: str
+    """The lab's code as an ES module."""
+    config: str
+    """The lab's data as JSON."""
+    mjb: bytes
+    """Its model."""
+    static: StaticForm | None
+    cached: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class OutputFile:
     """A file of the site: its path there (POSIX, relative) and its bytes."""
 
@@ -183,3 +231,4 @@ class Results:
     """Version of the interpreter that ran the scripts."""
     engine: str
     """Version of MuJoCo that ran the scripts."""
+    labs: tuple[LabResult, ...] = ()

@@ -42,9 +42,7 @@ from coursebuild.source import Span
 AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
 
 _HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
-_HTML_ANCHOR = re.compile(
-    r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE
-)
+_HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry point: `LabEngine.trial`. See docs/labs.md for what is asked and answered.
+Entry points: `LabEngine.trial`, `LabEngine.mistakes`, `engine_digest`. See docs/labs.md for what is
+asked and answered.
 
 The engine is started when it is first needed, and again after a trial that ran too long or took too
 much memory: such a trial is told as what it is, and takes no other along.
@@ -8,7 +9,11 @@ much memory: such a trial is told as what it is, and takes no other along.
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import json
+from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -46,6 +51,13 @@ class LabEngine:
             self._isolate.close()
             self._isolate = None
 
+    def mistakes(self, pieces: Sequence[tuple[str, str]]) -> list[str | None]:
+        """For each piece of code and its form: why it is no JavaScript, or `None`."""
+        isolate = self._isolate or self._start()
+        request = json.dumps([{"code": code, "form": form} for code, form in pieces])
+        found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
+        return found
+
     def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
         """The reply to a trial's request; `wall` is how many seconds it may take.
 
@@ -57,7 +69,12 @@ class LabEngine:
             text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + _MARGIN)
         except LimitError as error:
             self.close()
-            failure: dict[str, Any] = {"entry": [], "kind": "timeout", "message": str(error), "at": None}
+            failure: dict[str, Any] = {
+                "entry": [],
+                "kind": "timeout",
+                "message": str(error),
+                "at": None,
+            }
             return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] == "engine" for failure in reply["failures"]):
@@ -67,8 +84,18 @@ class LabEngine:
     def _start(self) -> Isolate:
         folder = assets_dir()
         script = (folder / "js" / "lab-trial.js").read_text(encoding="utf-8")
-        self._isolate = isolate = Isolate(script, memory=_MEMORY)
+        pieces = Path(__file__).with_name("lab_pieces.js").read_text(encoding="utf-8")
+        self._isolate = isolate = Isolate(script, pieces, memory=_MEMORY)
         isolate.fill("wasm", (folder / "mujoco" / "mujoco.wasm").read_bytes())
         isolate.call("boot", "", _START_SECONDS)
         self.version = isolate.call("booted", "", _START_SECONDS)
         return isolate
+
+
+@functools.lru_cache(maxsize=1)
+def engine_digest() -> str:
+    """A hash of everything that a trial runs besides the lab itself."""
+    folder = assets_dir()
+    digest = hashlib.sha256((folder / "mujoco" / "mujoco.wasm").read_bytes())
+    digest.update((folder / "js" / "lab-trial.js").read_bytes())
+    return digest.hexdigest()

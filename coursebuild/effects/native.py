@@ -33,16 +33,17 @@ class NativeEngine(JsonChild):
         request = {"task": "save", "path": str(self._root / path), "text": text}
         return base64.b64decode(self._told(request, path)["mjb"])
 
-    def parity(self, mjb: bytes, run: dict[str, Any], name: str) -> dict[str, Any]:
+    def parity(self, mjb: bytes, run: dict[str, Any], horizon: int, name: str) -> dict[str, Any]:
         """A recorded run of the browser's engine, repeated: where and by how much it differs.
 
-        `run` is the `parity` part of a trial's reply.
+        `run` is the `parity` part of a trial's reply; the size of a difference counts up to the
+        step `horizon`.
 
         Raises:
             EffectError: the child died.
         """
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
-        return self._told({"task": "parity", "mjb": model, "run": run}, name)
+        return self._told({"task": "parity", "mjb": model, "run": run, "horizon": horizon}, name)
 
     def _told(self, request: dict[str, Any], name: str) -> dict[str, Any]:
         reply: dict[str, Any] | None = self.ask({**request, "limit": _TIMEOUT})

@@ -63,7 +63,7 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
     """Repeat a run natively.
 
     The checksum of each step tells the first that differs; the states recorded at every `stride`-th
-    step tell by how much.
+    step, up to the horizon, tell by how much.
     """
     run = request["run"]
     Path(_MODEL).write_bytes(base64.b64decode(request["mjb"]))
@@ -83,7 +83,7 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
             checksum = zlib.crc32(part.tobytes(), checksum)
         if first is None and checksum != sums[step]:
             first = step + 1
-        if first is None or (step + 1) % run["stride"]:
+        if first is None or (step + 1) % run["stride"] or step >= request["horizon"]:
             continue
         mine = numpy.concatenate((data.qpos, data.qvel, data.act))
         gap = float(numpy.abs(mine - states[(step + 1) // run["stride"] - 1]).max())

@@ -176,6 +176,7 @@ def _control_data(control: LabControl) -> dict[str, Any]:
         "value": control.value,
         "digits": control.digits,
         "options": [list(option) for option in control.options],
+        "param": control.param,
         "init": control.init,
         "reset": control.reset,
     }

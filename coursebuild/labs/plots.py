@@ -14,8 +14,8 @@ from html import escape
 
 from coursebuild.model import LabPlot
 
-_WIDTH, _HEIGHT = 480.0, 220.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 54.0, 64.0, 12.0, 38.0
+_WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
+_LEFT, _TOP, _BOTTOM = 46.0, 12.0, 38.0
 _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
 _LABEL_GAP = 13.0
 
@@ -39,9 +39,16 @@ def number(value: float) -> str:
 
 
 def plot_svg(
-    plot: LabPlot, times: Sequence[float], traces: Sequence[Sequence[float | None]]
+    plot: LabPlot,
+    times: Sequence[float],
+    traces: Sequence[Sequence[float | None]],
+    *,
+    narrow: bool = False,
 ) -> str:
-    """The plot as an `svg` element; values that are no finite numbers interrupt their line."""
+    """The plot as an `svg` element; values that are no finite numbers interrupt their line.
+
+    A narrow one is for the margin: its text has the same size there.
+    """
     shown = [
         (t, i) for i, t in enumerate(times) if plot.window is None or t >= times[-1] - plot.window
     ]
@@ -53,7 +60,10 @@ def plot_svg(
     ]
     values += [y for y, _ in plot.ref_lines]
     low, high = _range(values, plot.ymin, plot.ymax)
-    frame = _Frame(low_t, high_t, low, high)
+    width = _NARROW if narrow else _WIDE
+    longest = max((len(trace.label) for trace in plot.traces), default=0)
+    margin = min(14.0 + 6.2 * longest, 0.35 * width)
+    frame = _Frame(low_t, high_t, low, high, width, margin)
     parts = [*_axes(frame, plot)]
     for y, label in plot.ref_lines:
         if low <= y <= high:
@@ -65,11 +75,11 @@ def plot_svg(
         last = next((v for _, v in reversed(points) if v is not None and math.isfinite(v)), None)
         if last is not None:
             ends.append((frame.y(min(max(last, low), high)), trace.label, n))
-    parts += _labels(ends)
+    parts += _labels(frame, ends)
     title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
     names = ", ".join(trace.label for trace in plot.traces)
     return (
-        f'<svg class="lab-plot" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" '
+        f'<svg class="lab-plot" viewBox="0 0 {width:g} {_HEIGHT:g}" role="img" '
         f'aria-label="{escape(f"{title}: {names}")}">' + "".join(parts) + "</svg>"
     )
 
@@ -77,11 +87,12 @@ def plot_svg(
 class _Frame:
     """From values to places."""
 
-    def __init__(self, low_t: float, high_t: float, low: float, high: float) -> None:
+    def __init__(self, low_t: float, high_t: float, low: float, high: float, width: float) -> None:
         self.low_t, self.high_t, self.low, self.high = low_t, high_t, low, high
+        self.right = width - margin
 
     def x(self, t: float) -> float:
-        return _LEFT + (t - self.low_t) / (self.high_t - self.low_t) * (_WIDTH - _LEFT - _RIGHT)
+        return _LEFT + (t - self.low_t) / (self.high_t - self.low_t) * (self.right - _LEFT)
 
     def y(self, v: float) -> float:
         return (
@@ -100,7 +111,7 @@ def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple
 
 
 def _axes(frame: _Frame, plot: LabPlot) -> list[str]:
-    right, bottom = _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
+    right, bottom = frame.right, _HEIGHT - _BOTTOM
     parts = []
     for value in ticks(frame.low, frame.high):
         y = frame.y(value)
@@ -131,7 +142,7 @@ def _axes(frame: _Frame, plot: LabPlot) -> list[str]:
 def _reference(frame: _Frame, y: float, label: str) -> str:
     at = frame.y(y)
     return (
-        f'<path class="lab-reference" d="M{_LEFT:g} {at:.1f}H{_WIDTH - _RIGHT:g}"/>'
+        f'<path class="lab-reference" d="M{_LEFT:g} {at:.1f}H{frame.right:g}"/>'
         f'<text x="{_LEFT + 4:g}" y="{at - 4:.1f}">{escape(label)}</text>'
     )
 
@@ -152,14 +163,14 @@ def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int) -
     return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
 
 
-def _labels(ends: list[tuple[float, str, int]]) -> list[str]:
+def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
     """Names at the ends of the lines, moved apart where they would overlap."""
     placed: list[str] = []
     last = -math.inf
     for y, label, n in sorted(ends):
         last = max(y, last + _LABEL_GAP)
         placed.append(
-            f'<text class="lab-name lab-name-{n % 7 + 1}" x="{_WIDTH - _RIGHT + 6:g}" '
+            f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:g}" '
             f'y="{last + 3.5:.1f}">{escape(label)}</text>'
         )
     return placed

@@ -38,6 +38,7 @@ class Trial:
     tried: tuple[str, ...]
     failures: tuple[Failure, ...]
     main: dict[str, Any] | None
+    steps_per_second: int | None
 
 
 def read_trial(reply: dict[str, Any]) -> Trial:
@@ -53,7 +54,8 @@ def read_trial(reply: dict[str, Any]) -> Trial:
         for failure in reply["failures"]
     )
     tried = tuple(step["what"] for step in reply["tried"])
-    return Trial(reply["version"], tried, failures, reply["main"])
+    speed = reply.get("stepsPerSecond")
+    return Trial(reply["version"], tried, failures, reply["main"], speed)
 
 
 def unpacked(value: Any) -> Any:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -17,6 +16,7 @@ from coursebuild.labs.plots import plot_svg
 from coursebuild.labs.reply import unpacked
 from coursebuild.labs.shapes import Array, Kind, Surface, mesh_surface, surface
 from coursebuild.model import Lab
+from coursebuild.results import StaticForm
 
 _KINDS: dict[int, Kind] = {
     0: "plane",
@@ -38,24 +38,6 @@ _GEOM, _DECORATION = 19, 24
 _WIDTH = 640
 
 
-@dataclass(frozen=True, slots=True)
-class StaticForm:
-    """What a page shows of a lab before it starts."""
-
-    picture: bytes
-    """PNG."""
-    size: tuple[int, int]
-    """Pixels."""
-    time: float
-    """Simulated time of the picture, s."""
-    readouts: tuple[tuple[str, str], ...]
-    """Label and value, at the end of the main run."""
-    end: float
-    """Simulated time of the readouts and of the end of the plots, s."""
-    plots: tuple[str, ...]
-    """SVG elements."""
-
-
 def static_form(lab: Lab, main: dict[str, Any]) -> StaticForm:
     """The static form of a lab whose trial's main run is `main`."""
     scene = unpacked(main["scene"])
@@ -73,7 +55,7 @@ def static_form(lab: Lab, main: dict[str, Any]) -> StaticForm:
     pixels = draw(tuple(scene_solids(scene, first["frame"])), seen, size)
     recorded = main["plots"]
     plots = tuple(
-        plot_svg(plot, recorded["times"], traces)
+        plot_svg(plot, recorded["times"], traces, narrow=lab.dock)
         for plot, traces in zip(lab.plots, recorded["plots"], strict=True)
     )
     readouts = tuple(

@@ -75,7 +75,7 @@ def prepare(options: Options, progress: Progress) -> Prepared:
 def _report(loaded: Loaded, verified: Verified, found: list[Diagnostic], seconds: float) -> Report:
     course = loaded.course
     written = [] if course is None else [x for x in course.lessons if x.document is not None]
-    return judge(course, found, verified.scripts, seconds, lessons=len(written))
+    return judge(course, found, verified.scripts, seconds, lessons=len(written), labs=verified.labs)
 
 
 def _render(course: Course, verified: Verified, options: Options) -> tuple[OutputFile, ...]:

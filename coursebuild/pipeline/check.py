@@ -44,6 +44,7 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
         time.monotonic() - began,
         lessons=len(chosen.lessons),
         documents=chosen.documents,
+        labs=verified.labs,
     )
 
 

@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 
 from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.model import Course, Silence
-from coursebuild.report import Report, ScriptLine, Summary
+from coursebuild.report import LabLine, Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")
 _OF_RUNS = (
@@ -33,6 +33,7 @@ def judge(
     lessons: int,
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
+    labs: tuple[LabLine, ...] = (),
 ) -> Report:
     """The report of a command.
 
@@ -55,7 +56,7 @@ def judge(
         silenced=len(told) - len(kept),
         seconds=seconds,
     )
-    return Report(kept, tuple(scripts), summary, remarks)
+    return Report(kept, tuple(scripts), summary, remarks, labs)
 
 
 def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:

@@ -53,7 +53,8 @@ class _Loader:
         self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
         self.unnamed: dict[str, Source] = {}
-        """Lesson files that the map does not name, by path; one that was surely meant is taken out."""
+        """Lesson files that the map does not name, by path; one that was surely meant is taken out.
+        """
 
     def course(self) -> Course | None:
         """The whole course, or `None` where there is no usable map."""

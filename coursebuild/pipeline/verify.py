@@ -12,6 +12,7 @@ Entry point: `verify(course, options, progress, lessons)`.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -24,12 +25,14 @@ from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
+from coursebuild.pipeline.labs import try_labs
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.report import ScriptLine
+from coursebuild.report import LabLine, ScriptLine
 from coursebuild.results import (
     CompileResult,
     Formula,
+    LabResult,
     MathError,
     Outcome,
     Results,
@@ -49,6 +52,7 @@ class Verified:
     results: Results
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
+    labs: tuple[LabLine, ...]
 
 
 def verify(
@@ -60,16 +64,21 @@ def verify(
     if documents is not None:
         leaned_on = _leaned_on(course, documents)
         chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
-    runs = run(chosen, options, progress)
-    verdicts = compare_all(course, runs)
-    found = [*extracted.diagnostics, *script_findings(course, chosen, runs, verdicts)]
-    found += check_output_lines(course, runs)
     models, compiled = _compile(course, options, progress)
-    found += compiled
+    with ThreadPoolExecutor(1, "labs") as beside:
+        trying = beside.submit(try_labs, course, dict(models), options, documents, compiled)
+        runs = run(chosen, options, progress)
+        with progress.stage("trying labs"):
+            labs, lab_findings = trying.result()
+    verdicts = compare_all(course, runs)
+    found = [*extracted.diagnostics, *compiled, *lab_findings]
+    found += script_findings(course, chosen, runs, verdicts)
+    found += check_output_lines(course, runs)
     formulas = _typeset(course, progress)
     found += check_formulas(course, dict(formulas))
-    results = Results(runs, verdicts, formulas, models, python_version(), engine_version())
-    return Verified(results, tuple(found), script_lines(chosen, runs, verdicts))
+    versions = python_version(), engine_version()
+    results = Results(runs, verdicts, formulas, models, *versions, labs)
+    return Verified(results, tuple(found), script_lines(chosen, runs, verdicts), lab_lines(labs))
 
 
 def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
@@ -184,6 +193,24 @@ def script_lines(
             ScriptLine(done.path, extraction.owner, status, done.seconds, done.cached, done.missing)
         )
     return tuple(lines)
+
+
+def lab_lines(labs: Sequence[LabResult]) -> tuple[LabLine, ...]:
+    """How each lab did, as a report lists it."""
+    return tuple(
+        LabLine(
+            lab.name,
+            lab.title,
+            lab.lesson,
+            lab.status,
+            lab.seconds,
+            lab.steps_per_second,
+            len(lab.tried),
+            lab.parity,
+            lab.cached,
+        )
+        for lab in labs
+    )
 
 
 # --- models and formulas

@@ -16,6 +16,7 @@ from coursebuild.render.strings import Strings
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
+    from coursebuild.render.lab_files import LabFiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,20 @@ class ControlView:
     label: str
     values: str
     """Range or options, and what it is at first, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedView:
+    """What the trial recorded, ready for the template."""
+
+    picture: str
+    width: int
+    height: int
+    alt: str
+    readouts: tuple[tuple[str, str], ...]
+    plots: tuple[Markup, ...]
+    at: str
+    proven: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +55,14 @@ class PlotView:
 def lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
     words = page.library.words
+    files = page.library.labs.labs.get((block.span.path, block.span.start))
     return page.template(
         "blocks/lab.html",
         lab=block,
+        key=files.result.name if files is not None else None,
+        config=page.place.href(files.config) if files is not None else None,
+        script=page.place.href(files.script) if files is not None else None,
+        recorded=_recorded(page, block, files) if files is not None else None,
         title=block.title or words("lab.untitled"),
         note=page.blocks(block.note),
         model_href=page.href(ModelTarget(block.model)) if block.model is not None else None,
@@ -52,6 +72,33 @@ def lab(page: PageContext, block: Lab) -> Markup:
         plots=tuple(_plot(words, block, index) for index in range(len(block.plots))),
         overlays=tuple(_overlay(words, name) for name in block.toggles),
     )
+
+
+def _recorded(page: PageContext, block: Lab, files: LabFiles) -> RecordedView | None:
+    """What the trial recorded; `None` where it did not come to its end."""
+    static = files.result.static
+    if static is None or files.picture is None:
+        return None
+    words = page.library.words
+    return RecordedView(
+        page.place.href(files.picture),
+        static.size[0],
+        static.size[1],
+        words("lab.picture", title=block.title or words("lab.untitled"), t=number(static.time, 4)),
+        static.readouts,
+        tuple(Markup(svg) for svg in static.plots),
+        words("lab.at", t=_seconds(static.end)),
+        words(
+            "lab.proven",
+            engine=page.library.results.engine,
+            tried=str(len(files.result.tried)),
+            parity=files.result.parity,
+        ),
+    )
+
+
+def _seconds(value: float) -> str:
+    return number(round(value, 3))
 
 
 def number(value: float, digits: int | None = None) -> str:

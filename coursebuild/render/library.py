@@ -30,6 +30,7 @@ from coursebuild.model import (
     document_inlines,
 )
 from coursebuild.render.assets import Assets, strings_for, template_environment
+from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.strings import Strings
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
 from coursebuild.vocabulary import CALLOUTS
@@ -72,6 +73,7 @@ class Library:
     """The lessons that need a lesson, by its id."""
     uses: Mapping[str, tuple[ModelUse, ...]]
     """Where a model is used, by its name, in the order of the course."""
+    labs: PublishedLabs
     _formulas: Mapping[Formula, str | MathError]
     _verdicts: Mapping[tuple[str, int], Verdict]
 
@@ -93,6 +95,7 @@ class Library:
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
             uses=_uses(course),
+            labs=lab_files(results.labs, assets),
             _formulas=dict(results.formulas),
             _verdicts={_place(verdict.recording): verdict for verdict in results.verdicts},
         )

@@ -104,10 +104,10 @@ class PlainContext:
             case Mjcf():
                 return self.code("mjcf", block.code.text)
             case Recording():
-                caption = f"<p>{render_inlines(block.caption, self, PLAIN)}</p>\n"
+                caption = Markup(f"<p>{render_inlines(block.caption, self, PLAIN)}</p>\n")
                 if isinstance(block.body, Table):
-                    return Markup(caption + render_table(block.body, self, PLAIN))
-                return Markup(caption + self.code("text", block.body.text))
+                    return caption + render_table(block.body, self, PLAIN)
+                return caption + self.code("text", block.body.text)
             case Io():
                 parts = (block.input, block.process, block.output)
                 return Markup(

@@ -48,6 +48,7 @@ def render_site(
     shared, names = _shared(library, assets, options, drafts, declarations)
     files = [OutputFile(draft.path, frame(library, draft, names).encode()) for draft in drafts]
     files += shared
+    files += library.labs.files
     files += _downloads(library, options)
     files += _machine_files(course, drafts)
     return tuple(sorted(files, key=lambda file: file.path))

@@ -11,6 +11,7 @@ from coursebuild.report.machine import to_annotations, to_json, to_junit, to_sar
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import to_text
+from coursebuild.report.values import LabLine as LabLine
 from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
 from coursebuild.report.values import Summary as Summary

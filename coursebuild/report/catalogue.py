@@ -1,7 +1,7 @@
 """The catalogue of rules as a page of Markdown, each rule with an example.
 
-Entry point: `catalogue_page(examples)`. The examples are the fixtures of the rules, so that the page
-shows what the tool says and not what somebody thought it would say.
+Entry point: `catalogue_page(examples)`. The examples are the fixtures of the rules, so that the
+page shows what the tool says and not what somebody thought it would say.
 """
 
 from __future__ import annotations
@@ -44,9 +44,10 @@ def catalogue_page(examples: Mapping[str, Example]) -> str:
     head = f"""\
 # Rules
 
-Every diagnostic of `coursebuild` names its rule: `error[output-drift]`. There are {errors} errors
-and {len(RULES) - errors} warnings. An error keeps the site from being published, and nothing silences
-it. A warning can be silenced in `content/course.toml`, by its rule and with a reason:
+Every diagnostic of `coursebuild` names its rule, as in `error[output-drift]`. There are {errors}
+errors and {len(RULES) - errors} warnings. An error keeps the site from being published, and
+nothing silences it. A warning can be silenced in `content/course.toml`, by its rule and with a
+reason:
 
 ```toml
 [[silence]]

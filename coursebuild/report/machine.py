@@ -53,6 +53,20 @@ def to_json(report: Report) -> str:
         }
         for s in report.scripts
     ]
+    labs = [
+        {
+            "name": lab.name,
+            "title": lab.title,
+            "lesson": lab.lesson,
+            "status": lab.status,
+            "seconds": round(lab.seconds, 3),
+            "steps_per_second": lab.steps_per_second,
+            "tried": lab.tried,
+            "parity": lab.parity,
+            "cached": lab.cached,
+        }
+        for lab in report.labs
+    ]
     s = report.summary
     summary = {
         "ok": report.ok,
@@ -65,7 +79,7 @@ def to_json(report: Report) -> str:
         "silenced": s.silenced,
         "seconds": round(s.seconds, 3),
     }
-    value = {"diagnostics": diagnostics, "scripts": scripts, "summary": summary}
+    value = {"diagnostics": diagnostics, "scripts": scripts, "labs": labs, "summary": summary}
     return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
 
 

@@ -14,7 +14,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.report.values import Report, ScriptLine, summary_line
+from coursebuild.report.values import LabLine, Report, ScriptLine, summary_line
 from coursebuild.source import Span
 
 _TAB = 4
@@ -38,8 +38,10 @@ _BOLD, _RED, _YELLOW, _BLUE, _GREEN, _FAINT = "1", "1;31", "1;33", "1;34", "32",
 def to_text(report: Report, style: Style) -> str:
     """Each diagnostic, the scripts, and a summary line."""
     parts = [diagnostic_text(d, style) + "\n" for d in report.diagnostics]
-    if report.scripts:
-        parts.append("".join(script_line(line, style) + "\n" for line in report.scripts))
+    lines = [script_line(line, style) for line in report.scripts]
+    lines += [lab_line(line, style) for line in report.labs]
+    if lines:
+        parts.append("".join(line + "\n" for line in lines))
     if report.remarks:
         parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
     colour = _GREEN if report.ok else _RED
@@ -57,6 +59,15 @@ def script_line(line: ScriptLine, style: Style) -> str:
         return f"{verdict} {line.path}  (needs {', '.join(line.missing)})"
     took = "cached" if line.cached else f"{line.seconds:.2f} s"
     return f"{verdict} {line.path}  {style.paint(took, _FAINT)}"
+
+
+def lab_line(line: LabLine, style: Style) -> str:
+    """One lab: verdict, name, how fast it ran, what was tried, how it compares."""
+    verdict = style.paint(f"{line.status:<8}", _GREEN if line.status == "ok" else _RED)
+    parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
+    parts += [f"{line.tried} things tried"] + ([line.parity] if line.parity else [])
+    parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
+    return f"{verdict} {line.name}  {style.paint(', '.join(parts), _FAINT)}"
 
 
 def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:

@@ -26,6 +26,25 @@ class ScriptLine:
 
 
 @dataclass(frozen=True, slots=True)
+class LabLine:
+    """One lab, as a report lists it."""
+
+    name: str
+    title: str
+    lesson: str
+    status: str
+    """`ok` or `failed`."""
+    seconds: float
+    """Wall time of its trial."""
+    steps_per_second: int | None
+    tried: int
+    """How many things were tried."""
+    parity: str
+    """How it compares with native MuJoCo, in words."""
+    cached: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Summary:
     """The totals."""
 
@@ -48,6 +67,7 @@ class Report:
     summary: Summary
     remarks: tuple[str, ...] = ()
     """What was done, a line each, such as the files written."""
+    labs: tuple[LabLine, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -64,6 +84,8 @@ def summary_line(report: Report) -> str:
     """One line: what was checked and what was found."""
     s = report.summary
     parts = [plural(s.lessons, "lesson"), f"{plural(s.ran, 'script')} run"]
+    if report.labs:
+        parts.append(f"{plural(len(report.labs), 'lab')} tried")
     if s.skipped:
         parts.append(f"{s.skipped} skipped")
     found = [plural(s.errors, "error")] if s.errors else []

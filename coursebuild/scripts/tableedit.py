@@ -9,6 +9,7 @@ refused: which line it was meant to show cannot be known.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,6 +22,7 @@ from coursebuild.scripts.traced import Side
 from coursebuild.scripts.unstable import unstable
 from coursebuild.source import Span
 
+MINUS = "\u2212"
 _BY_HAND = "bring the row up to date by hand"
 
 
@@ -68,15 +70,24 @@ def _updated_row(
         if same_number(recorded, printed, comparison):
             continue
         span = cell.span(recorded)
-        if span.text.replace("\u2212", "-") != recorded.text:
+        if span.text.replace(MINUS, "-") != recorded.text:
             return _refused(span, "a number written with an entity or an escape cannot be replaced")
         new = _written(recorded, printed, comparison)
         text = texts[id(cell)]
         texts[id(cell)] = text[: recorded.start] + new + text[recorded.end :]
-        minus = "\u2212" if "\u2212" in span.text else "-"
-        edits.append(Edit(span, new.replace("-", minus)))
+        edits.append(Edit(span, _signed_like(span.text, new)))
     cells = tuple(replace(cell, canon=canonical(texts[id(cell)])) for cell in found.row)
     return cells, edits[::-1]
+
+
+def _signed_like(old: str, new: str) -> str:
+    """The new number with the minus signs of the old one: before it, and in its exponent."""
+    signed: list[str] = []
+    old_parts, new_parts = (re.split("(?=[eE])", text) for text in (old, new))
+    for index, part in enumerate(new_parts):
+        model = old_parts[index] if index < len(old_parts) else ""
+        signed.append(part.replace("-", MINUS) if MINUS in model else part)
+    return "".join(signed)
 
 
 def _written(recorded: Number, printed: Number, comparison: Comparison) -> str:

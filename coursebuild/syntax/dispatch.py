@@ -16,7 +16,6 @@ from coursebuild.syntax.script import parse_python
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.texts import TextParser
 
-
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
 )

@@ -6,7 +6,6 @@ Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun
 
 from __future__ import annotations
 
-import math
 import re
 import shlex
 import sys
@@ -21,6 +20,8 @@ from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
 
 DEFAULT_TIMEOUT = 60.0
+"""Seconds."""
+LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
 _RUNNING = ("timeout", "requires", "args", "norun")
@@ -117,9 +118,11 @@ def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     if word is None or word.value is None:
         return DEFAULT_TIMEOUT
     seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
-    if seconds > 0 and math.isfinite(seconds):
+    if 0 < seconds <= LONGEST_TIMEOUT:
         return seconds
     message = f"`{word.value}` is not a number of seconds above 0"
+    if seconds > LONGEST_TIMEOUT:
+        message = f"`{word.value}` s is more than a day"
     diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return DEFAULT_TIMEOUT
 

@@ -13,6 +13,7 @@ from typing import Literal, cast
 
 from markdown_it.common.utils import MD_TRIM_CHARS
 
+from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.model import Cell, Inline, Table
 from coursebuild.source import Excerpt
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
@@ -25,6 +26,7 @@ def read_table(
     at: int,
     base: Excerpt,
     inlines: Callable[[Excerpt], tuple[Inline, ...]],
+    report: Callable[[Diagnostic], None],
 ) -> tuple[Table, int]:
     """The table whose opening token has the index `at`, and the index after its closing one."""
     opened = tokens[at]
@@ -39,12 +41,22 @@ def read_table(
         elif token.type == "tr_open":
             row = token
         elif token.type == "tr_close":
-            cells = split_row(base, row.start, row.end)[: len(align)]
+            cells = split_row(base, row.start, row.end)
+            if any(cell.text for cell in cells[len(align) :]):
+                report(_too_many(cells, len(align)))
+            cells = cells[: len(align)]
             empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
             cells += [empty] * (len(align) - len(cells))
             rows.append(tuple(Cell(cell.span(), cell, inlines(cell)) for cell in cells))
     span = base.span(opened.start, opened.end)
     return Table(span, tuple(align), rows[0], tuple(rows[1:])), at + 1
+
+
+def _too_many(cells: Sequence[Excerpt], wanted: int) -> Diagnostic:
+    """The mistake of cells that stand beyond the header's last one."""
+    message = f"this row has {len(cells)} cells and the header {wanted}, so this is not shown"
+    help = "write `\\|` for a `|` that is part of a cell, and `\\vert` for one in a formula"
+    return diagnose("table-cells", cells[wanted].span().to(cells[-1].span()), message, help=help)
 
 
 def split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:

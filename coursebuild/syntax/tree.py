@@ -173,16 +173,20 @@ class TextReader:
         )
 
     def _html(self, token: Placed) -> HtmlBlock | HtmlFlow:
+        """Raw HTML, kept as it is unless it holds formulas."""
         html = locate(self.base, token.rows)
-        if self.nested:
+        if self.nested or "$" in html.text:
             flow = html_flow(trimmed(html, " \t\n"), self.balance)
-            for child in flow.children:
-                if isinstance(child, Math) and not child.tex.text.strip():
-                    wrong = diagnose("math-syntax", child.span, "the formula is empty")
+            formulas = [child for child in flow.children if isinstance(child, Math)]
+            for formula in formulas:
+                if not formula.tex.text.strip():
+                    wrong = diagnose("math-syntax", formula.span, "the formula is empty")
                     self.session.report(wrong)
-            return flow
-        for tag in tags(html.text):
-            self.balance.add(tag, html.text, html.span)
+            if self.nested or formulas:
+                return flow
+        else:
+            for tag in tags(html.text):
+                self.balance.add(tag, html.text, html.span)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return HtmlBlock(self._span(token), text)
 
@@ -246,8 +250,11 @@ class TextReader:
         return ListItem(span, blocks, token.meta.get("checked"))
 
     def _table(self, token: Placed) -> Table:
-        table, self.at = read_table(self.tokens, self.at - 1, self.base, self.inlines.read)
+        table, self.at = self._read_table(self.at - 1)
         return table
+
+    def _read_table(self, at: int) -> tuple[Table, int]:
+        return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
 
     def _footnote(self, token: Placed) -> None:
         """Pass over a footnote: it is read later."""
@@ -264,7 +271,7 @@ class TextReader:
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
         kind = "" if token is None else token.type
         if token is not None and kind == "table_open":
-            table, self.at = read_table(self.tokens, self.at, self.base, self.inlines.read)
+            table, self.at = self._read_table(self.at)
             return record_table(caption, span, table, self.session)
         if token is not None and kind == "fence":
             fence = read_fence(token, self.base, nested=False)

@@ -2,6 +2,7 @@
 
 import { addCopyButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
+import { loadLabs } from './page/labs.js'
 import { openForPrint } from './page/print.js'
 import { markScrolling } from './page/scroll.js'
 import { addThemeSwitch } from './page/theme.js'
@@ -13,3 +14,4 @@ addCopyButtons(document, words)
 followContents(document)
 markScrolling(document)
 openForPrint(window)
+loadLabs(document, words)

@@ -51,7 +51,7 @@ def test_all_examples_are_read(examples: list[Example]) -> None:
 
 def test_examples(examples: list[Example], differences: dict[int, str]) -> None:
     wrong = [
-        f"example {e.number}: {e.markdown!r}\n  wanted {e.html!r}\n  got    {rendered(e.markdown)!r}"
+        f"example {e.number}: {e.markdown!r}\n  wanted {e.html!r}\n  got {rendered(e.markdown)!r}"
         for e in examples
         if e.number not in differences and rendered(e.markdown) != e.html
     ]

@@ -1,9 +1,10 @@
 """Scratch courses, written out of the input of a fixture, and the fixture files themselves.
 
-Entry points: `read_cases` (a fixture file), `Layout.of` (an input as files), `parts` (the same as texts).
+Entry points: `read_cases` (a fixture file), `Layout.of` (an input as files), `parts` (the same as
+texts).
 
-A fixture file holds cases: a title, the input and the expected text, each ended by a line that holds
-only `.`; what stands before a case's title on lines that begin with `#` is for its readers.
+A fixture file holds cases: a title, the input and the expected text, each ended by a line that
+holds only `.`; what stands before a title on lines that begin with `#` is for its readers.
 
 An input is the text of `content/lessons/1.1-first.md`, or several files, each after a line `=== …`:
 
@@ -110,7 +111,7 @@ def read_cases(path: Path) -> list[Case]:
         for _ in range(3):
             end = next((i for i in range(at, len(lines)) if lines[i] == ".\n"), None)
             if end is None:
-                raise ValueError(f"{path.name}:{title_line}: the case has no third line of only `.`")
+                raise ValueError(f"{path.name}:{title_line}: the case has no third `.`")
             parts.append("".join(lines[at:end]))
             at = end + 1
         cases.append(Case(parts[0].rstrip("\n"), parts[1], parts[2], title_line, remarks))

@@ -1,8 +1,9 @@
 """What an author sees of each rule: `tests/fixtures/rules/<rule>.md`, compared to the letter.
 
-A case names a smallest course that breaks the rule (see `scratch`) and all diagnostics that the tool
-then prints. `[update]` or `[build]` in a title says which command finds the mistake, where it is not
-`check`. `pytest tests/rules --rewrite-fixtures` writes the expected parts and `docs/rules.md` anew.
+A case names a smallest course that breaks the rule (see `scratch`) and all diagnostics that the
+tool then prints. `[update]` or `[build]` in a title says which command finds the mistake, where it
+is not `check`. `pytest tests/rules --rewrite-fixtures` writes the expected parts and
+`docs/rules.md` anew.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What a document becomes, and what its author is told: the fixture files, case by case.
 
-A file in `tests/fixtures/syntax/` whose name begins with `page` is parsed as a page, all others as lessons.
+A file in `tests/fixtures/syntax/` whose name begins with `page` is parsed as a page, all others as
+lessons.
 """
 
 from __future__ import annotations

@@ -58,7 +58,8 @@ export class Clock {
   ran(steps, timestep, now) {
     this.debt = Math.max(0, this.debt - steps * timestep)
     this.done += steps * timestep
-    this.marks.push({ now, done: this.done, wanted: this.wanted })
+    // What is still owed is late by less than a frame and no sign of slowness.
+    this.marks.push({ now, met: this.done + this.debt, wanted: this.wanted })
     while (this.marks.length > 2 && this.marks[1].now <= now - WINDOW) this.marks.shift()
   }
 
@@ -68,8 +69,7 @@ export class Clock {
     const first = this.marks[0]
     const last = this.marks[this.marks.length - 1]
     const wanted = last.wanted - first.wanted
-    // What is still owed is late by less than a frame and no sign of slowness.
-    return wanted > 0 ? Math.min(1, (last.done - first.done + this.debt) / wanted) : 1
+    return wanted > 0 ? Math.min(1, (last.met - first.met) / wanted) : 1
   }
 
   /** Seconds of real time until the next step is due. */

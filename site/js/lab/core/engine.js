@@ -129,15 +129,21 @@ export class Handles {
   }
 }
 
+const PATH = '/model.mjb'
+
 function readModel(mj, bytes) {
+  // MjVFS.addBuffer takes a microsecond for each four bytes; the engine's own file system copies them at once. A name that
+  // the MjVFS does not hold is looked for there.
   const files = new mj.MjVFS()
   let model = null
   try {
-    files.addBuffer('model.mjb', bytes)
-    model = mj.MjModel.from_binary_path('model.mjb', files)
+    mj.FS.writeFile(PATH, bytes)
+    model = mj.MjModel.from_binary_path(PATH, files)
   } catch (error) {
-    throw new EngineError(`the model does not load: ${error.message}`, error instanceof WebAssembly.RuntimeError)
+    const reason = String(error.message).replace(/^MuJoCo Error: /, '')
+    throw new EngineError(`the model does not load: ${reason}`, error instanceof WebAssembly.RuntimeError)
   } finally {
+    mj.FS.unlink(PATH)
     files.delete()
   }
   if (model === null || model === undefined) throw new EngineError('the model does not load')

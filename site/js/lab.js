@@ -1,0 +1,38 @@
+/**
+ * Labs in a page: loaded by site.js when a lab comes near. docs/labs.md says how a page holds a lab.
+ *
+ *   mountLab(element, words) → Promise<Instrument | null>
+ */
+
+import { h } from './lab/page/dom.js'
+import { Instrument } from './lab/page/instrument.js'
+import { mountCustom } from './lab/page/custom.js'
+import { readLink } from './lab/page/share.js'
+import { missing } from './lab/page/support.js'
+import { fill } from './lab/page/words.js'
+
+/**
+ * Put a live instrument in the place of a lab's static form, which stays where it cannot run.
+ *
+ * @param {HTMLElement} element has `data-config`, the address of the lab's JSON
+ * @param {(key: string) => string} texts of the interface
+ */
+export async function mountLab(element, texts) {
+  const words = (key, values) => fill(texts(key), values)
+  try {
+    const lack = missing()
+    if (lack !== null) throw new Error(words(lack))
+    const base = new URL(element.dataset.config, document.baseURI).href
+    const response = await fetch(base)
+    if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))
+    const config = await response.json()
+    const make = config.kind && config.kind !== 'simlab' ? mountCustom : (...rest) => new Instrument(...rest)
+    const instrument = await make(element, config, base, words)
+    const link = readLink(window.location.hash)
+    if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
+    return instrument
+  } catch (error) {
+    element.prepend(h('p', { class: 'lab-message lab-wrong', role: 'alert' }, error.message))
+    return null
+  }
+}

@@ -1,0 +1,65 @@
+/**
+ * The page's one worker, and the line of each lab to it. docs/labs.md has the protocol.
+ *
+ *   const line = connection(workerUrl).open(id, receive)
+ *   line.send({ type: 'play' }); line.close()
+ */
+
+const connections = new Map()
+
+/** The connection to the worker at this address; one for the page. */
+export function connection(url) {
+  if (!connections.has(url)) connections.set(url, new Connection(url))
+  return connections.get(url)
+}
+
+export class Connection {
+  /** @param {string} url of the worker's script; @param {(url: string) => Worker} [start] */
+  constructor(url, start = (address) => new Worker(address, { type: 'module', name: 'labs' })) {
+    this.url = url
+    this.start = start
+    this.worker = null
+    this.lines = new Map()
+  }
+
+  /**
+   * Open a lab's line.
+   *
+   * @param {string} id
+   * @param {(message: object) => void} receive gets every message about this lab
+   */
+  open(id, receive) {
+    if (this.lines.has(id)) throw new Error(`the lab ${id} is on the page twice`)
+    if (this.worker === null) this.begin()
+    this.lines.set(id, receive)
+    return {
+      send: (message, transfer = []) => this.worker?.postMessage({ ...message, lab: id }, transfer),
+      close: () => {
+        if (!this.lines.delete(id)) return
+        this.worker?.postMessage({ type: 'dispose', lab: id })
+      },
+    }
+  }
+
+  /** Have the engine fetched and started before a lab asks for it. */
+  warm(wasm) {
+    if (this.worker === null) this.begin()
+    this.worker.postMessage({ type: 'warm', wasm })
+  }
+
+  begin() {
+    this.worker = this.start(this.url)
+    this.worker.onmessage = ({ data }) => this.lines.get(data.lab)?.(data)
+    this.worker.onerror = (event) => this.fail(event.message ?? 'the worker does not start')
+    this.worker.onmessageerror = () => this.fail('a message of the worker cannot be read')
+  }
+
+  // The engine's memory is gone with the worker: every lab has to be told, and the next one starts a new worker.
+  fail(message) {
+    this.worker?.terminate()
+    this.worker = null
+    for (const receive of [...this.lines.values()]) {
+      receive({ type: 'error', message, entry: [], kind: 'worker', fatal: true })
+    }
+  }
+}

@@ -1,0 +1,104 @@
+/** The controls of a lab: sliders, lists, buttons, and which overlays are drawn. */
+
+import { freshId, h } from './dom.js'
+import { digitsOfStep, formatNumber } from './numbers.js'
+
+const STEPS = 200 // of a slider without a step
+
+/**
+ * @param {object[]} controls of the lab's JSON
+ * @param {{set: (index: number, value: unknown) => void, press: (index: number) => void}} actions
+ * @returns {{element: HTMLElement | null, show: (values: unknown[]) => void, setEnabled: (on: boolean) => void}}
+ */
+export function buildControls(controls, actions) {
+  const parts = controls.map((control, i) => {
+    if (control.type === 'slider') return slider(control, (value) => actions.set(i, value))
+    if (control.type === 'select') return list(control, (value) => actions.set(i, value))
+    return button(control, () => actions.press(i))
+  })
+  const buttons = parts.filter((_, i) => controls[i].type === 'button').map(({ element }) => element)
+  const others = parts.filter((_, i) => controls[i].type !== 'button').map(({ element }) => element)
+  const element = parts.length === 0 ? null : h('div', { class: 'lab-controls' })
+  if (buttons.length > 0) element.append(h('div', { class: 'lab-buttons' }, ...buttons))
+  if (others.length > 0) element.append(h('div', { class: 'lab-settings' }, ...others))
+  return {
+    element,
+    show: (values) => parts.forEach((part, i) => part.show?.(values[i])),
+    setEnabled: (on) => parts.forEach(({ field }) => (field.disabled = !on)),
+  }
+}
+
+function button({ label }, press) {
+  const field = h('button', { type: 'button', class: 'lab-button', onclick: press }, label)
+  return { element: field, field }
+}
+
+function slider({ label, unit, min, max, step, digits }, set) {
+  const id = freshId('slider')
+  const places = digits ?? digitsOfStep(step)
+  const text = (value) => `${formatNumber(value, places).trim()}${unit ? `\u00a0${unit}` : ''}`
+  const shown = h('output', { class: 'lab-value', for: id })
+  const field = h('input', { type: 'range', id })
+  Object.assign(field, { min: String(min), max: String(max), step: String(step ?? (max - min) / STEPS) })
+  // The widest value keeps its room, so that nothing moves while the slider does.
+  shown.style.minWidth = `${Math.max(text(min).length, text(max).length)}ch`
+  let value = null
+  let queued = false
+  const show = (now) => {
+    value = now
+    field.value = String(now ?? min)
+    shown.textContent = now === null || now === undefined ? '–' : text(now)
+    field.setAttribute('aria-valuetext', shown.textContent)
+  }
+  field.addEventListener('input', () => {
+    show(Number(field.value))
+    if (queued) return
+    queued = true // at most one message for each picture
+    requestAnimationFrame(() => {
+      queued = false
+      set(value)
+    })
+  })
+  const element = h('div', { class: 'lab-slider' }, h('label', { for: id }, label), shown, field)
+  return { element, field, show: (now) => queued || show(now) }
+}
+
+function list({ label, unit, options }, set) {
+  const id = freshId('list')
+  const field = h('select', { id }, ...options.map(([text], i) => h('option', { value: String(i) }, text)))
+  field.addEventListener('change', () => set(options[Number(field.value)][1]))
+  const element = h('div', { class: 'lab-list' }, h('label', { for: id }, unit ? `${label} (${unit})` : label), field)
+  const show = (value) => (field.selectedIndex = options.findIndex((option) => option[1] === value))
+  return { element, field, show }
+}
+
+/** Boxes to tick for overlays. */
+export function buildOverlays({ toggles, overlays }, words, toggle) {
+  if (toggles.length === 0) return null
+  const boxes = toggles.map((name) => {
+    const box = h('input', { type: 'checkbox', checked: overlays.includes(name) })
+    box.addEventListener('change', () => toggle(name, box.checked))
+    return h('label', { class: 'lab-check' }, box, ` ${words(`overlay.${name}`)}`)
+  })
+  return h('div', { class: 'lab-overlays', role: 'group', 'aria-label': words('lab.overlays') }, ...boxes)
+}
+
+/** The readouts: labels, and values that keep the room they once had. */
+export function buildReadouts(readouts, format) {
+  if (readouts.length === 0) return { element: null, show: () => {} }
+  const rows = readouts.map(({ label }) => ({ label, value: h('dd', {}, '–'), room: 0, text: '–' }))
+  const element = h('dl', { class: 'lab-readouts' }, ...rows.map(({ label, value }) => h('div', {}, h('dt', {}, label), value)))
+  const show = (values) => {
+    rows.forEach((row, i) => {
+      const text = format(values[i], readouts[i].digits)
+      if (text === row.text) return
+      row.text = text
+      row.value.textContent = text
+      if (text.length > row.room) {
+        row.room = text.length
+        row.value.style.minWidth = `${text.length}ch`
+      }
+    })
+  }
+  return { element, show }
+}

@@ -1,0 +1,2 @@
+/** placeholder until written */
+export async function mountCustom() { throw new Error('not yet') }

@@ -1,0 +1,191 @@
+/**
+ * The shapes of MuJoCo's geoms as three.js geometries.
+ *
+ * A shape is a list of parts; each has a geometry of unit size, shared by all labs, and says how it is scaled and shifted along
+ * its z axis for a geom's size. So a size may change from frame to frame without a new geometry. Texture coordinates are x and y
+ * in the unit shape (see `materials.js`).
+ */
+
+import { BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, EdgesGeometry, PlaneGeometry, SphereGeometry } from 'three'
+
+/** mjtGeom */
+export const GEOM = Object.freeze({
+  PLANE: 0, HFIELD: 1, SPHERE: 2, CAPSULE: 3, ELLIPSOID: 4, CYLINDER: 5, BOX: 6, MESH: 7, SDF: 8,
+  ARROW: 100, ARROW1: 101, ARROW2: 102, LINE: 103, LINEBOX: 104, TRIANGLE: 108,
+}) // prettier-ignore
+
+const ROUND = 40 // segments around
+const QUARTER = 10 // segments from a pole to the equator
+const HEAD_WIDTH = 2.2 // of an arrow, in widths of its shaft
+const HEAD_LENGTH = 5
+
+const cache = new Map()
+
+function unit(name, make) {
+  if (!cache.has(name)) cache.set(name, flat(make()))
+  return cache.get(name)
+}
+
+/** Texture coordinates of an unwrapped shape: seen from above. */
+function flat(geometry) {
+  const { position } = geometry.attributes
+  const uv = new Float32Array(2 * position.count)
+  for (let i = 0; i < position.count; i++) {
+    uv[2 * i] = position.getX(i)
+    uv[2 * i + 1] = position.getY(i)
+  }
+  geometry.setAttribute('uv', new BufferAttribute(uv, 2))
+  return geometry
+}
+
+const standing = (geometry) => geometry.rotateX(Math.PI / 2) // three.js has its axes along y
+
+const box = () => unit('box', () => new BoxGeometry(2, 2, 2))
+const ball = () => unit('ball', () => standing(new SphereGeometry(1, ROUND, 2 * QUARTER)))
+const cylinder = () => unit('cylinder', () => standing(new CylinderGeometry(1, 1, 2, ROUND)))
+const tube = () => unit('tube', () => standing(new CylinderGeometry(1, 1, 2, ROUND, 1, true)))
+const dome = () => unit('dome', () => standing(new SphereGeometry(1, ROUND, QUARTER, 0, 2 * Math.PI, 0, Math.PI / 2)))
+const bowl = () => unit('bowl', () => standing(new SphereGeometry(1, ROUND, QUARTER, 0, 2 * Math.PI, Math.PI / 2, Math.PI / 2)))
+const plane = () => unit('plane', () => new PlaneGeometry(2, 2))
+const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND)).translate(0, 0, 0.5))
+const edges = () => unit('edges', () => new EdgesGeometry(new BoxGeometry(2, 2, 2)))
+const line = () => unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
+
+/** A part: its geometry, and how `place(size, out)` fills out = [scale x, y, z, shift along z]. */
+const part = (geometry, place, lines = false) => ({ geometry, place, lines })
+const set = (out, x, y, z, shift = 0) => {
+  out[0] = x
+  out[1] = y
+  out[2] = z
+  out[3] = shift
+}
+
+const scaled = (geometry) => [part(geometry, (s, out) => set(out, s[0], s[1], s[2]))]
+
+/** Radius and half-length: the visualizer's geoms have the length third, the model's second. */
+const round = (pieces, at) => pieces.map(([geometry, kind]) =>
+  part(geometry, (s, out) => {
+    const r = s[0]
+    const half = s[at]
+    if (kind === 'side') set(out, r, r, half)
+    else set(out, r, r, r, kind === 'top' ? half : -half)
+  }),
+) // prettier-ignore
+
+const arrow = (both) => {
+  const head = (s) => Math.min(HEAD_LENGTH * s[0], 0.5 * s[2])
+  const parts = [
+    part(cylinder(), (s, out) => {
+      const length = s[2] - head(s) * (both ? 2 : 1)
+      set(out, s[0], s[1], length / 2, length / 2 + (both ? head(s) : 0))
+    }),
+    part(cone(), (s, out) => set(out, HEAD_WIDTH * s[0], HEAD_WIDTH * s[1], head(s), s[2] - head(s))),
+  ]
+  if (both) parts.push(part(cone(), (s, out) => set(out, HEAD_WIDTH * s[0], -HEAD_WIDTH * s[1], -head(s), head(s))))
+  return parts
+}
+
+/**
+ * The parts of a shape.
+ *
+ * @param {number} type mjtGeom
+ * @param {boolean} model whether sizes are the model's (radius, half-length) or the visualizer's (radius, radius, half-length)
+ * @param {import('three').BufferGeometry | null} [given] of a mesh or height field
+ */
+export function shape(type, model, given = null) {
+  const half = model ? 1 : 2
+  switch (type) {
+    case GEOM.SPHERE:
+      return [part(ball(), (s, out) => set(out, s[0], s[0], s[0]))]
+    case GEOM.ELLIPSOID:
+      return scaled(ball())
+    case GEOM.BOX:
+      return scaled(box())
+    case GEOM.CYLINDER:
+      return round([[cylinder(), 'side']], half)
+    case GEOM.CAPSULE:
+      return round([[tube(), 'side'], [dome(), 'top'], [bowl(), 'bottom']], half) // prettier-ignore
+    case GEOM.PLANE:
+      return [part(plane(), (s, out) => set(out, s[0], s[1], 1))]
+    case GEOM.MESH:
+    case GEOM.SDF:
+    case GEOM.HFIELD:
+      return given === null ? [] : [part(given, (_, out) => set(out, 1, 1, 1))]
+    case GEOM.ARROW:
+    case GEOM.ARROW1:
+      return arrow(false)
+    case GEOM.ARROW2:
+      return arrow(true)
+    case GEOM.LINE:
+      return [part(line(), (s, out) => set(out, 1, 1, s[2]), true)]
+    case GEOM.LINEBOX:
+      return [part(edges(), (s, out) => set(out, s[0], s[1], s[2]), true)]
+    default:
+      return []
+  }
+}
+
+/** A mesh of the model; each corner has its own normal and texture coordinate, as the file had them. */
+export function meshGeometry(mesh) {
+  const { vertices, normals, faces, faceNormals, texcoords, faceTexcoords } = mesh
+  const count = faces.length
+  const position = new Float32Array(3 * count)
+  const normal = new Float32Array(3 * count)
+  const uv = new Float32Array(2 * count)
+  for (let i = 0; i < count; i++) {
+    const v = 3 * faces[i]
+    const n = 3 * faceNormals[i]
+    for (let j = 0; j < 3; j++) {
+      position[3 * i + j] = vertices[v + j]
+      normal[3 * i + j] = normals[n + j]
+    }
+    const source = texcoords === null ? vertices : texcoords
+    const t = texcoords === null ? v : 2 * faceTexcoords[i]
+    uv[2 * i] = source[t]
+    uv[2 * i + 1] = source[t + 1]
+  }
+  return new BufferGeometry()
+    .setAttribute('position', new BufferAttribute(position, 3))
+    .setAttribute('normal', new BufferAttribute(normal, 3))
+    .setAttribute('uv', new BufferAttribute(uv, 2))
+}
+
+/** A height field: its surface, its four sides and its floor. */
+export function hfieldGeometry({ rows, columns, size, data }) {
+  const [halfX, halfY, top, base] = size
+  const position = []
+  const uv = []
+  const index = []
+  const vertex = (column, row, z) => {
+    const u = (2 * column) / (columns - 1) - 1
+    const v = (2 * row) / (rows - 1) - 1
+    uv.push(u, v)
+    return position.push(halfX * u, halfY * v, z) / 3 - 1
+  }
+  const height = (column, row) => top * data[row * columns + column]
+  const quad = (a, b, c, d) => index.push(a, b, c, a, c, d)
+  for (let row = 0; row < rows; row++) for (let column = 0; column < columns; column++) vertex(column, row, height(column, row))
+  for (let row = 0; row + 1 < rows; row++) {
+    for (let column = 0; column + 1 < columns; column++) {
+      const a = row * columns + column
+      quad(a, a + 1, a + columns + 1, a + columns)
+    }
+  }
+  // The sides have vertices of their own, so that the edge is sharp.
+  const wall = (points) => {
+    const pairs = points.map(([column, row]) => [vertex(column, row, height(column, row)), vertex(column, row, -base)])
+    for (let i = 0; i + 1 < pairs.length; i++) quad(pairs[i][1], pairs[i + 1][1], pairs[i + 1][0], pairs[i][0])
+  }
+  const along = (n, make) => Array.from({ length: n }, (_, i) => make(i))
+  wall(along(columns, (i) => [i, 0]))
+  wall(along(rows, (i) => [columns - 1, i]))
+  wall(along(columns, (i) => [columns - 1 - i, rows - 1]))
+  wall(along(rows, (i) => [0, rows - 1 - i]))
+  quad(vertex(0, 0, -base), vertex(0, rows - 1, -base), vertex(columns - 1, rows - 1, -base), vertex(columns - 1, 0, -base))
+  const geometry = new BufferGeometry()
+    .setAttribute('position', new BufferAttribute(new Float32Array(position), 3))
+    .setAttribute('uv', new BufferAttribute(new Float32Array(uv), 2))
+  geometry.setIndex(index)
+  geometry.computeVertexNormals()
+  return geometry
+}

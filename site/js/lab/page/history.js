@@ -1,0 +1,74 @@
+/**
+ * What a plot shows: samples in typed arrays, of the last so many seconds or of all of the run.
+ *
+ * With a window, what has left it is dropped. Without one, every second sample is dropped when there are more than a plot can
+ * show. No DOM.
+ */
+
+const MOST = 4000 // samples of a plot that shows all of its run
+
+export class History {
+  /** @param {number} traces how many values a sample has @param {number | null} window s; null: everything */
+  constructor(traces, window) {
+    this.window = window
+    this.columns = Array.from({ length: traces + 1 }, () => new Float64Array(1024))
+    this.clear()
+  }
+
+  clear() {
+    this.start = 0
+    this.end = 0
+    this.stride = 1
+    this.skipped = 0
+  }
+
+  get length() {
+    return this.end - this.start
+  }
+
+  /** The time of the last sample, or 0. */
+  get last() {
+    return this.end > this.start ? this.columns[0][this.end - 1] : 0
+  }
+
+  /** Add a sample: its time, and the values from `at` on. */
+  push(time, values, at) {
+    if (this.skipped++ % this.stride !== 0) return
+    if (this.end === this.columns[0].length) this.room()
+    this.columns[0][this.end] = time
+    for (let i = 1; i < this.columns.length; i++) this.columns[i][this.end] = values[at + i - 1]
+    this.end += 1
+    if (this.window !== null) {
+      // One sample before the window stays, so that the line reaches its edge.
+      while (this.start + 1 < this.end && this.columns[0][this.start + 1] < time - this.window) this.start += 1
+    } else if (this.length > MOST) this.thin()
+  }
+
+  room() {
+    if (this.start > this.end / 2) {
+      for (const column of this.columns) column.copyWithin(0, this.start, this.end)
+      this.end -= this.start
+      this.start = 0
+      return
+    }
+    this.columns = this.columns.map((column) => {
+      const larger = new Float64Array(2 * column.length)
+      larger.set(column)
+      return larger
+    })
+  }
+
+  thin() {
+    const count = Math.ceil(this.length / 2)
+    for (const column of this.columns) for (let i = 0; i < count; i++) column[i] = column[this.start + 2 * i]
+    this.start = 0
+    this.end = count
+    this.stride *= 2
+    this.skipped = 1
+  }
+
+  /** The samples as uPlot takes them: times, then one array for each trace. */
+  data() {
+    return this.columns.map((column) => column.subarray(this.start, this.end))
+  }
+}

@@ -1,0 +1,106 @@
+/**
+ * The lights of a lab.
+ *
+ * A model with lights of its own has those and MuJoCo's headlight, as in MuJoCo. One without is lit as the recorded picture is,
+ * from the camera and from above: by the headlight alone it would be too dark to see anything.
+ */
+
+import { AmbientLight, DirectionalLight, PointLight, SpotLight } from 'three'
+
+const FULL = Math.PI // see materials.js
+const AMBIENT = 0.3
+const FROM_CAMERA = 0.45
+const FROM_ABOVE = 0.4
+const ABOVE = [0.25, -0.35, 0.9]
+const LIGHT = 7 // floats in a frame
+const SPOT = 0 // mjtLightType
+const DIRECTIONAL = 1
+const SHADOW_TEXELS = 1024
+
+export class Lights {
+  /** @param {object} description of the lab's scene; @param {import('three').Scene} scene */
+  constructor(description, scene) {
+    this.scene = scene
+    this.extent = description.extent
+    this.center = description.center
+    this.start = description.layout.lights
+    this.ambient = new AmbientLight(0xffffff, FULL * AMBIENT)
+    this.head = new DirectionalLight(0xffffff, FULL * FROM_CAMERA)
+    this.lights = description.lights.map((light) => this.make(light))
+    this.add(this.head)
+    scene.add(this.ambient)
+    if (this.lights.length === 0) this.studio()
+    else this.own(description)
+  }
+
+  studio() {
+    const above = new DirectionalLight(0xffffff, FULL * FROM_ABOVE)
+    above.position.set(...ABOVE).multiplyScalar(4 * this.extent).add({ x: this.center[0], y: this.center[1], z: this.center[2] })
+    above.target.position.set(...this.center)
+    this.add(above)
+    above.target.updateMatrixWorld()
+  }
+
+  own({ lights, visual: { headlight } }) {
+    const sum = [0, 0, 0]
+    const add = (colour) => colour.forEach((x, i) => (sum[i] += x))
+    lights.forEach((light) => add(light.ambient))
+    if (headlight.active) add(headlight.ambient)
+    this.ambient.color.setRGB(...sum)
+    this.ambient.intensity = FULL
+    this.head.visible = headlight.active
+    this.head.color.setRGB(...headlight.diffuse)
+    this.head.intensity = FULL
+  }
+
+  make(info) {
+    const light =
+      info.type === DIRECTIONAL
+        ? new DirectionalLight()
+        : info.type === SPOT && info.cutoff < 90
+          ? new SpotLight(0xffffff, 1, 0, (info.cutoff * Math.PI) / 180, Math.min(1, 8 / Math.max(8, info.exponent)), 0)
+          : new PointLight(0xffffff, 1, 0, 0)
+    light.color.setRGB(...info.diffuse)
+    light.intensity = FULL
+    // Only lights with a beam: the six shadow maps of a point light are not worth their price.
+    if (info.castshadow && light.target) this.shadow(light)
+    this.add(light)
+    return light
+  }
+
+  shadow(light) {
+    light.castShadow = true
+    light.shadow.mapSize.set(SHADOW_TEXELS, SHADOW_TEXELS)
+    light.shadow.normalBias = 0.004 * this.extent
+    const { camera } = light.shadow
+    camera.near = 0.01 * this.extent
+    camera.far = 20 * this.extent
+    const side = 1.5 * this.extent
+    if (camera.isOrthographicCamera) Object.assign(camera, { left: -side, right: side, bottom: -side, top: side })
+    camera.updateProjectionMatrix()
+  }
+
+  add(light) {
+    this.scene.add(light)
+    if (light.target) this.scene.add(light.target)
+  }
+
+  /** Where the lights are, from a frame, and the headlight at the camera. */
+  update(frame, eye, forward) {
+    this.head.position.set(...eye)
+    this.head.target.position.set(eye[0] + forward[0], eye[1] + forward[1], eye[2] + forward[2])
+    this.lights.forEach((light, i) => {
+      const at = this.start + LIGHT * i
+      const [px, py, pz, dx, dy, dz, on] = frame.subarray(at, at + LIGHT)
+      light.visible = on !== 0
+      light.position.set(px, py, pz)
+      if (light.isDirectionalLight) light.position.set(...this.center.map((x, j) => x - 4 * this.extent * [dx, dy, dz][j]))
+      const { x, y, z } = light.position
+      light.target?.position.set(x + dx, y + dy, z + dz)
+    })
+  }
+
+  dispose() {
+    for (const light of this.lights) light.dispose()
+  }
+}

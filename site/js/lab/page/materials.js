@@ -1,0 +1,170 @@
+/**
+ * MuJoCo's materials and textures for three.js.
+ *
+ * MuJoCo lights as OpenGL's fixed pipeline does, with colours as they are written; three.js with light intensities, in which a
+ * surface of colour c returns c/π. Lights are therefore π times as strong here, and specular colours divided by what
+ * three.js's highlight has more than OpenGL's.
+ */
+
+import {
+  CubeTexture, DataTexture, DoubleSide, LinearFilter, LinearMipmapLinearFilter, MeshPhongMaterial,
+  NoColorSpace, RepeatWrapping, RGBAFormat,
+} from 'three' // prettier-ignore
+
+const SPECULAR = 0.5 // of a geom without a material
+const SHININESS = 0.5
+const FINE = 4 // anisotropy
+const TEXTURE_CUBE = 1
+const TEXTURE_SKY = 2
+
+export class Materials {
+  /** @param {object} scene the description of a lab's scene */
+  constructor(scene) {
+    this.scene = scene
+    this.textures = new Map()
+    this.made = []
+  }
+
+  /**
+   * A material of its own for one geom, since its colour may change.
+   *
+   * @param {number} id of the material, or -1
+   */
+  make(id, { doubleSided = false } = {}) {
+    const info = this.scene.materials[id]
+    const shininess = Math.max(1, 128 * (info?.shininess ?? SHININESS))
+    const specular = (8 / (shininess + 2)) * (info?.specular ?? SPECULAR)
+    const material = new MeshPhongMaterial({ shininess })
+    material.specular.setScalar(specular)
+    material.userData.emission = info?.emission ?? 0
+    if (doubleSided) material.side = DoubleSide
+    this.made.push(material)
+    return material
+  }
+
+  /** Colour and transparency (red, green, blue, alpha in [0, 1]) from the frame. */
+  paint(material, r, g, b, a, emission = material.userData.emission) {
+    const old = material.userData
+    if (old.r === r && old.g === g && old.b === b && old.a === a && old.emission === emission) return
+    Object.assign(old, { r, g, b, a, emission })
+    material.color.setRGB(r, g, b)
+    material.emissive.setRGB(r, g, b).multiplyScalar(emission)
+    const through = a < 1
+    if (material.transparent !== through) {
+      material.transparent = through
+      material.depthWrite = !through
+      material.needsUpdate = true
+    }
+    material.opacity = a
+  }
+
+  /**
+   * Give a material its texture.
+   *
+   * @param {boolean} wrapped whether the geometry has texture coordinates of the file, and not x and y of the unit shape
+   * @returns {((size: ArrayLike<number>, x?: number, y?: number, endless?: boolean) => void) | null} what to call when the size has
+   *   changed; x and y are where in its plane (m) an endless plane has its middle
+   */
+  dress(material, id, wrapped) {
+    const info = this.scene.materials[id]
+    const texture = info === undefined ? undefined : this.scene.textures[info.texture]
+    if (texture === undefined || texture.type === TEXTURE_SKY) return null
+    if (texture.type === TEXTURE_CUBE) return wrapCube(material, this.cube(info.texture), info.texuniform)
+    const map = this.flat(info.texture).clone()
+    map.needsUpdate = true
+    material.map = map
+    this.made.push(map)
+    const [u, v] = info.texrepeat
+    if (wrapped) {
+      map.repeat.set(u, v)
+      return null
+    }
+    // The unit shape goes from -1 to 1. A uniform texture repeats u times a metre, another u times over the geom.
+    return (size, x = 0, y = 0, endless = false) => {
+      if (info.texuniform || endless) {
+        map.repeat.set(u * size[0], v * size[1])
+        map.offset.set(u * x, v * y)
+      } else {
+        map.repeat.set(u / 2, v / 2)
+        map.offset.set(-u / 2, -v / 2)
+      }
+    }
+  }
+
+  flat(id) {
+    if (!this.textures.has(id)) {
+      const { width, height } = this.scene.textures[id]
+      this.textures.set(id, finish(new DataTexture(rgba(this.scene.textures[id], 0, height), width, height, RGBAFormat)))
+    }
+    return this.textures.get(id)
+  }
+
+  /** Six faces: +x, -x, +y, -y, +z, -z, one above the other; a square texture is on all of them. */
+  cube(id) {
+    if (!this.textures.has(id)) {
+      const texture = this.scene.textures[id]
+      const { width, height } = texture
+      const faces = Array.from({ length: 6 }, (_, i) => {
+        const from = height === 6 * width ? i * width : 0
+        return new DataTexture(rgba(texture, from, width), width, width, RGBAFormat)
+      })
+      faces.forEach((face) => (face.needsUpdate = true))
+      this.textures.set(id, finish(new CubeTexture(faces)))
+    }
+    return this.textures.get(id)
+  }
+
+  /** The texture of the sky, or null. */
+  sky() {
+    const id = this.scene.textures.findIndex((texture) => texture.type === TEXTURE_SKY)
+    return id < 0 ? null : this.cube(id)
+  }
+
+  dispose() {
+    for (const thing of [...this.made, ...this.textures.values()]) thing.dispose()
+  }
+}
+
+function finish(texture) {
+  texture.colorSpace = NoColorSpace
+  texture.wrapS = texture.wrapT = RepeatWrapping
+  texture.magFilter = LinearFilter
+  texture.minFilter = LinearMipmapLinearFilter
+  texture.generateMipmaps = true
+  texture.anisotropy = FINE
+  texture.needsUpdate = true
+  return texture
+}
+
+/** Rows of a texture as red, green, blue, alpha. */
+function rgba({ width, channels, data }, firstRow, rows) {
+  const count = width * rows
+  const target = new Uint8Array(4 * count)
+  for (let i = 0, from = firstRow * width * channels; i < count; i++, from += channels) {
+    const grey = channels < 3
+    target[4 * i] = data[from]
+    target[4 * i + 1] = data[from + (grey ? 0 : 1)]
+    target[4 * i + 2] = data[from + (grey ? 0 : 2)]
+    target[4 * i + 3] = channels === 4 ? data[from + 3] : 255
+  }
+  return target
+}
+
+/** A cube texture is looked up by the direction from the geom's centre, in its own axes. */
+function wrapCube(material, texture, uniform) {
+  const size = { value: [1, 1, 1] }
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.labCube = { value: texture }
+    shader.uniforms.labSize = size
+    shader.vertexShader = shader.vertexShader
+      .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform vec3 labSize;')
+      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = position * labSize;')
+    shader.fragmentShader = shader.fragmentShader
+      .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform samplerCube labCube;')
+      .replace('#include <map_fragment>', 'diffuseColor *= textureCube(labCube, vLabDirection);')
+  }
+  material.customProgramCacheKey = () => 'lab-cube'
+  return (now) => {
+    if (!uniform) size.value = [now[0], now[1], now[2]]
+  }
+}

@@ -1,0 +1,46 @@
+/** The page's colours for canvases, which know no style sheet, and when they change. */
+
+const TRACES = 6
+
+/** Resolve a CSS colour in an element's place to red, green, blue in [0, 255] and text. */
+export function resolve(element, colour) {
+  const probe = document.createElement('span')
+  probe.hidden = true
+  probe.style.color = colour
+  element.append(probe)
+  const text = getComputedStyle(probe).color
+  probe.remove()
+  return text
+}
+
+/** The colours of a plot. */
+export function palette(element) {
+  return {
+    text: resolve(element, 'var(--ink-soft)'),
+    grid: resolve(element, 'var(--rule)'),
+    rule: resolve(element, 'var(--rule-firm)'),
+    traces: Array.from({ length: TRACES }, (_, i) => resolve(element, `var(--trace-${i + 1})`)),
+  }
+}
+
+/** A CSS colour `rgb(r g b)` as numbers in [0, 1]. */
+export function channels(text) {
+  const numbers = text.match(/[\d.]+/g).map(Number)
+  return numbers.slice(0, 3).map((x) => x / 255)
+}
+
+/**
+ * Call `changed` when the page goes from light to dark or back, or moves to a screen of another pixel density.
+ *
+ * @returns {() => void} stops it
+ */
+export function watchTheme(changed) {
+  const media = window.matchMedia('(prefers-color-scheme: dark)')
+  const observer = new MutationObserver(changed)
+  observer.observe(document.documentElement, { attributes: true, attributeFilter: ['data-theme'] })
+  media.addEventListener('change', changed)
+  return () => {
+    observer.disconnect()
+    media.removeEventListener('change', changed)
+  }
+}

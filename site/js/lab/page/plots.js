@@ -1,0 +1,206 @@
+/**
+ * Plots of traces against time, drawn by uPlot: axes with labels, a label at the end of each line instead of a legend, a colour and a
+ * dash for each, and lines for reference values.
+ */
+
+import uPlot from 'uplot'
+import { h } from './dom.js'
+import { History } from './history.js'
+import { formatLabel } from './numbers.js'
+import { palette, watchTheme } from './palette.js'
+import { spread } from './spread.js'
+
+const HEIGHT = 170 // CSS pixels
+const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
+const FONT = 11.5 // CSS pixels
+const GAP = 6
+
+export class Plot {
+  /**
+   * @param {object} config a plot of the lab's JSON
+   * @param {(key: string, values?: object) => string} words
+   */
+  constructor(config, words) {
+    this.config = config
+    this.history = new History(config.traces.length, config.window)
+    this.caption = words('lab.plot', { ylabel: config.ylabel || words('lab.value'), xlabel: config.xlabel || words('lab.time') })
+    this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
+    this.chart = null
+    this.dirty = false
+    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width))
+    this.resizer.observe(this.element)
+    this.unwatch = watchTheme(() => this.recolour())
+  }
+
+  /** Add samples: `values` has `width` numbers for each time, those of this plot from `offset` on. */
+  push(times, values, width, offset) {
+    for (let i = 0; i < times.length; i++) this.history.push(times[i], values, i * width + offset)
+    if (times.length > 0) this.dirty = true
+  }
+
+  clear() {
+    this.history.clear()
+    this.dirty = true
+  }
+
+  /** Draw what is new. */
+  draw() {
+    if (!this.dirty || this.chart === null) return
+    this.dirty = false
+    this.chart.setData(this.history.data())
+  }
+
+  resize(width) {
+    if (width < 40) return
+    const size = { width: Math.floor(width), height: this.config.height ?? HEIGHT }
+    if (this.chart === null) {
+      this.colours = palette(this.element)
+      this.chart = new uPlot(this.options(size), this.history.data(), this.element)
+    } else if (this.chart.width !== size.width) this.chart.setSize(size)
+  }
+
+  recolour() {
+    if (this.chart === null) return
+    this.colours = palette(this.element)
+    this.chart.redraw(false, false)
+  }
+
+  options(size) {
+    const { config } = this
+    const font = `${FONT}px ${getComputedStyle(this.element).fontFamily}`
+    const axis = (label) => ({
+      label,
+      font,
+      labelFont: font,
+      labelGap: 0,
+      labelSize: label ? FONT + GAP : 0,
+      gap: 4,
+      stroke: () => this.colours.text,
+      grid: { stroke: () => this.colours.grid, width: 1 },
+      ticks: { stroke: () => this.colours.grid, width: 1, size: 4 },
+      border: { show: true, stroke: () => this.colours.rule, width: 1 },
+      values: (_, ticks) => ticks.map(formatLabel),
+    })
+    return {
+      ...size,
+      padding: [FONT, this.room(font), 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      scales: {
+        x: { time: false, range: () => this.spanX() },
+        y: { range: (_, min, max) => this.spanY(min, max) },
+      },
+      axes: [
+        { ...axis(config.xlabel || ''), size: FONT + 10, space: 45 },
+        { ...axis(config.ylabel || ''), size: (_, values) => sizeOf(values, font), space: 28 },
+      ],
+      series: [
+        {},
+        ...config.traces.map((trace, i) => ({
+          stroke: () => this.colours.traces[i % this.colours.traces.length],
+          width: 1.6,
+          dash: dashOf(trace, i, config.traces.length),
+          points: { show: false },
+        })),
+      ],
+      hooks: { drawAxes: [(chart) => this.references(chart)], draw: [(chart) => this.labels(chart, font)] },
+    }
+  }
+
+  spanX() {
+    const { window } = this.config
+    const { last } = this.history
+    if (window !== null) return last <= window ? [0, window] : [last - window, last]
+    return [0, Math.max(1, last)]
+  }
+
+  // Bounds that the author leaves open follow the data, with room on both sides; a flat line gets a scale too.
+  spanY(low, high) {
+    const { ymin, ymax, refLines } = this.config
+    const marks = refLines.map(({ y }) => y)
+    let min = ymin ?? Math.min(low ?? Infinity, ...marks)
+    let max = ymax ?? Math.max(high ?? -Infinity, ...marks)
+    if (!Number.isFinite(min) || !Number.isFinite(max)) {
+      min = ymin ?? (ymax ?? 1) - 1
+      max = ymax ?? min + 1
+    }
+    const room = max > min ? 0.06 * (max - min) : Math.max(1e-9, 0.05 * Math.abs(max))
+    return [ymin ?? min - room, ymax ?? max + room]
+  }
+
+  /** Width of the labels at the ends of the lines. */
+  room(font) {
+    const { traces } = this.config
+    return traces.length === 0 ? GAP : Math.min(140, Math.ceil(Math.max(...traces.map(({ label }) => widthOf(label, font))) + 2 * GAP))
+  }
+
+  references({ ctx, bbox, valToPos }) {
+    const ratio = uPlot.pxRatio
+    for (const { y, label } of this.config.refLines) {
+      const at = Math.round(valToPos(y, 'y', true))
+      if (at < bbox.top || at > bbox.top + bbox.height) continue
+      ctx.save()
+      ctx.strokeStyle = this.colours.text
+      ctx.lineWidth = ratio
+      ctx.setLineDash([2 * ratio, 3 * ratio])
+      ctx.beginPath()
+      ctx.moveTo(bbox.left, at)
+      ctx.lineTo(bbox.left + bbox.width, at)
+      ctx.stroke()
+      if (label) {
+        ctx.font = `${FONT * ratio}px ${getComputedStyle(this.element).fontFamily}`
+        ctx.fillStyle = this.colours.text
+        ctx.textAlign = 'left'
+        ctx.textBaseline = 'bottom'
+        ctx.fillText(label, bbox.left + GAP * ratio, at - 2 * ratio)
+      }
+      ctx.restore()
+    }
+  }
+
+  labels(chart, font) {
+    const { ctx, bbox, valToPos } = chart
+    const { traces } = this.config
+    const data = chart.data
+    const end = data[0].length - 1
+    const ratio = uPlot.pxRatio
+    const ends = traces.map((_, i) => (end < 0 || !Number.isFinite(data[i + 1][end]) ? null : valToPos(data[i + 1][end], 'y', true)))
+    const places = spread(ends, (FONT + 2) * ratio, bbox.top, bbox.top + bbox.height)
+    const x = Math.min(bbox.left + bbox.width, end < 0 ? bbox.left : valToPos(data[0][end], 'x', true))
+    ctx.save()
+    ctx.font = font.replace(/^[\d.]+/, String(FONT * ratio))
+    ctx.textBaseline = 'middle'
+    traces.forEach(({ label }, i) => {
+      if (places[i] === null) return
+      ctx.fillStyle = this.colours.traces[i % this.colours.traces.length]
+      ctx.fillText(label, x + GAP * ratio, places[i])
+    })
+    ctx.restore()
+  }
+
+  dispose() {
+    this.unwatch()
+    this.resizer.disconnect()
+    this.chart?.destroy()
+  }
+}
+
+const names = ({ traces }) => traces.map(({ label }) => label).join(', ')
+
+function dashOf({ dash }, index, count) {
+  if (Array.isArray(dash)) return dash
+  if (dash) return DASHES[1]
+  return count > 1 ? DASHES[index % DASHES.length] : []
+}
+
+let measuring = null
+
+function widthOf(text, font) {
+  measuring ??= document.createElement('canvas').getContext('2d')
+  measuring.font = font
+  return measuring.measureText(text).width
+}
+
+function sizeOf(values, font) {
+  return 12 + Math.ceil(Math.max(14, ...(values ?? []).map((value) => widthOf(value, font))))
+}

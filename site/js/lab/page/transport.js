@@ -1,0 +1,50 @@
+/** The row under the picture: play and pause, step, reset, speed, time, full screen. */
+
+import { h, icon } from './dom.js'
+import { formatRatio, formatTime } from './numbers.js'
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
+const ON_TIME = 0.95
+
+/**
+ * @param {(key: string, values?: object) => string} words
+ * @param {{play: () => void, step: () => void, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
+ */
+export function buildTransport(words, actions) {
+  const act = (name, text, run) => h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick: run }, icon(name))
+  const label = h('span', {}, words('lab.live.play'))
+  const sign = h('span', { class: 'lab-sign' }, icon('play'))
+  const play = h('button', { type: 'button', class: 'lab-play', onclick: actions.play }, sign, label)
+  const step = act('step', words('lab.live.step'), actions.step)
+  const reset = act('reset', words('lab.live.reset'), actions.reset)
+  const speed = h('select', { class: 'lab-speed', 'aria-label': words('lab.live.speed'), title: words('lab.live.speed') })
+  speed.append(...SPEEDS.map((factor) => h('option', { value: String(factor), selected: factor === 1 }, `${factor} ×`)))
+  speed.addEventListener('change', () => actions.speed(Number(speed.value)))
+  const full = actions.full === null ? null : act('full', words('lab.live.full'), actions.full)
+  const time = h('output', { class: 'lab-time' })
+  const late = h('span', { class: 'lab-late' })
+  const clock = h('span', { class: 'lab-clock' }, time, late)
+  const element = h('div', { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') }, play, step, reset, speed, clock, full)
+  let playing = null
+  return {
+    element,
+    play,
+    setPlaying(now) {
+      if (now === playing) return
+      playing = now
+      label.textContent = words(now ? 'lab.live.pause' : 'lab.live.play')
+      sign.replaceChildren(icon(now ? 'pause' : 'play'))
+    },
+    setTime(seconds) {
+      const text = `${formatTime(seconds)} s`
+      if (time.textContent !== text) time.textContent = text
+    },
+    setRatio(ratio) {
+      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRatio(ratio) }) : ''
+      if (late.textContent !== text) late.textContent = text
+    },
+    setEnabled(on) {
+      for (const button of [step, reset, speed]) button.disabled = !on
+    },
+  }
+}

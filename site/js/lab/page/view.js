@@ -1,0 +1,140 @@
+/**
+ * The picture of a lab: a place in the page, a camera, and the world that is seen.
+ *
+ * The place holds a 2-D canvas with the last picture, and while the view moves the stage's canvas above it (see `stage.js`).
+ */
+
+import { PerspectiveCamera } from 'three'
+import { OrbitCamera } from './camera.js'
+import { h } from './dom.js'
+import { stage } from './stage.js'
+import { World, aim } from './world.js'
+
+export class View {
+  /**
+   * @param {object} options
+   * @param {number} options.height CSS pixels
+   * @param {string} options.label what the picture shows, for who cannot see it
+   */
+  constructor({ height, label }) {
+    this.label = label
+    this.still = h('canvas', { class: 'lab-still', role: 'img', 'aria-label': label })
+    this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group' }, this.still)
+    this.element.style.setProperty('--height', `${height}px`)
+    this.lens = new PerspectiveCamera()
+    this.lens.matrixAutoUpdate = false
+    this.world = null
+    this.camera = null
+    this.frame = null
+    this.fresh = false
+    this.width = 0
+    this.height = 0
+    this.onDrawn = null
+    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
+    this.resizer.observe(this.element)
+    this.colours = () => {}
+  }
+
+  get scene() {
+    return this.world?.scene ?? null
+  }
+
+  resize(width, height) {
+    if (width === this.width && height === this.height) return
+    this.width = Math.round(width)
+    this.height = Math.round(height)
+    this.invalidate()
+  }
+
+  /** Begin with a model. Throws where WebGL is missing. */
+  open(description) {
+    stage.add(this)
+    this.world?.dispose()
+    this.world = new World(description)
+    const { azimuth, elevation, distance, target, fovy } = description.camera
+    this.camera = new OrbitCamera({ azimuth, elevation, distance, target: [...target], fovy })
+    this.colours()
+  }
+
+  /** Show a frame from the next drawing on; returns the frame that it takes the place of, which is spent. */
+  setFrame(frame) {
+    const spent = this.frame
+    this.frame = frame
+    this.fresh = true
+    this.invalidate()
+    return spent
+  }
+
+  /** The picture has to be drawn again. */
+  invalidate() {
+    if (this.world !== null) stage.invalidate(this)
+  }
+
+  setMoving(moving) {
+    if (this.world !== null) stage.setMoving(this, moving)
+  }
+
+  // --- called by the stage
+
+  /** Make ready for drawing; false if there is nothing to draw. */
+  prepare() {
+    if (this.world === null || this.frame === null || this.width === 0) return false
+    this.world.update(this.frame, this.camera)
+    aim(this.lens, this.camera, this.world.description, this.width, this.height)
+    this.fresh = false
+    this.onDrawn?.()
+    return true
+  }
+
+  /** Take the stage's canvas. */
+  hold(canvas) {
+    canvas.setAttribute('role', 'img')
+    canvas.setAttribute('aria-label', this.label)
+    this.still.setAttribute('aria-hidden', 'true')
+    this.element.append(canvas)
+  }
+
+  /** Keep what is on the stage's canvas. */
+  keep(canvas) {
+    const { still } = this
+    if (still.width !== canvas.width || still.height !== canvas.height) {
+      still.width = canvas.width
+      still.height = canvas.height
+    }
+    const context = still.getContext('2d')
+    context.clearRect(0, 0, still.width, still.height)
+    context.drawImage(canvas, 0, 0)
+    still.removeAttribute('aria-hidden')
+  }
+
+  // --- geometry of the pointer
+
+  /** A place in the window as coordinates of the view, in [-1, 1], to the right and up. */
+  coordinates(clientX, clientY) {
+    const box = this.element.getBoundingClientRect()
+    return [(2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height]
+  }
+
+  /** The movable body under the pointer. */
+  pick(clientX, clientY) {
+    return this.world?.pick(...this.coordinates(clientX, clientY), this.lens) ?? null
+  }
+
+  /** The point under the pointer that is as deep in the picture as `point` (m, world). */
+  atDepth(clientX, clientY, point) {
+    const { right, up, forward } = this.camera.axes()
+    const eye = this.camera.position()
+    const depth = point.reduce((sum, x, i) => sum + (x - eye[i]) * forward[i], 0)
+    const half = depth * Math.tan((this.camera.fovy * Math.PI) / 360)
+    const [x, y] = this.coordinates(clientX, clientY)
+    const aspect = this.width / this.height
+    return eye.map((e, i) => e + depth * forward[i] + half * (x * aspect * right[i] + y * up[i]))
+  }
+
+  dispose() {
+    this.resizer.disconnect()
+    stage.remove(this)
+    this.world?.dispose()
+    this.world = null
+  }
+}

@@ -1,0 +1,6 @@
+/** Interface texts with values in them. */
+
+/** `fill('diverged at t = {t} s', { t: '1.20' })`; a name without a value stays. */
+export function fill(text, values = {}) {
+  return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? String(values[name]) : whole))
+}

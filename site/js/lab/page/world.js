@@ -1,0 +1,154 @@
+/**
+ * All that one lab shows, as a three.js scene: made once from the description of the model, moved by every frame.
+ *
+ * `site/js/lab/core/scene.js` and `frame.js` say what the two hold.
+ */
+
+import { CubeTexture, Matrix4, Raycaster, Scene, Vector2 } from 'three'
+import { GEOM, hfieldGeometry, meshGeometry } from './geometry.js'
+import { Lights } from './lights.js'
+import { Materials } from './materials.js'
+import { Solid } from './solid.js'
+import { Flex, Skin, Trail } from './surfaces.js'
+
+const SHOWN_GROUPS = 3 // MuJoCo's viewer shows groups 0, 1 and 2 at first
+const ROW = 19 // floats of a geom or site in a frame
+const SIZE = 12
+const COLOUR = 15
+const DECORATION = 24
+
+export class World {
+  /** @param {object} description what the worker's `ready` holds as `scene` */
+  constructor(description) {
+    this.description = description
+    this.scene = new Scene()
+    this.materials = new Materials(description)
+    this.lights = new Lights(description, this.scene)
+    this.meshes = description.meshes.map(() => null)
+    this.hfields = description.hfields.map(() => null)
+    this.geoms = description.geoms.map((geom) => (geom.group < SHOWN_GROUPS ? this.solid(geom) : null))
+    this.sites = description.sites.map((site) => (site.group < SHOWN_GROUPS ? this.solid(site) : null))
+    this.skins = description.skins.map((skin) => new Skin(this.scene, this.materials, skin, description.layout))
+    this.flexes = description.flexes.map((flex) => new Flex(this.scene, this.materials, flex, description.layout))
+    this.trail = description.layout.longestTrail > 0 ? new Trail(this.scene, description.layout) : null
+    this.decorations = new Map()
+    this.setSky()
+    this.raycaster = new Raycaster()
+  }
+
+  setSky() {
+    const sky = this.materials.sky()
+    if (!(sky instanceof CubeTexture)) return
+    this.scene.background = sky
+    // MuJoCo's faces are about its z axis, three.js's about y.
+    this.scene.backgroundRotation.set(Math.PI / 2, 0, 0)
+  }
+
+  solid({ type, material, data = -1 }) {
+    const geometry = type === GEOM.MESH || type === GEOM.SDF ? this.mesh(data) : type === GEOM.HFIELD ? this.hfield(data) : null
+    const wrapped = geometry !== null && this.description.meshes[data]?.texcoords != null && type !== GEOM.HFIELD
+    return new Solid(this.scene, this.materials, { type, material, geometry, wrapped, extent: this.description.extent })
+  }
+
+  mesh(id) {
+    const info = this.description.meshes[id]
+    if (info === undefined) return null
+    this.meshes[id] ??= meshGeometry(info)
+    return this.meshes[id]
+  }
+
+  hfield(id) {
+    const info = this.description.hfields[id]
+    if (info === undefined) return null
+    this.hfields[id] ??= hfieldGeometry(info)
+    return this.hfields[id]
+  }
+
+  /** Move everything to where a frame says it is. */
+  update(frame, camera) {
+    const { layout } = this.description
+    this.place(this.geoms, frame, layout.geoms, camera.target)
+    this.place(this.sites, frame, layout.sites, camera.target)
+    this.skins.forEach((skin) => skin.update(frame))
+    this.flexes.forEach((flex) => flex.update(frame))
+    const points = frame[2]
+    this.trail?.update(frame, points)
+    this.decorate(frame, layout.trail + 3 * points, frame[1], camera.target)
+    this.lights.update(frame, camera.position(), camera.axes().forward)
+  }
+
+  place(solids, frame, start, target) {
+    for (let i = 0, at = start; i < solids.length; i++, at += ROW) solids[i]?.update(frame, at, at + SIZE, at + COLOUR, target)
+  }
+
+  // Decorations come and go: those of a type are used again, and what is left over is hidden.
+  decorate(frame, start, count, target) {
+    const used = new Map()
+    for (let i = 0, at = start; i < count; i++, at += DECORATION) {
+      const type = frame[at]
+      const key = type === GEOM.MESH ? `mesh ${frame[at + 1] >> 1}` : type
+      if (!this.decorations.has(key)) this.decorations.set(key, [])
+      const pool = this.decorations.get(key)
+      const next = used.get(key) ?? 0
+      if (next === pool.length) pool.push(this.decoration(type, frame[at + 1]))
+      used.set(key, next + 1)
+      const solid = pool[next]
+      solid.update(frame, at + 7, at + 4, at + 19, target, frame[at + 23])
+    }
+    for (const [key, pool] of this.decorations) for (let i = used.get(key) ?? 0; i < pool.length; i++) pool[i].show(false)
+  }
+
+  decoration(type, data) {
+    const geometry = type === GEOM.MESH ? this.mesh(data >> 1) : null
+    const solid = new Solid(this.scene, this.materials, { type, geometry, model: false, extent: this.description.extent })
+    for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
+    return solid
+  }
+
+  /**
+   * The body under a point of the view, if it can move.
+   *
+   * @param {number} x @param {number} y in [-1, 1], to the right and up @param {import('three').Camera} lens
+   * @returns {{body: number, point: number[]} | null} id and the point (m, world)
+   */
+  pick(x, y, lens) {
+    this.raycaster.setFromCamera(new Vector2(x, y), lens)
+    let best = null
+    this.geoms.forEach((solid, i) => {
+      const { body } = this.description.geoms[i]
+      if (solid === null) return
+      for (const hit of this.raycaster.intersectObjects(solid.meshes.filter((mesh) => mesh.visible), false)) {
+        if (best === null || hit.distance < best.distance) best = { body, distance: hit.distance, point: hit.point.toArray() }
+      }
+    })
+    return best !== null && this.description.bodies[best.body].movable ? best : null
+  }
+
+  dispose() {
+    this.lights.dispose()
+    this.materials.dispose()
+    for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, this.trail]) thing?.dispose()
+    for (const solid of [...this.geoms, ...this.sites, ...[...this.decorations.values()].flat()]) solid?.remove()
+    this.scene.clear()
+  }
+}
+
+/** Set a three.js camera to a free camera: near and far in extents of the model, as MuJoCo has them. */
+export function aim(lens, camera, { extent, visual }, width, height) {
+  const { right, up, forward } = camera.axes()
+  const p = camera.position()
+  lens.matrix.copy(
+    new Matrix4().set(
+      right[0], up[0], -forward[0], p[0],
+      right[1], up[1], -forward[1], p[1],
+      right[2], up[2], -forward[2], p[2],
+      0, 0, 0, 1,
+    ), // prettier-ignore
+  )
+  lens.fov = camera.fovy
+  lens.aspect = width / Math.max(1, height)
+  lens.near = Math.min(visual.znear * extent, 0.2 * camera.distance)
+  lens.far = Math.max(visual.zfar * extent, 4 * camera.distance)
+  lens.updateProjectionMatrix()
+  lens.updateMatrixWorld(true)
+}

@@ -1,0 +1,100 @@
+"""The same course gives the same site, byte for byte, wherever and however it is built."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from coursekit import ROOT, Folder
+
+Make = Callable[..., Folder]
+FULL = ROOT / "tests/courses/full/course"
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory, font_store: Path) -> Folder:
+    """The course that uses everything, built in this process."""
+    folder = copy(tmp_path_factory.mktemp("original") / "course", font_store)
+    done = folder.main("build", "--jobs", "1")
+    assert done.status == 0, done.out
+    return folder
+
+
+def copy(root: Path, fonts: Path) -> Folder:
+    folder = Folder(root)
+    shutil.copytree(FULL, root)
+    (root / ".coursebuild").mkdir()
+    (root / ".coursebuild/fonts").symlink_to(fonts)
+    folder.tmp.mkdir()
+    return folder
+
+
+def differences(a: Folder, b: Folder) -> list[str]:
+    """The names of files that differ; a site's bytes would say little."""
+    left, right = a.tree(), b.tree()
+    return sorted(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
+
+
+def test_twice_in_one_place(original: Folder) -> None:
+    before = original.tree()
+    assert original.run("build").status == 0
+    assert original.tree() == before
+
+
+def test_anywhere_and_anyhow(original: Folder, tmp_path: Path, font_store: Path) -> None:
+    folder = copy(tmp_path / "anderswo ünd 別" / "a course", font_store)
+    environment = {
+        "TZ": "Pacific/Kiritimati",
+        "LANG": "tr_TR.UTF-8",
+        "LC_ALL": "C",
+        "PYTHONHASHSEED": "4242",
+        "PYTHONOPTIMIZE": "2",
+        "SOURCE_DATE_EPOCH": "1",
+        "USER": "somebody",
+    }
+    where = str(folder.root)
+    done = folder.run("-C", where, "build", "--jobs", "3", "--quiet", cwd=tmp_path, env=environment)
+    assert done.status == 0, done.out
+    assert differences(original, folder) == []
+
+
+def test_without_any_cache_and_with_files_in_another_order(
+    original: Folder, tmp_path: Path
+) -> None:
+    """Fonts are cut anew; the folders' entries are made in reverse."""
+    root = tmp_path / "reverse"
+    for path in sorted(FULL.rglob("*"), reverse=True):
+        if path.is_file():
+            target = root / path.relative_to(FULL)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(path.read_bytes())
+            target.chmod(0o600)
+    folder = Folder(root)
+    folder.tmp.mkdir()
+    done = folder.run("build", env={"PYTHONHASHSEED": "1"})
+    assert done.status == 0, done.out
+    assert differences(original, folder) == []
+
+
+def test_nothing_says_where_when_or_by_whom(original: Folder) -> None:
+    marks = [str(original.root.parent).encode(), str(ROOT).encode(), b"/tmp/", b"/home/"]
+    for name, data in original.tree("public").items():
+        assert not [mark for mark in marks if mark in data], name
+
+
+def test_after_any_edits_as_after_none(original: Folder, tmp_path: Path, font_store: Path) -> None:
+    """A folder that has seen other courses gives what a fresh one gives."""
+    folder = copy(tmp_path / "used", font_store)
+    lesson = "content/lessons/1.1-text.md"
+    text = folder.text(lesson)
+    for edited in (
+        text + "More.\n\n```python file=examples/extra.py\nprint(1)\n```\n",
+        text.replace("## Callouts", "## Other"),
+        text + "[gone](lesson:9.9)\n",
+        text,
+    ):
+        folder.write(lesson, edited)
+        assert folder.main("build").status == (1 if "gone" in edited else 0)
+    assert differences(original, folder) == []
