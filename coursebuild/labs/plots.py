@@ -87,7 +87,9 @@ def plot_svg(
 class _Frame:
     """From values to places."""
 
-    def __init__(self, low_t: float, high_t: float, low: float, high: float, width: float) -> None:
+    def __init__(
+        self, low_t: float, high_t: float, low: float, high: float, width: float, margin: float
+    ) -> None:
         self.low_t, self.high_t, self.low, self.high = low_t, high_t, low, high
         self.right = width - margin
 
