@@ -32,9 +32,12 @@ from coursebuild.model import (
     Quiz,
     RawInline,
     Script,
+    Target,
     UrlTarget,
     block_inlines,
     document_blocks,
+    local_file,
+    resolve,
     walk_inlines,
 )
 from coursebuild.source import Span
@@ -106,7 +109,8 @@ def check_links(course: Course) -> tuple[Diagnostic, ...]:
                 found += _check_html(block.span, document, anchors_of)
             for inline in walk_inlines(block_inlines(block)):
                 if isinstance(inline, Link):
-                    found += _check_link(inline, document, known, anchors_of)
+                    target = resolve(inline.target, course, document.source.path)
+                    found += _check_link(inline, target, document, known, anchors_of)
                 elif isinstance(inline, Image):
                     found += _check_image(inline, document, known)
                 elif isinstance(inline, RawInline):
@@ -122,10 +126,9 @@ def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterat
 
 
 def _check_link(
-    link: Link, document: Document, known: Places, anchors_of: AnchorsOf
+    link: Link, target: Target, document: Document, known: Places, anchors_of: AnchorsOf
 ) -> Iterator[Diagnostic]:
     span = link.target_span
-    target = link.target
     match target:
         case LessonTarget():
             if target.id not in known.lessons:
@@ -258,10 +261,3 @@ def urlsplit_or_none(url: str) -> SplitResult | None:
         return urlsplit(url)
     except ValueError:
         return None
-
-
-def local_file(url: str, document_path: str) -> str:
-    """The path, relative to the root, of the file that a relative address in a document names."""
-    path = unquote(url.split("#", 1)[0].split("?", 1)[0])
-    base = "" if path.startswith("/") else posixpath.dirname(document_path)
-    return posixpath.normpath(posixpath.join(base, path.lstrip("/")))

@@ -8,6 +8,8 @@ end (`assert_never`). A document is the tree of one Markdown text: a lesson, a p
 inside a quiz.
 """
 
+from coursebuild.model.addresses import local_file as local_file
+from coursebuild.model.addresses import resolve as resolve
 from coursebuild.model.blocks import Block as Block
 from coursebuild.model.blocks import BlockQuote as BlockQuote
 from coursebuild.model.blocks import Callout as Callout

@@ -64,6 +64,8 @@ class Page:
     title: str
     path: str
     document: Document | None
+    menu: bool = True
+    """Whether every page's menu has it; the foot has them all."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,8 @@ from coursebuild.model import (
     Target,
     UrlTarget,
     child_blocks,
+    local_file,
+    resolve,
 )
 from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
 from coursebuild.render.highlight import highlight
@@ -67,6 +69,7 @@ class PageContext:
     def href(self, target: Target) -> str:
         """The address of a link's target."""
         library, place = self.library, self.place
+        target = resolve(target, library.course, self.document.source.path)
         match target:
             case LessonTarget():
                 return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
@@ -88,7 +91,7 @@ class PageContext:
         parts = urlsplit(url)
         if parts.scheme or parts.netloc or not parts.path:
             return url
-        path = urls.file_path(urls.local_file(url, self.document.source.path))
+        path = urls.file_path(local_file(url, self.document.source.path))
         return self.place.href(path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
 
     def math(self, tex: str, display: bool) -> Markup:

@@ -31,6 +31,12 @@ PAGE_WORDS = (
 )
 """Interface texts that the page's script shows."""
 
+_LAB_WORDS = ("lab.live.", "overlay.")
+"""Beginnings of the keys of what running labs say."""
+
+_LIVE_LAB = "data-script="
+"""What a page with a lab that runs has in it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Draft:
@@ -118,15 +124,26 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
         "script": place.href(names.script),
         "home": place.href(urls.HOME),
         "credits": place.href(names.credits),
-        "pages": _navigation(library, place),
+        "menu": _navigation(library, place, menu=True),
+        "more": _navigation(library, place, menu=False),
         "course": course,
         "source": course.repository if "{path}" not in course.repository else "",
         "results": library.results,
-        "page_words": PAGE_WORDS,
+        "page_words": _page_words(library, draft.body),
     }
     return visible(library.render("base.html", **values)) + "\n"
 
 
-def _navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
-    pages = ((urls.page_path(page), page.title) for page in library.course.pages)
-    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)
+def _page_words(library: Library, body: str) -> tuple[str, ...]:
+    """Keys of the texts that the page carries for its scripts."""
+    if _LIVE_LAB not in body:
+        return PAGE_WORDS
+    labs = sorted(key for key in library.words.keys if key.startswith(_LAB_WORDS))
+    return (*PAGE_WORDS, *labs, "lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
+
+
+def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[NavLink, ...]:
+    """Links to the pages that are in the menu, or to the others."""
+    pages = (page for page in library.course.pages if page.menu is menu)
+    paths = ((urls.page_path(page), page.title) for page in pages)
+    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)

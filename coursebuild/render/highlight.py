@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Iterator
 from html import escape
 
 from markupsafe import Markup
@@ -73,7 +74,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     if lexer is None:
         return tuple(Markup(escape(line, quote=False)) for line in visible(code).split("\n"))
     lines: list[list[tuple[str, str]]] = [[]]
-    for token, text in lexer.get_tokens(visible(code)):
+    for token, text in _tokens(lexer, visible(code)):
         css = _class_of(token)
         for number, part in enumerate(text.split("\n")):
             if number:
@@ -84,6 +85,14 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
             else:
                 line.append((css, part))
     return tuple(Markup("".join(_span(css, text) for css, text in line)) for line in lines)
+
+
+def _tokens(lexer: Lexer, code: str) -> Iterator[tuple[_TokenType, str]]:
+    """The lexer's tokens; a byte order mark at the start, which it drops, stays."""
+    if code.startswith("\ufeff"):
+        yield Token.Text, "\ufeff"
+        code = code[1:]
+    yield from lexer.get_tokens(code)
 
 
 def _span(css: str, text: str) -> str:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import posixpath
 from dataclasses import dataclass
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote, urlsplit
 
 from coursebuild.model import Course, Lesson, Level, Page
 
@@ -61,13 +61,6 @@ def file_path(path: str) -> str:
     What a model pulls in lies beside the model, as in the course.
     """
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
-
-
-def local_file(url: str, document_path: str) -> str:
-    """The path, from the project root, of the file that a relative address in a document names."""
-    path = unquote(url.split("#", 1)[0].split("?", 1)[0])
-    base = "" if path.startswith("/") else posixpath.dirname(document_path)
-    return posixpath.normpath(posixpath.join(base, path.lstrip("/")))
 
 
 def absolute(course: Course, path: str) -> str:

@@ -39,7 +39,7 @@ class Example:
 
 
 def catalogue_page(examples: Mapping[str, Example]) -> str:
-    """`docs/rules.md`; a rule without an example is a `KeyError`."""
+    """`docs/rules.md`."""
     errors = sum(rule.severity == "error" for rule in RULES.values())
     head = f"""\
 # Rules
@@ -56,11 +56,13 @@ reason = "the levels are those of the book"
 path = "content/lessons/4.*"   # optional
 ```
 """
-    return head + "".join(_entry(rule, examples[name]) for name, rule in RULES.items())
+    return head + "".join(_entry(rule, examples.get(name)) for name, rule in RULES.items())
 
 
-def _entry(rule: Rule, example: Example) -> str:
+def _entry(rule: Rule, example: Example | None) -> str:
     parts = [f"\n## {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary}\n"]
+    if example is None:
+        return parts[0]
     for file in example.files:
         parts.append(f"\n`{file.path}`{file.remark}\n")
         if file.text:

@@ -54,14 +54,16 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
         *parsed.diagnostics,
         *decoding.diagnostics,
         *_check_ids(root, nodes),
-        *_check_places(root, decoding.structs),
         *_check_files(root, decoding.structs),
-        *check_prerequisites(lessons, _ids(nodes)),
         *check_settings(root, decoding.structs),
     ]
-    if found or decoding.value is None:
+    unusable = bool(found)
+    found += _check_places(root, decoding.structs)
+    found += check_prerequisites(lessons, _ids(nodes))
+    if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
-    return Parsed(_course(source, root, decoding.value, decoding.structs, levels))
+    course = _course(source, root, decoding.value, decoding.structs, levels)
+    return Parsed(course, sort_diagnostics(found))
 
 
 def _course(
@@ -90,7 +92,7 @@ def _course(
         silences=silences(fields.silence),
         levels=levels,
         pages=tuple(
-            Page(node.span, page.id, page.title, page.file, None)
+            Page(node.span, page.id, page.title, page.file, None, page.menu)
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
@@ -152,6 +154,9 @@ def _ids(nodes: Iterable[ObjectNode]) -> list[str]:
 
 # ---------------------------------------------------------------------------------------- checks
 
+_TAKEN = frozenset({"index", "404"})
+"""Names of pages that every site has."""
+
 
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
     kinds = (("level", root.objects("level")), ("lesson", lessons), ("page", root.objects("page")))
@@ -189,6 +194,10 @@ def _check_files(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         if isinstance(fields, PageTable):
             place = node.place("file")
             named.append((fields.file, place))
+            if fields.id in _TAKEN:
+                message = f"a page cannot have the id `{fields.id}`"
+                help = "the site has a file of this name already"
+                yield diagnose("field-value", node.place("id"), message, help=help)
             problem = _path_problem(fields.file)
             if problem:
                 message = f"`{short(fields.file)}` {problem}"

@@ -51,11 +51,11 @@ class Doom:
         if name == "open" and not arguments[1] & os.O_CREAT:
             return False
         # Relative ones are those of a tree that is being removed, or of a course as a whole.
-        return not os.path.isabs(path) or os.fspath(path).startswith(self.folder)
+        return not Path(path).is_absolute() or os.fspath(path).startswith(self.folder)
 
     def place(self, fd: int) -> str:
         try:
-            return os.readlink(f"/proc/self/fd/{fd}")
+            return str(Path(f"/proc/self/fd/{fd}").readlink())
         except OSError:
             return ""
 

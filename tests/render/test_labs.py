@@ -36,7 +36,8 @@ def lab(**fields: Any) -> str:
 
 def test_everything_that_can_be_said_is_said(make: Make) -> None:
     assert make(lab(**FULL)).html() == (
-        '<section class="lab" data-lab="simlab" data-model="box" aria-label="Lab: A &lt;lab&gt;">\n'
+        '<section class="lab" data-lab="" data-kind="simlab" data-model="box" '
+        'aria-label="Lab: A &lt;lab&gt;">\n'
         '<p class="lab-title"><span class="lab-kind">Lab</span> A &lt;lab&gt;</p>\n'
         '<div class="lab-static">\n'
         '<p class="lab-what">A simulation of the model <a href="../models/box.html">box</a>. '
@@ -58,7 +59,7 @@ def test_everything_that_can_be_said_is_said(make: Make) -> None:
 def test_a_bare_lab_has_no_empty_parts(make: Make) -> None:
     html = make(lab(xml="<mujoco/>")).html()
     assert html == (
-        '<section class="lab" data-lab="simlab" aria-label="Lab: Simulation">\n'
+        '<section class="lab" data-lab="" data-kind="simlab" aria-label="Lab: Simulation">\n'
         '<p class="lab-title"><span class="lab-kind">Lab</span> Simulation</p>\n'
         '<div class="lab-static">\n'
         '<p class="lab-what">A simulation of a model of its own.</p>\n</div>\n</section>\n'

@@ -72,7 +72,7 @@ def test_a_prediction_keeps_its_simulation_behind_the_answer(make: Make) -> None
     assert "Decide first, then open." in html
     before, after = html.split("<summary>Answer</summary>")
     assert "The simulation" not in before
-    assert 'data-lab="simlab"' in after.split("</details>")[0]
+    assert 'data-kind="simlab"' in after.split("</details>")[0]
 
 
 def test_open_questions_have_a_reference(make: Make) -> None:

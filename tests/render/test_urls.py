@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.render.urls import Place, local_file
+from coursebuild.model import local_file
+from coursebuild.render.urls import Place
 
 PATHS = [
     "index.html",

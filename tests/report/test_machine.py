@@ -103,6 +103,7 @@ def test_sarif() -> None:
 
 def test_annotations_escape_what_their_syntax_uses() -> None:
     assert render_report(REPORT, "github", Style()).splitlines()[1] == (
-        "::error file=content/lessons/1.1-a%2Cb.md,line=2,col=1,endLine=2,endColumn=6,title=math-syntax"
+        "::error file=content/lessons/1.1-a%2Cb.md,line=2,col=1,endLine=2,endColumn=6,"
+        "title=math-syntax"
         "::it is 100%25 wrong%0Ahere%0Ahelp: mend it"
     )

@@ -1,4 +1,4 @@
-"""Each mistake that the lesson format names, tried alone by the command line, and the good beside it.
+"""Each mistake that the lesson format names, alone, through the command line; and the good cases.
 
 The cases are fixtures in `tests/fixtures/mistakes/`. Where a mistake is expected its place is
 marked in the input by `‸`, which is taken out before the course is written; the expected text is

@@ -28,6 +28,13 @@ FIXTURES = ROOT / "tests/fixtures/rules"
 PAGE = ROOT / "docs/rules.md"
 FILES = {path.stem: path for path in sorted(FIXTURES.glob("*.md"))}
 CASES = {name: read_cases(path) for name, path in FILES.items()}
+NOT_SHOWN = {
+    "lab-engine": "needs a browser's engine of another version than the pinned one",
+    "lab-parity": "needs engines that differ, and they do not",
+    "lab-timeout": "takes more than a minute",
+}
+"""Rules that no course brings about here; why."""
+SENTENCE = re.compile(r"(?!MuJoCo|JavaScript|Markdown|Python)[A-Z][a-z]")
 TOLD = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
 
 
@@ -86,10 +93,11 @@ def test_what_the_author_sees(name: str, tmp_path: Path, request: pytest.Fixture
 
 
 def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
-    assert set(FILES) == set(RULES)
+    assert set(FILES) == set(RULES) - set(NOT_SHOWN)
+    assert set(NOT_SHOWN) <= set(RULES)
 
 
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("name", FILES)
 def test_the_fixture_shows_its_rule(name: str) -> None:
     assert CASES[name], "an empty fixture shows nothing"
     for case in CASES[name]:
@@ -103,7 +111,7 @@ def test_messages_keep_the_style_of_the_house() -> None:
     for name, cases in CASES.items():
         for line in "".join(case.expected for case in cases).splitlines():
             said = re.match(r"(?:(?:error|warning)\[[a-z-]+\]| *= help): (.*)", line)
-            if said and (re.match(r"[A-Z][a-z]", said[1]) or re.search(r"(?<!\.)\.$", said[1])):
+            if said and (SENTENCE.match(said[1]) or re.search(r"(?<!\.)\.$", said[1])):
                 wrong.append(f"{name}: {line}")
     assert wrong == []
 

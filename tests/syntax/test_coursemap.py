@@ -362,7 +362,9 @@ PATH = "a path relative to the project, as in `content/pages/about.md`"
 )  # fmt: skip
 def test_what_an_author_is_told(text: str, expected: str) -> None:
     assert told(text) == [expected]
-    assert parse(text).value is None
+    # A course with these mistakes can still be read, so that those of its lessons are told as well.
+    usable = ("prerequisite-", "stands in the level", "is named twice")
+    assert (parse(text).value is None) is not any(part in expected for part in usable)
 
 
 def test_a_mistake_in_a_lesson_does_not_make_it_unknown_to_others() -> None:
@@ -456,6 +458,6 @@ def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
     )
     mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 20)) :]
     parsed = parse(mutated)
-    assert (parsed.value is None) == bool(parsed.diagnostics)
+    assert parsed.value is not None or parsed.diagnostics
     orders = [d.order for d in parsed.diagnostics]
     assert orders == sorted(orders)

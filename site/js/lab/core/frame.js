@@ -49,6 +49,9 @@ export class Pictures {
     this.option = handles.own(new mj.MjvOption())
     this.camera = handles.own(new mj.MjvCamera())
     this.still = handles.own(new mj.MjvPerturb())
+    // What is computed from the distance of the camera (a drag, slack tendons) must find one.
+    mj.mjv_defaultFreeCamera(this.model, this.camera)
+    mj.mjv_updateCamera(this.model, this.data, this.camera, this.scene)
     this.geoms = new SceneGeoms(this.scene, this.data)
     this.layout = layoutOf(this.model, sampler.capacity)
     if (config.forceScale) this.model.vis.map.force = config.forceScale

@@ -67,7 +67,8 @@ export class Instrument {
     this.plots = config.plots.map((plot) => new Plot(plot, words))
     this.message = h('p', { class: 'lab-message', role: 'alert', hidden: true })
     this.live = h('p', { class: 'lab-announce', role: 'status' })
-    this.body = h('div', { class: 'lab-live' }, this.view.element, this.transport.element, this.message, this.controls.element, this.overlays)
+    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
+    this.body = h('div', { class: 'lab-live' }, screen, this.transport.element, this.message, this.controls.element, this.overlays)
     this.body.append(...[this.readouts.element].filter(Boolean), ...this.plots.map((plot) => plot.element), this.foot(), this.live)
     this.controls.show(this.values)
     this.transport.setTime(0)
@@ -279,14 +280,14 @@ export class Instrument {
   /** Tell everybody, in the instrument; an error stays until the next reset. */
   tell(text, kind) {
     this.message.textContent = text
-    this.message.className = `lab-message lab-${kind}`
+    this.message.className = `lab-message lab-is-${kind}`
     this.message.hidden = false
   }
 
   note(key) {
     this.tell(this.words(key), 'note')
     clearTimeout(this.noteTimer)
-    this.noteTimer = setTimeout(() => this.message.classList.contains('lab-note-line') && this.clear(), 4000)
+    this.noteTimer = setTimeout(() => this.message.classList.contains('lab-is-note') && this.clear(), 4000)
   }
 
   clear() {

@@ -8,8 +8,8 @@
 import { AmbientLight, DirectionalLight, PointLight, SpotLight } from 'three'
 
 const FULL = Math.PI // see materials.js
-const AMBIENT = 0.3
-const FROM_CAMERA = 0.45
+const AMBIENT = 0.45
+const FROM_CAMERA = 0.4
 const FROM_ABOVE = 0.4
 const ABOVE = [0.25, -0.35, 0.9]
 const LIGHT = 7 // floats in a frame

@@ -169,6 +169,7 @@ export class Plot {
     const x = Math.min(bbox.left + bbox.width, end < 0 ? bbox.left : valToPos(data[0][end], 'x', true))
     ctx.save()
     ctx.font = font.replace(/^[\d.]+/, String(FONT * ratio))
+    ctx.textAlign = 'left'
     ctx.textBaseline = 'middle'
     traces.forEach(({ label }, i) => {
       if (places[i] === null) return

@@ -24,11 +24,11 @@ export function buildTransport(words, actions) {
   const time = h('output', { class: 'lab-time' })
   const late = h('span', { class: 'lab-late' })
   const clock = h('span', { class: 'lab-clock' }, time, late)
-  const element = h('div', { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') }, play, step, reset, speed, clock, full)
+  const element = h('div', { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') }, play, step, reset, speed, clock)
   let playing = null
   return {
     element,
-    play,
+    full,
     setPlaying(now) {
       if (now === playing) return
       playing = now

@@ -90,7 +90,7 @@ export class View {
   hold(canvas) {
     canvas.setAttribute('role', 'img')
     canvas.setAttribute('aria-label', this.label)
-    this.still.setAttribute('aria-hidden', 'true')
+    this.still.hidden = true
     this.element.append(canvas)
   }
 
@@ -104,7 +104,7 @@ export class View {
     const context = still.getContext('2d')
     context.clearRect(0, 0, still.width, still.height)
     context.drawImage(canvas, 0, 0)
-    still.removeAttribute('aria-hidden')
+    still.hidden = false
   }
 
   // --- geometry of the pointer

@@ -10,16 +10,17 @@
  * The same request gives the same reply, but for `stepsPerSecond`, and for what did not fit into `wall`.
  */
 
+import { EngineError } from '../core/engine.js'
 import { Lab } from '../core/lab.js'
-import { LabError, call, current, numeric } from '../core/piece.js'
+import { LabError, call, current, numeric, readable } from '../core/piece.js'
 import { packed } from './base64.js'
 import { ParityRecorder } from './parity.js'
+import { picture, record, withoutTextures } from './record.js'
 
 const SECONDS = 5 // of simulated time, unless the lab says otherwise
 const STEPS = 20_000 // at most, unless the lab says for how long
 const PROBE = { seconds: 0.5, steps: 500 } // after each act
 const SLICE = 64 // steps between two looks at the clock
-const POINTS = 1000 // of a recorded trace, at most
 const CHECKS = 100 // looks at the readouts during the main run
 
 class OutOfTime extends Error {}
@@ -81,7 +82,7 @@ class Trial {
       result = action(lab)
     } catch (error) {
       if (error instanceof OutOfTime) throw error
-      this.failed(error, lab)
+      this.failed(error, lab?.time ?? null)
     } finally {
       lab?.dispose()
     }
@@ -89,15 +90,14 @@ class Trial {
     return result
   }
 
-  failed(error, lab) {
-    if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, lab?.time ?? null)
-    else this.fail(this.during.entry, error.name === 'EngineError' ? 'engine' : 'throws', error.message, lab?.time ?? null)
+  failed(error, at) {
+    if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, at)
+    else this.fail(this.during.entry, error instanceof EngineError ? 'engine' : 'throws', error.message, at)
     // An engine that ended in the middle of something cannot be trusted with the rest.
     if (error.kind === 'engine' || error.fatal || error instanceof WebAssembly.RuntimeError) throw error
   }
 
-  fail(entry, kind, message, at) {
-    const key = JSON.stringify([entry, kind, message])
+  fail(entry, kind, message, at, key = JSON.stringify([entry, kind, message])) {
     if (this.told.has(key)) return
     this.told.add(key)
     this.failures.push({ entry, kind, message, at, during: this.during ?? null })
@@ -106,31 +106,31 @@ class Trial {
   /** Note what the lab itself says: divergence, warnings. */
   state(lab) {
     const { entry } = this.during
-    for (const { kind, message, time } of lab.takeWarnings()) this.fail(entry, 'warning', `${kind}: ${message}`, time)
+    for (const { kind, message, time } of lab.takeWarnings()) {
+      this.fail(entry, 'warning', `${kind}: ${message}`, time, JSON.stringify([entry, kind])) // the first of its kind
+    }
     if (lab.diverged !== null) this.fail(entry, 'diverged', lab.diverged.message, lab.diverged.time)
   }
 
   /** Evaluate all that is shown; a wrong value does not keep the rest from being tried. */
   look(lab) {
     const env = lab.sync()
-    this.code.readouts.forEach((run, i) => {
-      this.value(['readouts', i, 'expr'], run, env, lab, (value) => typeof value === 'string' || typeof value === 'number')
-    })
+    this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable))
     this.code.plots.forEach((traces, i) =>
-      traces.forEach((run, j) => {
-        this.value(['plots', i, 'traces', j, 'expr'], run, env, lab, (value) => typeof value === 'number')
-      }),
+      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, numeric)),
     )
   }
 
-  value(entry, run, env, lab, fits) {
+  /** Evaluate an expression; `check` takes its entry and value, and gives the value or throws. */
+  value(entry, run, env, check) {
     try {
-      const value = call(entry, () => run(env))
-      if (!fits(value)) call(entry, () => numeric(entry, value))
-      else if (typeof value === 'number' && !Number.isFinite(value)) this.fail(entry, 'nan', `is ${value}`, lab.time)
+      const value = call(entry, () => check(entry, run(env)))
+      if (typeof value !== 'number' || Number.isFinite(value)) return value
+      this.fail(entry, 'nan', `is ${value}`, env.data.time)
     } catch (error) {
-      this.failed(error, lab)
+      this.failed(error, env.data.time)
     }
+    return null
   }
 
   /** Step until simulated time `t`, or for `most` steps; returns why it ended early. */
@@ -176,7 +176,7 @@ class Trial {
     const most = this.seconds === null ? STEPS : Infinity
     const due = Math.min(most, Math.ceil(wanted / timestep))
     this.look(lab)
-    const start = this.picture(lab)
+    const start = picture(lab)
     const atStart = lab.state().physics
     if (this.parity) lab.recorder = new ParityRecorder(lab, this.bytes, due)
     const end = lab.time + wanted
@@ -198,42 +198,11 @@ class Trial {
       stopped,
       timestep,
       scene: packed(withoutTextures(lab.scene())),
-      pictures: packed([start, this.picture(lab)]),
-      plots: this.record(lab),
+      pictures: packed([start, picture(lab)]),
+      plots: record(lab),
       parity,
       resetDiffers: this.resetDiffers(lab, atStart),
     }
-  }
-
-  picture(lab) {
-    const readouts = lab.diverged === null ? this.quietly(() => lab.readouts()) : null
-    return { time: lab.time, frame: lab.frame(null).slice(), readouts }
-  }
-
-  /** What has been told as a failure already. */
-  quietly(look) {
-    try {
-      return look()
-    } catch (error) {
-      if (error instanceof LabError && error.kind !== 'engine') return null
-      throw error
-    }
-  }
-
-  /** The samples of the run, thinned: {times, plots: [[values of each trace]]}. */
-  record(lab) {
-    const { times, values } = lab.sampler.take()
-    const width = lab.sampler.traces.length
-    const stride = Math.max(1, Math.ceil(times.length / POINTS))
-    const picked = Array.from({ length: Math.ceil(times.length / stride) }, (_, i) => i * stride)
-    let column = 0
-    const plots = this.code.plots.map((traces) =>
-      traces.map(() => {
-        const at = column++
-        return picked.map((i) => values[i * width + at])
-      }),
-    )
-    return { times: picked.map((i) => times[i]), plots }
   }
 
   /** Whether a reset leads back to where the lab started; it does not when lab code uses chance of its own. */
@@ -290,12 +259,10 @@ class Trial {
       this.during.entry = current.trying = ['expect', i]
       this.advance(lab, t)
       if (lab.diverged !== null) return
-      this.value(entry, this.code.expect[i], lab.sync(), lab, (value) => {
-        if (typeof value !== 'number') return false
-        if (min !== null && value < min) this.fail(entry, 'expect', `is ${value} at ${t} s, less than ${min}`, lab.time)
-        if (max !== null && value > max) this.fail(entry, 'expect', `is ${value} at ${t} s, more than ${max}`, lab.time)
-        return true
-      })
+      const value = this.value(entry, this.code.expect[i], lab.sync(), numeric)
+      if (value === null) continue
+      if (min !== null && value < min) this.fail(entry, 'expect', `is ${value} at ${t} s, less than ${min}`, lab.time)
+      if (max !== null && value > max) this.fail(entry, 'expect', `is ${value} at ${t} s, more than ${max}`, lab.time)
     }
   }
 
@@ -309,9 +276,4 @@ class Trial {
     if (typeof after === 'string') lab.press(index(after))
     else for (const [label, value] of Object.entries(after)) lab.setControl(index(label), value)
   }
-}
-
-/** Pictures without a GPU show no textures, which can be large. */
-function withoutTextures(scene) {
-  return { ...scene, textures: scene.textures.map((texture) => ({ ...texture, data: null })) }
 }

@@ -1,0 +1,213 @@
+/** The trial finds what is wrong in a lab, says where, and says the same each time. */
+
+import assert from 'node:assert/strict'
+import { before, test } from 'node:test'
+import { fromBase64, toBase64 } from '../js/lab/trial/base64.js'
+import { crc32 } from '../js/lab/trial/parity.js'
+import { runTrial } from '../js/lab/trial/trial.js'
+import { FALLING, PENDULUM, compile, config, control, newEngine, plot } from './helpers.mjs'
+
+let engine
+before(async () => {
+  engine = await newEngine()
+})
+
+const READOUT = [{ label: 'r', digits: 3 }]
+const HEAD = '({model, data, mj, sim, ctx, lib})'
+
+/** Try a lab; its pieces are texts: expressions for readouts, plots and claims, statements for the rest. */
+function attempt(xml, data, pieces = {}, request = {}) {
+  const statements = (text) => `${HEAD} => { ${text} }`
+  const list = (texts) => `[${(texts ?? []).map((text) => `${HEAD} => (${text})`).join(', ')}]`
+  const members = [
+    ...['setup', 'controller'].filter((name) => pieces[name]).map((name) => `${name}: ${statements(pieces[name])}`),
+    `controls: [${(pieces.controls ?? []).join(', ')}]`,
+    `readouts: ${list(pieces.readouts)}`,
+    `plots: [${(pieces.plots ?? []).map(list).join(', ')}]`,
+    `expect: ${list(pieces.expect)}`,
+  ]
+  const code = `({${members.join(', ')}})`
+  let clock = 0
+  return runTrial(engine, { config: config(data), code, ...request }, compile(engine, xml), () => (clock += 0.01))
+}
+
+const set = (target) => `{set: (${HEAD.slice(1, -1)}, value) => { (${target}) = value }}`
+const run = (text) => `{run: ${HEAD} => { ${text} }}`
+const told = ({ failures }) => failures.map(({ entry, kind, message, at }) => [entry.join('.'), kind, message, at])
+
+test('a sound lab passes, and everything in it is tried', () => {
+  const reply = attempt(
+    PENDULUM,
+    {
+      key: 'up',
+      controls: [
+        control({ label: 'torque', min: -0.5, max: 0.5, value: 0.1, init: true }),
+        control({ label: 'kick', type: 'button' }),
+        control({ label: 'from', type: 'select', options: [['low', 1], ['high', 3]], value: 3, reset: true, param: 'from' }),
+      ],
+      readouts: [...READOUT, ...READOUT],
+      plots: [plot(2)],
+      expect: [
+        { after: null, t: 0, min: 3, max: 3 },
+        { after: { from: 1 }, t: 0, min: 1, max: 1 },
+        { after: 'kick', t: 0.1, min: null, max: 100 },
+      ],
+      stopAt: 2,
+    },
+    {
+      setup: 'data.qpos[0] = ctx.from',
+      controls: [set('data.ctrl[0]'), run('data.qvel[0] += 1'), '{set: ({ctx}, value) => { ctx.from = value }}'],
+      readouts: ['data.qpos[0]', '"text"'],
+      plots: [['data.qpos[0]', 'lib.energy().total']],
+      expect: ['data.qpos[0]', 'data.qpos[0]', 'data.qvel[0]'],
+    },
+  )
+  assert.deepEqual(told(reply), [])
+  assert.deepEqual(
+    reply.tried.map(({ entry, what }) => `${entry.join('.')}: ${what}`),
+    [
+      ': start',
+      'controls.0: "torque" at its minimum -0.5',
+      'controls.0: "torque" at its maximum 0.5',
+      'controls.0: "torque" at its value 0.1',
+      'controls.1: button "kick"',
+      'controls.2: "from" at "low"',
+      'controls.2: "from" at "high"',
+      'expect.0: claims from the start',
+      'expect.1: claims with "from" at 1',
+      'expect.2: claims after "kick"',
+    ],
+  )
+  const { main } = reply
+  assert.deepEqual([main.stopped, main.steps, main.resetDiffers], ['stopAt', 1000, null])
+  assert.ok(Math.abs(main.seconds - 2) < 1e-9)
+  assert.equal(main.plots.times.length, 126)
+  assert.deepEqual(main.plots.plots.map((traces) => traces.map((values) => values.length)), [[126, 126]])
+  assert.deepEqual(main.pictures.map(({ readouts }) => readouts[1]), ['text', 'text'])
+  assert.equal(main.pictures[0].readouts[0], 3)
+  assert.equal(main.scene.geoms[0].name, 'bob')
+  assert.equal(reply.version, engine.version)
+  assert.ok(reply.stepsPerSecond > 0)
+})
+
+test('the same request gives the same reply', () => {
+  const one = () => {
+    const reply = attempt(PENDULUM, { key: 'up', plots: [plot(1)], seed: 5 }, {
+      controller: 'data.ctrl[0] = lib.random()',
+      plots: [['data.qpos[0]']],
+    })
+    return JSON.stringify({ ...reply, stepsPerSecond: 0 })
+  }
+  assert.equal(one(), one())
+})
+
+test('each way to be wrong, with its entry', () => {
+  const cases = [
+    [{}, { setup: 'nowhere.x = 1' }, [['setup', 'throws', 'ReferenceError: nowhere is not defined', 0]]],
+    [{}, { setup: 'oops = 1' }, [['setup', 'throws', 'ReferenceError: oops is not defined', 0]]],
+    [{}, { controller: 'lib.sitePos("none")' }, [['controller', 'throws', 'Error: the model has no site "none"', 0]]],
+    [{ readouts: READOUT }, { readouts: ['data.qpos[99]'] }, [['readouts.0.expr', 'type', 'gives undefined, not a number or a text', 0]]],
+    [{ readouts: READOUT }, { readouts: ['0 / 0'] }, [['readouts.0.expr', 'nan', 'is NaN', 0]]],
+    [{ readouts: READOUT }, { readouts: ['1 / (0.1 - Math.min(0.1, data.time))'] }, [['readouts.0.expr', 'nan', 'is Infinity', 0.1]]],
+    [{ plots: [plot(2)] }, { plots: [['1', '"x"']] }, [['plots.0.traces.1.expr', 'type', 'gives the text "x", not a number', 0]]],
+    [{ plots: [plot(1)] }, { plots: [['NaN']] }, [['plots.0.traces.0.expr', 'nan', 'is NaN', 0]]],
+    [{ expect: [{ after: null, t: 1, min: 0, max: null }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /^is -3\.9\d* at 1 s, less than 0$/, 1]]],
+    [{ expect: [{ after: null, t: 1, min: null, max: -5 }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /more than -5$/, 1]]],
+    [{ expect: [{ after: null, t: 0, min: 0, max: 1 }] }, { expect: ['"0.5"'] }, [['expect.0.expr', 'type', 'gives the text "0.5", not a number', 0]]],
+    [{ expect: [{ after: 'nothing', t: 0, min: 0, max: 1 }] }, { expect: ['0'] }, [['expect.0', 'throws', 'there is no control "nothing"', 0]]],
+    [{ key: 'none' }, {}, [['', 'throws', 'the model has no keyframe "none"', null]]],
+    [{ trail: 'none' }, {}, [['', 'throws', 'the model has no site "none"', null]]],
+  ]
+  for (const [data, pieces, wanted] of cases) {
+    const found = told(attempt(FALLING, data, pieces, { seconds: 1 }))
+    const rounded = found.map(([entry, kind, message, at]) => [entry, kind, message, at === null ? null : Math.round(100 * at) / 100])
+    const what = JSON.stringify([data, pieces])
+    assert.equal(rounded.length, wanted.length, `${what}: ${JSON.stringify(rounded)}`)
+    rounded.forEach((failure, i) => {
+      const [entry, kind, message, at] = wanted[i]
+      assert.deepEqual([failure[0], failure[1], failure[3]], [entry, kind, at], what)
+      if (message instanceof RegExp) assert.match(failure[2], message)
+      else assert.equal(failure[2], message, what)
+    })
+  }
+})
+
+test('a control that only fails at an end', () => {
+  const reply = attempt(
+    FALLING,
+    { controls: [control({ label: 'g', min: 0, max: 1e9, value: 10 }), control({ label: 'b', type: 'button' })], readouts: READOUT },
+    {
+      controls: [set('model.opt.gravity[2]'), run('data.qpos[2] = NaN')],
+      readouts: ['data.qpos[2] > 1e6 ? lib.none() : 1'],
+    },
+    { seconds: 0.1 },
+  )
+  const failures = reply.failures.map(({ entry, kind, during }) => [entry.join('.'), kind, during.what])
+  assert.deepEqual(failures, [
+    ['readouts.0.expr', 'throws', '"g" at its maximum 1000000000'],
+    ['controls.1', 'diverged', 'button "b"'],
+  ])
+})
+
+test('warnings and divergence', () => {
+  const reply = attempt(PENDULUM, {}, { controller: 'if (data.time > 0.1) data.ctrl[0] = NaN' }, { seconds: 1 })
+  assert.deepEqual(reply.failures.map(({ kind }) => kind), ['warning'])
+  assert.ok(reply.failures[0].at > 0.1 && reply.failures[0].at < 0.11)
+  const blown = attempt(FALLING, {}, { controller: 'if (data.time > 0.1) data.qvel[2] = 1e12' }, { seconds: 1 })
+  assert.deepEqual(blown.failures.map(({ kind, entry }) => [kind, entry]), [['diverged', []]])
+  assert.ok(blown.main.seconds < 0.2)
+})
+
+test('a trial that takes too long says so', () => {
+  const reply = attempt(FALLING, {}, {}, { seconds: 1000, wall: 0.005 })
+  assert.deepEqual(told(reply).map(([, kind]) => kind), ['timeout'])
+})
+
+test('a reset that does not lead back is noticed', () => {
+  const reply = attempt(FALLING, {}, { setup: 'data.qvel[0] = Math.random()' }, { seconds: 0.1 })
+  assert.match(reply.main.resetDiffers, /^number 8 of the state is 0\.\d+ after a reset, and was 0\.\d+$/)
+})
+
+test('a model that does not load', () => {
+  const reply = runTrial(engine, { config: config(), code: '({controls: [], readouts: [], plots: [], expect: []})' }, new Uint8Array(9), () => 0)
+  assert.deepEqual(told(reply), [['', 'engine', 'the model does not load: Failed to load from mjb', null]])
+  assert.equal(reply.main, null)
+})
+
+test('what parity needs: the start, what a controller wrote, and the way', () => {
+  const { main } = attempt(PENDULUM, { key: 'up' }, { controller: 'data.ctrl[0] = Math.round(5 * data.time) % 2' }, { seconds: 1 })
+  const { parity } = main
+  const array = ({ type, data }) => {
+    const bytes = fromBase64(data)
+    const kinds = { f64: Float64Array, i32: Int32Array, u32: Uint32Array }
+    return [...new kinds[type](bytes.buffer, bytes.byteOffset, bytes.byteLength / kinds[type].BYTES_PER_ELEMENT)]
+  }
+  assert.deepEqual([parity.steps, parity.stride, parity.width, parity.complete, parity.modelChanged], [500, 1, 2, true, false])
+  assert.equal(array(parity.checksums).length, 500)
+  assert.equal(array(parity.states).length, 1000)
+  const writes = array(parity.writes.steps)
+  assert.equal(writes.length, 5, 'only what has changed')
+  assert.deepEqual(array(parity.writes.values), [1, 0, 1, 0, 1])
+  assert.equal(new Set(array(parity.writes.indices)).size, 1)
+  const last = array(parity.states).slice(-2)
+  assert.equal(crc32(new Float64Array(last), 0), array(parity.checksums).at(-1))
+  const changing = attempt(PENDULUM, {}, { controller: 'model.dof_damping[0] = data.time' }, { seconds: 0.1 })
+  assert.equal(changing.main.parity.modelChanged, true)
+  assert.equal(attempt(PENDULUM, {}, {}, { seconds: 0.1, parity: false }).main.parity, null)
+})
+
+test('base64 there and back, with and without the functions of the engine', () => {
+  assert.equal(toBase64(new Uint8Array([])), '')
+  for (const length of [0, 1, 2, 3, 4, 255, 0x3000, 0x3001, 100_000]) {
+    const bytes = Uint8Array.from({ length }, (_, i) => (i * 167 + (i >> 8)) & 255)
+    const text = toBase64(bytes)
+    assert.equal(text, Buffer.from(bytes).toString('base64'))
+    assert.deepEqual(fromBase64(text), bytes)
+  }
+  assert.equal(toBase64(new Float64Array([1.5]).subarray(0, 1)), Buffer.from(new Float64Array([1.5]).buffer).toString('base64'))
+})
+
+test('CRC-32 is that of zlib', () => {
+  assert.equal(crc32(new TextEncoder().encode('123456789'), 0), 0xcbf43926)
+  assert.equal(crc32(new TextEncoder().encode('6789'), crc32(new TextEncoder().encode('12345'), 0)), 0xcbf43926)
+})
