@@ -16,7 +16,7 @@ the only module that counts lines.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -118,6 +118,10 @@ class Span:
         return self.source is other.source and self.start <= other.start and other.end <= self.end
 
 
+def _text_offset(piece: tuple[int, int]) -> int:
+    return piece[0]
+
+
 @dataclass(frozen=True, slots=True)
 class Excerpt:
     """Text out of a source; its pieces say where each part of the text stands."""
@@ -147,7 +151,7 @@ class Excerpt:
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""
-        i = bisect_right(self.pieces, at, key=lambda piece: piece[0]) - 1
+        i = bisect_right(self.pieces, at, key=_text_offset) - 1
         text_at, source_at = self.pieces[max(i, 0)]
         return min(source_at + (at - text_at), len(self.source.text))
 
@@ -161,7 +165,9 @@ class Excerpt:
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
         end = len(self.text) if end is None else end
-        inner = [(t - start, s) for t, s in self.pieces if start < t < end]
+        first = bisect_right(self.pieces, start, key=_text_offset)
+        last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
+        inner = ((t - start, s) for t, s in self.pieces[first:last])
         return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)), *inner))
 
     def lines(self) -> tuple[Excerpt, ...]:

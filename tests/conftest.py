@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# No deadlines: a slow machine is no mistake. A change is judged by the same examples each time it is
-# judged; whoever works on the code meets new ones with every run.
+# No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
+# whoever works on the code meets new ones with every run.
 settings.register_profile("work", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", settings.get_profile("work"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "work")

@@ -37,8 +37,9 @@ class JsonChild:
     def __init__(self, script: str, seconds: float) -> None:
         self._script = script
         self._seconds = seconds
-        self._folder = tempfile.TemporaryDirectory(prefix="coursebuild-")
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._process: subprocess.Popen[bytes] | None = None
+        self._interrupted = False
         self._buffer = b""
 
     def __enter__(self) -> Self:
@@ -51,16 +52,20 @@ class JsonChild:
         traceback: TracebackType | None,
     ) -> None:
         self.stop()
-        self._folder.cleanup()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
 
     def ask(self, request: Any) -> Any:
         """The child's answer; `None` if it died, or said nothing for too long.
 
         Raises:
-            EffectError: MuJoCo cannot be loaded.
+            EffectError: MuJoCo cannot be loaded, or somebody interrupted.
         """
         process = self._process or self._start()
         assert process.stdin is not None
+        if self._interrupted:
+            raise EffectError("interrupted")
         with contextlib.suppress(BrokenPipeError):  # it died; reading tells
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
@@ -79,6 +84,12 @@ class JsonChild:
                 with contextlib.suppress(BrokenPipeError):
                     pipe.close()
 
+    def interrupt(self) -> None:
+        """From another thread: end the child; what it is asked gets no answer any more."""
+        self._interrupted = True
+        if (process := self._process) is not None:
+            process.kill()
+
     def death(self) -> str:
         """What ended the child, after it gave no answer."""
         assert self._process is not None
@@ -93,6 +104,8 @@ class JsonChild:
         return f"ended with status {status}"
 
     def _start(self) -> subprocess.Popen[bytes]:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="coursebuild-")
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
                 [sys.executable, "-E", "-P", self._script],

@@ -9,6 +9,8 @@ much memory: such a trial is told as what it is, and takes no other along.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import functools
 import hashlib
 import json
@@ -18,7 +20,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from coursebuild.effects.resources import assets_dir
-from coursebuild.effects.v8 import Isolate, LimitError
+from coursebuild.effects.v8 import Isolate, LimitError, ScriptError
 
 _MEMORY = 1 << 30
 """Bytes: the engine's WebAssembly memory counts."""
@@ -32,6 +34,7 @@ class LabEngine:
 
     def __init__(self) -> None:
         self._isolate: Isolate | None = None
+        self._stopped = False
         self.version = ""
 
     def __enter__(self) -> Self:
@@ -51,35 +54,54 @@ class LabEngine:
             self._isolate.close()
             self._isolate = None
 
-    def mistakes(self, pieces: Sequence[tuple[str, str]]) -> list[str | None]:
-        """For each piece of code and its form: why it is no JavaScript, or `None`."""
-        isolate = self._isolate or self._start()
-        request = json.dumps([{"code": code, "form": form} for code, form in pieces])
+    def stop(self) -> None:
+        """From another thread: end what runs, and all that comes after, by a cancellation there."""
+        self._stopped = True
+        if self._isolate is not None:
+            self._isolate.stop()
+
+    def mistakes(self, pieces: Sequence[tuple[str, str, str, bool]]) -> list[str | None]:
+        """For each piece of code: why it cannot be part of a lab, or `None`.
+
+        A piece is its code, its form, the function that it becomes, and whether it reads `value`.
+        """
+        isolate = self._ready()
+        names = ("code", "form", "text", "takesValue")
+        request = json.dumps([dict(zip(names, piece, strict=True)) for piece in pieces])
         found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
         return found
 
     def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
         """The reply to a trial's request; `wall` is how many seconds it may take.
 
-        A trial that had to be stopped gives a reply with one failure, of the kind `timeout`.
+        A trial that had to be stopped gives a reply with one failure, of the kind `timeout`, at the
+        entry whose code was running.
         """
-        isolate = self._isolate or self._start()
+        isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
             text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + _MARGIN)
         except LimitError as error:
+            entry = _running(isolate) if error.resumable else []
             self.close()
-            failure: dict[str, Any] = {
-                "entry": [],
-                "kind": "timeout",
-                "message": str(error),
-                "at": None,
-            }
-            return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
+            return self._ended("timeout", entry, str(error))
+        except ScriptError as error:  # lab code has broken what all share
+            self.close()
+            return self._ended("engine", [], f"the trial broke: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] == "engine" for failure in reply["failures"]):
             self.close()  # what ended in the middle of something cannot be trusted with the rest
         return reply
+
+    def _ended(self, kind: str, entry: list[str | int], message: str) -> dict[str, Any]:
+        failure = {"entry": entry, "kind": kind, "message": message, "at": None}
+        return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
+
+    def _ready(self) -> Isolate:
+        isolate = self._isolate or self._start()
+        if self._stopped:  # before there was anything to stop
+            raise asyncio.CancelledError
+        return isolate
 
     def _start(self) -> Isolate:
         folder = assets_dir()
@@ -90,6 +112,15 @@ class LabEngine:
         isolate.call("boot", "", _START_SECONDS)
         self.version = isolate.call("booted", "", _START_SECONDS)
         return isolate
+
+
+def _running(isolate: Isolate) -> list[str | int]:
+    """The entry whose code was running when a trial was stopped; empty where none was."""
+    with contextlib.suppress(LimitError, ScriptError):
+        told = json.loads(isolate.call("trying", "", _MARGIN))
+        found: list[str | int] = told["entry"] or told["trying"] or []
+        return found
+    return []
 
 
 @functools.lru_cache(maxsize=1)

@@ -1,26 +1,38 @@
 /**
- * Does each piece of lab code parse by itself? Called by `lab_engine.py` in V8: JSON in, JSON out.
+ * Is each piece of lab code one of the kind that it should be? Called by `lab_engine.py` in V8: JSON in, JSON out.
  *
- * A piece that only parses together with what is put around it could end its function and begin another; an expression must
- * therefore parse between round and between square brackets.
+ * 1. It must parse by itself: one that only parses together with what is put around it could end its function and begin another.
+ *    An expression must therefore parse between round and between square brackets.
+ * 2. It must parse as the function that it becomes. No function is called.
+ * 3. It must mean the same in a module, where `await` is a reserved word and `<!--` is no comment, and in the trial's script.
  */
 
-globalThis.parsePieces = (json) => {
-  const NAMES = ['model', 'data', 'mj', 'sim', 'ctx', 'lib', 'value']
-  const bodies = {
-    statements: (code) => [code],
-    expression: (code) => [`return (${code}\n)`, `return [${code}\n]`],
-    target: (code) => [`(${code}\n) = value`, `[${code}\n] = value`],
-  }
-  const mistake = ({ code, form }) => {
-    for (const body of bodies[form](code)) {
-      try {
-        new Function(...NAMES, `"use strict"; ${body}`)
-      } catch (error) {
-        return error.message
-      }
-    }
-    return null
-  }
-  return JSON.stringify(JSON.parse(json).map(mistake))
+const SEEN = ['model', 'data', 'mj', 'sim', 'ctx', 'lib']
+const BODIES = {
+  statements: (code) => [code],
+  expression: (code) => [`return (${code}\n)`, `return [${code}\n]`],
+  target: (code) => [`(${code}\n) = value`, `[${code}\n] = value`],
 }
+const QUOTED = /\/\*[^]*?\*\/|\/\/.*|'(?:\\[^]|[^'\\\n])*'|"(?:\\[^]|[^"\\\n])*"/g
+const NOT_IN_MODULES = [
+  [/\bawait\b/, '`await` has no place in lab code, which never waits'],
+  [/<!--|^\s*-->/m, '`<!--` and `-->` begin a comment in some places only; put a space into it'],
+]
+
+function mistake({ code, form, text, takesValue }) {
+  const names = takesValue ? [...SEEN, 'value'] : SEEN
+  try {
+    for (const body of BODIES[form](code)) new Function(...names, `"use strict"; ${body}`)
+    ;(0, eval)(`"use strict"; (${text})`)
+  } catch (error) {
+    return error.message
+  }
+  // The places of comments are where these are not in quotes; a line end keeps its place.
+  const bare = code.replace(QUOTED, (quoted) => (quoted.startsWith('/') ? quoted.replace(/[^\n]/g, ' ') : '""'))
+  for (const [pattern, message] of NOT_IN_MODULES) if (pattern.test(bare)) return message
+  if (/\barguments\b/.test(bare) && !/\bfunction\b/.test(bare)) return '`arguments` belongs to no function here'
+  if (form === 'target' && /^[\w$\s]+$/.test(bare)) return 'only a field of something can be set, as in `model.opt.timestep`'
+  return null
+}
+
+globalThis.parsePieces = (json) => JSON.stringify(JSON.parse(json).map(mistake))

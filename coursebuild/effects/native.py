@@ -6,15 +6,20 @@ Entry point: `NativeEngine`, a context manager around a child process.
 from __future__ import annotations
 
 import base64
+import functools
+import hashlib
 from pathlib import Path
 from typing import Any
 
 from coursebuild.effects import native_worker
 from coursebuild.effects.child import JsonChild
-from coursebuild.effects.errors import EffectError
 
 _TIMEOUT = 120.0
 """Seconds for one model, or one run."""
+
+
+class NativeError(Exception):
+    """Native MuJoCo did not do what it was asked; the text says why."""
 
 
 class NativeEngine(JsonChild):
@@ -27,28 +32,38 @@ class NativeEngine(JsonChild):
     def save(self, path: str, text: str) -> bytes:
         """A model as an MJB file, of a text that stands, or would stand, at a path of the course.
 
+        The same text and files give the same bytes wherever the course lies.
+
         Raises:
-            EffectError: it does not compile (which has been found before), or the child died.
+            NativeError: it does not compile (which has been found before), or the child died.
+            EffectError: MuJoCo cannot be loaded.
         """
         request = {"task": "save", "path": str(self._root / path), "text": text}
-        return base64.b64decode(self._told(request, path)["mjb"])
+        return base64.b64decode(self._told(request)["mjb"])
 
-    def parity(self, mjb: bytes, run: dict[str, Any], horizon: int, name: str) -> dict[str, Any]:
+    def parity(self, mjb: bytes, run: dict[str, Any], horizon: int) -> dict[str, Any]:
         """A recorded run of the browser's engine, repeated: where and by how much it differs.
 
         `run` is the `parity` part of a trial's reply; the size of a difference counts up to the
         step `horizon`.
 
         Raises:
-            EffectError: the child died.
+            NativeError: the model cannot be loaded, or the child died.
+            EffectError: MuJoCo cannot be loaded.
         """
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
-        return self._told({"task": "parity", "mjb": model, "run": run, "horizon": horizon}, name)
+        return self._told({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
 
-    def _told(self, request: dict[str, Any], name: str) -> dict[str, Any]:
+    def _told(self, request: dict[str, Any]) -> dict[str, Any]:
         reply: dict[str, Any] | None = self.ask({**request, "limit": _TIMEOUT})
         if reply is None:
-            raise EffectError(f"{name}: MuJoCo {self.death()}")
+            raise NativeError(self.death())
         if reply["error"]:
-            raise EffectError(f"{name}: {reply['error']}")
+            raise NativeError(f"says: {reply['error'].strip()}")
         return reply
+
+
+@functools.lru_cache(maxsize=1)
+def native_digest() -> str:
+    """A hash of how a run is repeated and compared."""
+    return hashlib.sha256(Path(native_worker.__file__).read_bytes()).hexdigest()

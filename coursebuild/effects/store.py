@@ -1,6 +1,6 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `kept(root, kind, key, make)`.
+Entry points: `kept(root, kind, key, make)`; `load` and `keep`, its two halves.
 
 An entry begins with the hash of what follows, so that one which was cut or flipped is made again
 instead of served. Nothing is lost when the folder is deleted.
@@ -22,17 +22,29 @@ _DIGEST = hashlib.sha256().digest_size
 
 def kept(root: Path, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
     """The result of this kind and key: from the store, or made now and kept."""
-    path = root / ".coursebuild" / kind / key
+    found = load(root, kind, key)
+    if found is None:
+        found = make()
+        keep(root, kind, key, found)
+    return found
+
+
+def load(root: Path, kind: str, key: str) -> bytes | None:
+    """The result of this kind and key, if it is in the store and whole."""
     with contextlib.suppress(OSError):
-        data = path.read_bytes()
+        data = (root / ".coursebuild" / kind / key).read_bytes()
         if data[:_DIGEST] == hashlib.sha256(data[_DIGEST:]).digest():
             return data[_DIGEST:]
-    made = make()
-    with contextlib.suppress(OSError):  # a store that cannot be written only costs time
+    return None
+
+
+def keep(root: Path, kind: str, key: str, data: bytes) -> None:
+    """Put a result into the store; one that cannot be written only costs time."""
+    with contextlib.suppress(OSError):
         make_private_folder(root / ".coursebuild")
+        path = root / ".coursebuild" / kind / key
         path.parent.mkdir(exist_ok=True)
-        _write(path, hashlib.sha256(made).digest() + made)
-    return made
+        _write(path, hashlib.sha256(data).digest() + data)
 
 
 def _write(path: Path, data: bytes) -> None:

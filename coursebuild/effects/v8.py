@@ -11,6 +11,7 @@ Entry points: `MathEngine.typeset`; `Isolate`, for other scripts.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import re
 import threading
@@ -36,7 +37,18 @@ _LONGEST_MESSAGE = 160
 
 
 class LimitError(Exception):
-    """A script ran too long or took too much memory; its isolate cannot be used any more."""
+    """A script ran too long or took too much memory; its isolate should not be used any more.
+
+    `resumable`: it can still be asked how far it came.
+    """
+
+    def __init__(self, message: str, *, resumable: bool) -> None:
+        super().__init__(message)
+        self.resumable = resumable
+
+
+class ScriptError(Exception):
+    """A script threw; the text is its message."""
 
 
 class Isolate:
@@ -59,11 +71,25 @@ class Isolate:
 
         Raises:
             LimitError: it ran for more than `seconds`, or took too much memory.
+            ScriptError: it threw.
         """
         result = self._evaluate(f"{function}({json.dumps(argument)})", seconds)
         if not isinstance(result, str):
             raise TypeError(f"{function} returned {type(result).__name__}, not a string")
         return result
+
+    def stop(self) -> None:
+        """From another thread: end what runs, by an `asyncio.CancelledError` there.
+
+        Where nothing runs at this moment, it ends what runs next.
+        """
+
+        def cancel() -> None:
+            for task in asyncio.all_tasks():
+                task.cancel()
+
+        with contextlib.suppress(RuntimeError):  # it is closed already
+            self._runner.get_loop().call_soon_threadsafe(cancel)
 
     def fill(self, name: str, data: bytes) -> None:
         """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
@@ -73,7 +99,7 @@ class Isolate:
         place[:] = data
 
     def _evaluate(self, code: str, seconds: float) -> object:
-        from py_mini_racer import JSOOMException
+        from py_mini_racer import JSEvalException, JSOOMException
 
         async def evaluate() -> object:
             return await asyncio.wait_for(self._context.eval_cancelable(code), seconds)
@@ -81,9 +107,13 @@ class Isolate:
         try:
             return self._runner.run(evaluate())
         except TimeoutError:
-            raise LimitError(f"ran for more than {seconds:g} s") from None
+            raise LimitError(f"ran for more than {seconds:g} s", resumable=True) from None
         except JSOOMException:
-            raise LimitError(f"took more than {self._memory >> 20} MiB") from None
+            raise LimitError(
+                f"took more than {self._memory >> 20} MiB", resumable=False
+            ) from None
+        except JSEvalException as error:
+            raise ScriptError(str(error)) from None
 
 
 async def _make_context() -> MiniRacer:

@@ -7,8 +7,9 @@ Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
    `value`. A module is strict, so a misspelt assignment is an error and no new global.
 2. The same functions serve the browser's worker (`code`, a module) and the trial (`literal`, an
    expression). A page needs no `eval`, so its policy can forbid it.
-3. A piece is put into the module only when it parses by itself (`pieces` gives the trial what to
-   try), so that no piece can end its function and begin another.
+3. A piece is put into the module only when it parses by itself and as the function that it becomes
+   (`pieces` gives what to try), so that no piece can end its function and begin another, and none
+   keeps the others from loading.
 """
 
 from __future__ import annotations
@@ -40,6 +41,15 @@ class Piece:
     takes_value: bool = False
     """Whether it reads `value`."""
 
+    @property
+    def function(self) -> str:
+        """It as it stands in the module, a function."""
+        if self.form == "target":
+            return _setter(f"({self.code}\n) = value;")
+        if self.form == "expression":
+            return _expression(self.code)
+        return _setter(self.code) if self.takes_value else _statements(self.code)
+
 
 @dataclass(frozen=True, slots=True)
 class LabModule:
@@ -63,7 +73,7 @@ def pieces(lab: Lab) -> tuple[Piece, ...]:
 def _pieces(lab: Lab) -> Iterator[Piece]:
     for name, code in (("setup", lab.setup), ("controller", lab.controller)):
         if code:
-            yield Piece((name,), "statements", code, lab.span.first_line())
+            yield Piece((name,), "statements", code, lab.span)
     for i, control in enumerate(lab.controls):
         if control.set is not None:
             yield Piece(("controls", i, "set"), "target", control.set, control.span, True)
@@ -107,9 +117,9 @@ def _control(control: LabControl) -> str:
     if control.run is not None:
         return "{run: " + _statements(control.run) + "}"
     if control.set is not None:
-        return f"{{set: ({_NAMES}, value) => {{ ({control.set}\n) = value; }}}}"
+        return "{set: " + _setter(f"({control.set}\n) = value;") + "}"
     if control.apply is not None:
-        return f"{{set: ({_NAMES}, value) => {{ {control.apply}\n}}}}"
+        return "{set: " + _setter(control.apply) + "}"
     name = json.dumps(control.param or control.label)
     return f"{{set: ({{ctx}}, value) => {{ ctx[{name}] = value; }}}}"
 
@@ -117,6 +127,10 @@ def _control(control: LabControl) -> str:
 # A line end closes a comment with which a piece may end.
 def _statements(code: str) -> str:
     return f"({_NAMES}) => {{ {code}\n}}"
+
+
+def _setter(code: str) -> str:
+    return f"({_NAMES}, value) => {{ {code}\n}}"
 
 
 def _expression(code: str) -> str:

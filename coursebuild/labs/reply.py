@@ -47,7 +47,7 @@ def read_trial(reply: dict[str, Any]) -> Trial:
         Failure(
             tuple(failure["entry"]),
             failure["kind"],
-            failure["message"],
+            failure.get("message") or "something that has no text",
             failure["at"],
             (failure.get("during") or {}).get("what", ""),
         )

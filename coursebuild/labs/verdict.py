@@ -43,72 +43,111 @@ class Parity:
     """Largest difference relative to the largest number of the state, where it counts."""
 
     def within(self, rtol: float | None) -> bool:
-        """Whether the difference is allowed."""
-        return self.first is None or self.relative <= (PARITY_RTOL if rtol is None else rtol)
+        """Whether the difference is allowed; an `rtol` of 0 allows none of any size."""
+        allowed = PARITY_RTOL if rtol is None else rtol
+        return self.first is None or (allowed > 0 and self.relative <= allowed)
 
     def describe(self) -> str:
         """For people."""
         if self.first is None:
             return f"bit-identical to native MuJoCo over {self.steps} steps"
-        return f"differs from native MuJoCo from step {self.first}, by {self.relative:.1e}"
+        same = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
+        return f"{same}, then within {self.relative:.0e}" if self.relative > 0 else same
 
 
 def entry_span(lab: Lab, entry: Entry) -> Span:
-    """Where an entry of a lab stands: the smallest one that is known."""
+    """Where an entry of a lab stands: the value itself, or the nearest around it that is known."""
+    places = dict(lab.places)
+    inner = {"controls": ("set", "apply", "run", "label"), "expect": ("expr",)}
+    for name in inner.get(str(entry[0]), ()) if len(entry) == 2 else ():
+        if (*entry, name) in places:
+            return places[(*entry, name)].first_line()
+    for end in range(len(entry), 0, -1):
+        if entry[:end] in places:
+            return places[entry[:end]].first_line()
+    return lab.span.first_line()
+
+
+def _named(lab: Lab, entry: Entry) -> str:
+    """An entry in words, by the name that a reader of the page knows."""
     match entry:
         case ("controls", int(i), *_) if i < len(lab.controls):
-            return lab.controls[i].span.first_line()
+            control = lab.controls[i]
+            return f"the {'button' if control.kind == 'button' else 'control'} `{control.label}`"
         case ("readouts", int(i), *_) if i < len(lab.readouts):
-            return lab.readouts[i].span.first_line()
+            return f"the readout `{lab.readouts[i].label}`"
         case ("plots", int(i), "traces", int(j), *_) if i < len(lab.plots):
-            return lab.plots[i].traces[j].span.first_line()
-        case ("plots", int(i), *_) if i < len(lab.plots):
-            return lab.plots[i].span.first_line()
+            return f"the trace `{lab.plots[i].traces[j].label}`"
         case ("expect", int(i), *_) if i < len(lab.expect):
-            return lab.expect[i].span.first_line()
+            return "the claim"
+        case (str(name),):
+            return f"`{name}`"
         case _:
-            return lab.span.first_line()
+            return "the lab"
 
 
-def _named(entry: Entry) -> str:
-    """An entry in words: `controls[2].set`."""
-    text = ""
-    for part in entry:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text or "the lab"
+def code_diagnostic(lab: Lab, piece: Piece, message: str) -> Diagnostic:
+    """A piece of code that cannot be part of a lab."""
+    message = message[:1].lower() + message[1:].rstrip(".")
+    what = f"{_named(lab, piece.entry)} has code that cannot run: {message}"
+    return diagnose("lab-code", entry_span(lab, piece.entry), what, help=_HELP[piece.form])
 
 
-def code_diagnostic(piece: Piece, message: str) -> Diagnostic:
-    """A piece of code that does not parse."""
-    what = f"`{_named(piece.entry)}` is no JavaScript: {message}"
-    return diagnose("lab-code", piece.span.first_line(), what, label=_short(piece.code))
+_HELP = {
+    "statements": "",
+    "expression": "an expression has a value and no `;`, as in `data.qpos[0]`",
+    "target": "it must be something that can be assigned to, as `model.opt.timestep`",
+}
 
 
 def trial_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
-    """Each failure of a trial, at its entry."""
-    return tuple(_failure(lab, failure) for failure in trial.failures)
+    """Each failure of a trial, at its entry.
+
+    What MuJoCo says of the main run it says again of every act; once is enough.
+    """
+    always = {f.kind for f in trial.failures if f.entry == () and f.kind in _OF_MUJOCO}
+    failures = [f for f in trial.failures if f.entry == () or f.kind not in always]
+    return tuple(_failure(lab, failure) for failure in failures)
+
+
+_OF_MUJOCO = ("warning", "diverged")
 
 
 def _failure(lab: Lab, failure: Failure) -> Diagnostic:
-    name = _named(failure.entry)
+    name = _named(lab, failure.entry)
     when = "" if failure.time is None else f" at t = {failure.time:.6g} s"
-    tried = f"while trying {failure.during}" if failure.during not in ("", "start") else ""
+    tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
     message = failure.message.rstrip(".")
+    help = ""
     match failure.kind:
         case "throws":
-            text = f"`{name}` throws: {message}"
+            text = f"{name} throws {message}{when}"
         case "nan" | "type":
-            text = f"`{name}` {message}{when}"
+            text = f"{name} {message}{when}"
         case "warning":
             text = f"MuJoCo warns{when}: {message}"
         case "diverged":
             text = f"the simulation diverges{when}: {message}"
+            help = "try a smaller `timestep`, another integrator, or a narrower range"
         case "expect":
-            text = f"the claim does not hold: `{name}` {message}"
+            text = f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}"
+        case "timeout":
+            text = f"{name} {message}"
+            if name == "the lab":
+                text = f"trying the lab took too long: it {message}"
+            help = "shorten what is run with `verify`: {`seconds`: …}, or look for an endless loop"
         case _:
             text = message
     span = entry_span(lab, failure.entry)
-    return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried)
+    return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
+
+
+def _claim(lab: Lab, entry: Entry) -> str:
+    match entry:
+        case ("expect", int(i), *_) if i < len(lab.expect):
+            return _short(lab.expect[i].expr)
+        case _:
+            return "the claim"
 
 
 def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
@@ -119,9 +158,11 @@ def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
     allowed = PARITY_RTOL if lab.verify_rtol is None else lab.verify_rtol
     yield diagnose(
         "lab-parity",
-        lab.span.first_line(),
-        f"the browser's engine {parity.describe()} (t = {time:.6g} s), and {allowed:g} is allowed",
-        help='if the motion is chaotic say how much is, in "verify": {"rtol": …, "seconds": …}',
+        entry_span(lab, ("verify", "rtol")),
+        f"the browser's engine and native MuJoCo part at step {parity.first} (t = {time:.6g} s), "
+        f"by up to {parity.relative:.1e} of the state, and {allowed:g} is allowed",
+        help="a controller that changes `model` while it runs cannot be repeated natively; where "
+        'the motion is chaotic say how far it may part: `"verify": {"rtol": …, "seconds": …}`',
     )
 
 

@@ -129,6 +129,8 @@ class Lab:
     verify_seconds: float | None
     verify_rtol: float | None
     trail_span: Span | None = None
+    places: tuple[tuple[tuple[str | int, ...], Span], ...] = ()
+    """Where each value of the JSON stands, by the way to it: `("controls", 2, "set")`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Trying every lab of a course: models → V8 and native MuJoCo → results and diagnostics.
 
-Entry point: `try_labs(course, models, options)`.
+Entry point: `try_labs(course, models, options, engine)`.
 
 1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
 2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
@@ -57,6 +57,7 @@ def try_labs(
     course: Course,
     models: Mapping[str, CompileResult],
     options: Options,
+    engine: LabEngine,
     documents: frozenset[str] | None = None,
     wrong: Sequence[Diagnostic] = (),
 ) -> tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]:
@@ -81,7 +82,7 @@ def try_labs(
                 workshop = _Workshop(
                     options,
                     stack.enter_context(NativeEngine(options.root)),
-                    stack.enter_context(LabEngine()),
+                    stack.enter_context(engine),
                 )
             result, diagnostics = workshop.work(owner, name, lab, source)
             found += diagnostics

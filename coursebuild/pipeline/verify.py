@@ -22,6 +22,7 @@ from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.effects import mjcf
 from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
+from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
@@ -65,11 +66,16 @@ def verify(
         leaned_on = _leaned_on(course, documents)
         chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
     models, compiled = _compile(course, options, progress)
+    engine = LabEngine()
     with ThreadPoolExecutor(1, "labs") as beside:
-        trying = beside.submit(try_labs, course, dict(models), options, documents, compiled)
-        runs = run(chosen, options, progress)
-        with progress.stage("trying labs"):
-            labs, lab_findings = trying.result()
+        trying = beside.submit(try_labs, course, dict(models), options, engine, documents, compiled)
+        try:
+            runs = run(chosen, options, progress)
+            with progress.stage("trying labs"):
+                labs, lab_findings = trying.result()
+        except BaseException:  # Ctrl-C does not wait for a lab
+            engine.stop()
+            raise
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]
     found += script_findings(course, chosen, runs, verdicts)

@@ -10,7 +10,7 @@ Entry points: `parse_lab` (a fence), `sim_lab` (a lab that stands inside other J
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
@@ -38,7 +38,7 @@ from coursebuild.syntax.lab_schema import (
     SimLab,
     Slider,
 )
-from coursebuild.syntax.nodes import Node, ObjectNode, StringNode
+from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.syntax.prose import Prose
 from coursebuild.syntax.texts import TextParser
 from coursebuild.syntax.wording import JSON
@@ -118,6 +118,7 @@ def sim_lab(
         verify_seconds=verify.seconds if verify is not None else None,
         verify_rtol=verify.rtol if verify is not None else None,
         trail_span=_span(node, "trail"),
+        places=tuple(_places(node, ())),
     )
 
 
@@ -155,6 +156,18 @@ def _other_lab(
         verify_seconds=None,
         verify_rtol=None,
     )
+
+
+def _places(node: Node, way: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
+    """Every value inside a node, with the way to it."""
+    parts: list[tuple[str | int, Node]] = []
+    if isinstance(node, ObjectNode):
+        parts = [(member.key.value, member.value) for member in node.members]
+    elif isinstance(node, ArrayNode):
+        parts = list(enumerate(node.items))
+    for name, value in parts:
+        yield (*way, name), value.mark
+        yield from _places(value, (*way, name))
 
 
 def _span(node: ObjectNode, name: str) -> Span | None:

@@ -49,16 +49,20 @@ export class Connection {
 
   begin() {
     this.worker = this.start(this.url)
-    this.worker.onmessage = ({ data }) => this.lines.get(data.lab)?.(data)
+    this.worker.onmessage = ({ data }) => {
+      this.lines.get(data.lab)?.(data)
+      if (data.type === 'error' && data.fatal) this.fail('the engine has ended', data.lab)
+    }
     this.worker.onerror = (event) => this.fail(event.message ?? 'the worker does not start')
     this.worker.onmessageerror = () => this.fail('a message of the worker cannot be read')
   }
 
   // The engine's memory is gone with the worker: every lab has to be told, and the next one starts a new worker.
-  fail(message) {
+  fail(message, told = null) {
     this.worker?.terminate()
     this.worker = null
-    for (const receive of [...this.lines.values()]) {
+    for (const [id, receive] of [...this.lines]) {
+      if (id === told) continue
       receive({ type: 'error', message, entry: [], kind: 'worker', fatal: true })
     }
   }

@@ -1,2 +1,152 @@
-/** placeholder until written */
-export async function mountCustom() { throw new Error('not yet') }
+/**
+ * Labs of kinds that a course brings: `content/labs/NAME.js` with `mount(element, config, api)`. docs/labs.md is its manual.
+ */
+
+import { buildControls, buildReadouts } from './controls.js'
+import { h } from './dom.js'
+import { Notices } from './notices.js'
+import { formatReadout, formatTime } from './numbers.js'
+import { Plot } from './plots.js'
+import { Hands } from './pointer.js'
+import { watchSight } from './sight.js'
+import { Simulation } from './simulation.js'
+import { prefersStillness } from './support.js'
+import { buildTransport } from './transport.js'
+import { View } from './view.js'
+
+const HEIGHT = 240 // CSS pixels
+const PLAIN_PLOT = { xlabel: '', ylabel: '', window: null, ymin: null, ymax: null, height: null, refLines: [], traces: [], log: false }
+const PLAIN_LAB = {
+  key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, trail: null, seed: null,
+  controls: [], readouts: [], plots: [], expect: [],
+} // prettier-ignore
+const PLAIN_CONTROL = { type: 'slider', unit: '', min: 0, max: 1, step: null, value: null, digits: null, options: [], init: false, reset: false }
+
+/**
+ * Mount a lab with the course's own code.
+ *
+ * @returns {Promise<{dispose: () => void, restore?: (state: object) => void}>}
+ */
+export async function mountCustom(element, config, base, words) {
+  const { mount } = await import(new URL(config.module, base).href)
+  if (typeof mount !== 'function') throw new Error(`${config.kind}.js exports no function mount(element, config, api)`)
+  const body = h('div', { class: 'lab-live' })
+  const still = element.querySelector('.lab-static')
+  if (still !== null) still.before(body)
+  else element.append(body)
+  const kit = new Kit(element, body, config, base, words)
+  try {
+    const mounted = (await mount(body, config.data, kit.api())) ?? {}
+    element.classList.add('lab-on')
+    kit.finish()
+    return {
+      restore: mounted.restore,
+      dispose() {
+        mounted.dispose?.()
+        kit.dispose()
+      },
+    }
+  } catch (error) {
+    kit.dispose()
+    throw error
+  }
+}
+
+/** What a custom lab is given, and what must be taken back from it at the end. */
+class Kit {
+  constructor(element, body, config, base, words) {
+    Object.assign(this, { element, body, config, base, words })
+    this.notices = new Notices(words)
+    this.simulations = []
+    this.disposals = []
+    this.watchers = new Set()
+    this.seen = false
+    this.disposals.push(
+      watchSight(body, (seen) => {
+        this.seen = seen
+        this.simulations.forEach((simulation) => simulation.setVisible(seen))
+        this.watchers.forEach((watcher) => watcher(seen))
+      }),
+    )
+  }
+
+  api() {
+    const { words, notices } = this
+    return Object.freeze({
+      h,
+      words,
+      formatNumber: formatReadout,
+      formatTime,
+      createSimulation: (options) => this.simulation(options),
+      createPlot: (config) => this.plot(config),
+      createControls: (controls, actions) => buildControls(controls.map((control) => ({ ...PLAIN_CONTROL, ...control })), actions),
+      createReadouts: (readouts) => buildReadouts(readouts.map((readout) => ({ digits: null, ...readout })), formatReadout),
+      createTransport: (actions) => buildTransport(words, { full: null, ...actions }),
+      announce: (text) => notices.say(text),
+      notice: (text, kind = 'note') => (text === null ? notices.clear() : notices.show(text, kind)),
+      onVisible: (watcher) => {
+        this.watchers.add(watcher)
+        watcher(this.seen)
+        return () => this.watchers.delete(watcher)
+      },
+      prefersStillness,
+    })
+  }
+
+  /**
+   * Another simulation in the page's worker.
+   *
+   * @param {object} [options] fields of a simlab (`controls`, `plots`, …), and `on` (see simulation.js), `picture` (false: none),
+   *   `height` (px), `label` of the picture, `mjb` and `module` (addresses relative to the lab's JSON)
+   */
+  simulation(options = {}) {
+    const { on = {}, picture = true, height = HEIGHT, label = this.config.title, ...fields } = options
+    const { words, notices, config } = this
+    const number = this.simulations.length + 1
+    const lab = { ...PLAIN_LAB, ...pickAddresses(config), ...fields, id: `${config.id}/${number}`, kind: 'simlab' }
+    lab.controls = lab.controls.map((control) => ({ ...PLAIN_CONTROL, ...control }))
+    lab.plots = lab.plots.map((plot) => ({ ...PLAIN_PLOT, ...plot }))
+    const name = words('lab.live.view', { title: label })
+    const view = picture ? new View({ height, label: words('lab.live.picture', { title: label }), name }) : null
+    const simulation = new Simulation({
+      config: { ...lab, autoplay: lab.autoplay && !prefersStillness() },
+      base: this.base,
+      view,
+      on: {
+        diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
+        error: (error) => notices.failure(error, lab),
+        noPicture: () => view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
+        ...on,
+      },
+    })
+    if (view !== null) {
+      const keys = { ' ': () => (simulation.state === 'playing' ? simulation.pause() : simulation.play()), '.': () => simulation.step(), r: () => simulation.reset() }
+      const hands = new Hands(view, { pull: (request) => simulation.pull(request), keys })
+      this.disposals.push(() => hands.dispose())
+    }
+    simulation.element = view === null ? null : h('div', { class: 'lab-screen' }, view.element)
+    simulation.setVisible(this.seen)
+    this.simulations.push(simulation)
+    return simulation
+  }
+
+  plot(config) {
+    const plot = new Plot({ ...PLAIN_PLOT, ...config }, this.words)
+    this.disposals.push(() => plot.dispose())
+    return plot
+  }
+
+  /** After `mount`: the lines that tell something stand last. */
+  finish() {
+    this.body.append(this.notices.shown, this.notices.spoken)
+  }
+
+  dispose() {
+    for (const simulation of this.simulations.splice(0)) simulation.dispose()
+    for (const dispose of this.disposals.splice(0)) dispose()
+    this.body.remove()
+    this.element.classList.remove('lab-on')
+  }
+}
+
+const pickAddresses = ({ worker, wasm, module, mjb }) => ({ worker, wasm, module, mjb })

@@ -6,7 +6,7 @@
 import uPlot from 'uplot'
 import { h } from './dom.js'
 import { History } from './history.js'
-import { formatLabel } from './numbers.js'
+import { formatLabel, superscript } from './numbers.js'
 import { palette, watchTheme } from './palette.js'
 import { spread } from './spread.js'
 
@@ -14,10 +14,13 @@ const HEIGHT = 170 // CSS pixels
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
 const FONT = 11.5 // CSS pixels
 const GAP = 6
+const LINEAR = 1 // uPlot's kinds of scales
+const LOGARITHMIC = 3
+const MOST_POWERS = 6 // labels of a logarithmic axis
 
 export class Plot {
   /**
-   * @param {object} config a plot of the lab's JSON
+   * @param {object} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
    * @param {(key: string, values?: object) => string} words
    */
   constructor(config, words) {
@@ -88,11 +91,11 @@ export class Plot {
       cursor: { show: false },
       scales: {
         x: { time: false, range: () => this.spanX() },
-        y: { range: (_, min, max) => this.spanY(min, max) },
+        y: { distr: config.log ? LOGARITHMIC : LINEAR, range: (_, min, max) => (config.log ? decades(config, min, max) : this.spanY(min, max)) },
       },
       axes: [
         { ...axis(config.xlabel || ''), size: FONT + 10, space: 45 },
-        { ...axis(config.ylabel || ''), size: (_, values) => sizeOf(values, font), space: 28 },
+        { ...axis(config.ylabel || ''), size: (_, values) => sizeOf(values, font), space: 28, ...(config.log ? POWERS : {}) },
       ],
       series: [
         {},
@@ -192,6 +195,25 @@ function dashOf({ dash }, index, count) {
   if (Array.isArray(dash)) return dash
   if (dash) return DASHES[1]
   return count > 1 ? DASHES[index % DASHES.length] : []
+}
+
+/** Whole decades around the data; a log axis has no room for zero. */
+function decades({ ymin, ymax }, low, high) {
+  const from = ymin ?? 10 ** Math.floor(Math.log10(low > 0 ? low : 1e-3))
+  const to = ymax ?? 10 ** Math.ceil(Math.log10(high > 0 ? high : 1))
+  return [from, to > from ? to : 10 * from]
+}
+
+/** Ticks at powers of ten, not more than can be read. */
+const POWERS = {
+  splits: (_, __, min, max) => {
+    const first = Math.ceil(Math.log10(min) - 1e-9)
+    const last = Math.floor(Math.log10(max) + 1e-9)
+    const stride = Math.max(1, Math.ceil((last - first) / MOST_POWERS))
+    return Array.from({ length: Math.floor((last - first) / stride) + 1 }, (___, i) => 10 ** (first + i * stride))
+  },
+  filter: (_, splits) => splits,
+  values: (_, ticks) => ticks.map((tick) => `10${superscript(Math.round(Math.log10(tick)))}`),
 }
 
 let measuring = null

@@ -7,6 +7,7 @@
 import { PerspectiveCamera } from 'three'
 import { OrbitCamera } from './camera.js'
 import { h } from './dom.js'
+import { channels, resolve, watchTheme } from './palette.js'
 import { stage } from './stage.js'
 import { World, aim } from './world.js'
 
@@ -15,24 +16,26 @@ export class View {
    * @param {object} options
    * @param {number} options.height CSS pixels
    * @param {string} options.label what the picture shows, for who cannot see it
+   * @param {string} options.name of the view, and how keys move it
+   * @param {HTMLImageElement | null} [options.poster] a picture that is shown until there is a live one
    */
-  constructor({ height, label }) {
+  constructor({ height, label, name, poster = null }) {
     this.label = label
     this.still = h('canvas', { class: 'lab-still', role: 'img', 'aria-label': label })
-    this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group' }, this.still)
+    this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group', 'aria-label': name }, this.still)
+    this.poster = poster === null ? null : h('img', { class: 'lab-poster', src: poster.src, alt: '' })
+    if (this.poster !== null) this.element.append(this.poster)
     this.element.style.setProperty('--height', `${height}px`)
     this.lens = new PerspectiveCamera()
     this.lens.matrixAutoUpdate = false
     this.world = null
     this.camera = null
     this.frame = null
-    this.fresh = false
     this.width = 0
     this.height = 0
-    this.onDrawn = null
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
-    this.colours = () => {}
+    this.unwatch = watchTheme(() => this.colour())
   }
 
   get scene() {
@@ -53,14 +56,20 @@ export class View {
     this.world = new World(description)
     const { azimuth, elevation, distance, target, fovy } = description.camera
     this.camera = new OrbitCamera({ azimuth, elevation, distance, target: [...target], fovy })
-    this.colours()
+    this.frame = null
+    this.colour()
+  }
+
+  /** Take the page's colours for what has none of its own. */
+  colour() {
+    this.world?.trail?.paint(channels(resolve(this.element, 'var(--trace-2)')))
+    this.invalidate()
   }
 
   /** Show a frame from the next drawing on; returns the frame that it takes the place of, which is spent. */
   setFrame(frame) {
     const spent = this.frame
     this.frame = frame
-    this.fresh = true
     this.invalidate()
     return spent
   }
@@ -81,8 +90,7 @@ export class View {
     if (this.world === null || this.frame === null || this.width === 0) return false
     this.world.update(this.frame, this.camera)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
-    this.fresh = false
-    this.onDrawn?.()
+    this.poster?.remove()
     return true
   }
 
@@ -132,6 +140,7 @@ export class View {
   }
 
   dispose() {
+    this.unwatch()
     this.resizer.disconnect()
     stage.remove(this)
     this.world?.dispose()

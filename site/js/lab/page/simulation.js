@@ -1,0 +1,194 @@
+/**
+ * One simulation of the worker, as the page holds it: its line, its picture, and what it is doing.
+ *
+ *   const simulation = new Simulation({ config, base, view, on })
+ *   simulation.play(); simulation.set(0, 3); simulation.dispose()
+ *
+ * `on` has functions for what happens; all may be absent:
+ *
+ *   state(state, reason)   'loading', 'paused', 'playing', 'ended' (it will not run again)
+ *   ready({scene, values, time, version})
+ *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, samples before these are of another
+ *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts}
+ *   controls(values)       lab code may have changed them
+ *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
+ *   noPicture()            the browser has no WebGL
+ *
+ * Buffers of frames go back to the worker once for each refresh of the screen, which makes the worker send one for each.
+ */
+
+import { connection } from './connection.js'
+
+export class Simulation {
+  /**
+   * @param {object} options
+   * @param {object} options.config the lab's JSON; `worker`, `wasm`, `module` and `mjb` are addresses
+   * @param {string} options.base to which these are relative
+   * @param {import('./view.js').View | null} [options.view] shows it
+   * @param {object} [options.on] listeners
+   */
+  constructor({ config, base, view = null, on = {} }) {
+    Object.assign(this, { config, view, on })
+    this.address = (path) => new URL(path, base).href
+    this.visible = false
+    this.tick = (now) => this.refresh(now)
+    this.request = 0
+    this.connect()
+  }
+
+  connect() {
+    const { config, address } = this
+    this.spent = []
+    this.latest = null
+    this.epoch = null
+    this.diverged = false
+    this.change('loading')
+    this.line = connection(address(config.worker)).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
+    const addresses = { module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
+    this.send({ type: 'load', config, ...addresses })
+    this.send({ type: 'visible', on: this.visible })
+  }
+
+  send(message, transfer) {
+    this.line.send(message, transfer)
+  }
+
+  change(state, reason = null) {
+    this.state = state
+    this.view?.setMoving(state === 'playing' && this.visible)
+    this.on.state?.(state, reason)
+    this.schedule()
+  }
+
+  // --- what can be done with it
+
+  play() {
+    if (this.state === 'ended') this.again()
+    else if (this.diverged) this.reset()
+    this.send({ type: 'play' })
+  }
+
+  pause() {
+    this.send({ type: 'pause' })
+  }
+
+  step(n = 1) {
+    this.send({ type: 'step', n })
+  }
+
+  reset() {
+    this.send({ type: 'reset' })
+  }
+
+  /** Simulated seconds for each real one. */
+  speed(factor) {
+    this.send({ type: 'speed', factor })
+  }
+
+  /** Set a control to a value. */
+  set(index, value) {
+    this.send({ type: 'control', index, value })
+  }
+
+  /** Press a button. */
+  press(index) {
+    this.send({ type: 'press', index })
+  }
+
+  overlay(name, on) {
+    this.send({ type: 'overlay', name, on })
+  }
+
+  /** Pull a body: `{body, point, target}`, then `{body, target}`; null lets go. */
+  pull(request) {
+    this.send({ type: 'perturb', ...(request ?? { target: null }) })
+  }
+
+  /** Ask for the state, which comes to `on.saved`. */
+  save() {
+    this.send({ type: 'state' })
+  }
+
+  restore(state) {
+    this.send({ type: 'restore', state })
+  }
+
+  /** What is out of sight makes no steps. */
+  setVisible(on) {
+    if (on === this.visible) return
+    this.visible = on
+    this.send({ type: 'visible', on })
+    this.view?.setMoving(this.state === 'playing' && on)
+  }
+
+  /** From the beginning, after the engine has ended. */
+  again() {
+    this.line.close()
+    this.connect()
+  }
+
+  dispose() {
+    cancelAnimationFrame(this.request)
+    this.request = -1
+    this.line.close()
+    this.view?.dispose()
+  }
+
+  // --- what comes back
+
+  opened(message) {
+    try {
+      this.view?.open(message.scene)
+    } catch {
+      this.view.dispose()
+      this.view = null
+      this.on.noPicture?.()
+    }
+    this.on.ready?.(message)
+    if (this.state === 'loading') this.change('paused')
+  }
+
+  took(frame) {
+    const { buffer, samples } = frame
+    const spent = this.view === null ? { buffer } : this.view.setFrame(new Float32Array(buffer))
+    if (spent !== null) this.spent.push(spent.buffer)
+    this.latest = frame
+    const fresh = samples.epoch !== this.epoch
+    this.epoch = samples.epoch
+    this.on.samples?.(samples, fresh)
+    this.schedule()
+  }
+
+  schedule() {
+    if (this.request === 0 && this.latest !== null) this.request = requestAnimationFrame(this.tick)
+  }
+
+  refresh(now) {
+    this.request = 0
+    for (const buffer of this.spent.splice(0)) this.send({ type: 'frame', buffer }, [buffer])
+    this.on.refresh?.(this.latest, now)
+  }
+}
+
+/** What each message of the worker does. */
+const MESSAGES = {
+  ready: (simulation, message) => simulation.opened(message),
+  frame: (simulation, message) => simulation.took(message),
+  playing: (simulation) => simulation.state === 'playing' || simulation.change('playing'),
+  // Out of sight it only waits: nobody has paused it.
+  paused: (simulation, { reason }) => reason === 'offscreen' || simulation.change('paused', reason),
+  controls(simulation, { values }) {
+    simulation.diverged = false
+    simulation.on.controls?.(values)
+  },
+  diverged(simulation, message) {
+    simulation.diverged = true
+    simulation.on.diverged?.(message)
+  },
+  warning: (simulation, message) => simulation.on.warning?.(message),
+  error(simulation, message) {
+    simulation.on.error?.(message)
+    if (message.kind === 'load' || message.fatal) simulation.change('ended')
+  },
+  state: (simulation, { state }) => simulation.on.saved?.(state),
+}
