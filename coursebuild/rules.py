@@ -72,7 +72,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("heading-empty", "error", "A heading has no text."),
     ("heading-attributes", "error", "The attributes after a heading cannot be read."),
     ("anchor-repeated", "error", "Two headings of a page have the same explicit id."),
-    ("fence-unclosed", "error", "A code fence is never closed."),
+    (
+        "fence-unclosed",
+        "error",
+        "A code fence is never closed, or not before another one begins.",
+    ),
     ("fence-info", "error", "The info string of a fence cannot be read."),
     ("fence-key-unknown", "error", "A fence has a key that its kind does not know."),
     ("fence-key-repeated", "error", "A fence has the same key twice."),
@@ -172,8 +176,12 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("lab-diverged", "error", "The simulation of a lab diverges."),
     ("lab-expect", "error", "A claim of a lab does not hold."),
     ("lab-parity", "error", "A lab runs otherwise in the browser's engine than natively."),
-    ("lab-timeout", "error", "A lab takes too long to be tried."),
-    ("lab-engine", "error", "The browser's engine is of another version than the native one."),
+    ("lab-timeout", "error", "A lab takes too long, or too much memory, to be tried."),
+    (
+        "lab-engine",
+        "error",
+        "An engine ended while a lab was tried, or the two are of different versions.",
+    ),
     # quizzes
     ("quiz-id-repeated", "error", "Two quizzes of the course have the same id."),
     ("quiz-answer", "error", "The answer of a question is not one of its options."),

@@ -14,6 +14,7 @@ const BODIES = {
   target: (code) => [`(${code}\n) = value`, `[${code}\n] = value`],
 }
 const QUOTED = /\/\*[^]*?\*\/|\/\/.*|'(?:\\[^]|[^'\\\n])*'|"(?:\\[^]|[^"\\\n])*"/g
+const UNASSIGNABLE = /assignment target|left-hand side/
 const NOT_IN_MODULES = [
   [/\bawait\b/, '`await` has no place in lab code, which never waits'],
   [/<!--|^\s*-->/m, '`<!--` and `-->` begin a comment in some places only; put a space into it'],
@@ -25,13 +26,13 @@ function mistake({ code, form, text, takesValue }) {
     for (const body of BODIES[form](code)) new Function(...names, `"use strict"; ${body}`)
     ;(0, eval)(`"use strict"; (${text})`)
   } catch (error) {
-    return error.message
+    return form === 'target' && UNASSIGNABLE.test(error.message) ? 'nothing can be assigned to it' : error.message
   }
   // The places of comments are where these are not in quotes; a line end keeps its place.
   const bare = code.replace(QUOTED, (quoted) => (quoted.startsWith('/') ? quoted.replace(/[^\n]/g, ' ') : '""'))
   for (const [pattern, message] of NOT_IN_MODULES) if (pattern.test(bare)) return message
   if (/\barguments\b/.test(bare) && !/\bfunction\b/.test(bare)) return '`arguments` belongs to no function here'
-  if (form === 'target' && /^[\w$\s]+$/.test(bare)) return 'only a field of something can be set, as in `model.opt.timestep`'
+  if (form === 'target' && /^[\w$\s]+$/.test(bare)) return 'it is a name of its own, and no part of the simulation'
   return null
 }
 

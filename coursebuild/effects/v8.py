@@ -109,9 +109,7 @@ class Isolate:
         except TimeoutError:
             raise LimitError(f"ran for more than {seconds:g} s", resumable=True) from None
         except JSOOMException:
-            raise LimitError(
-                f"took more than {self._memory >> 20} MiB", resumable=False
-            ) from None
+            raise LimitError(f"took more than {self._memory >> 20} MiB", resumable=False) from None
         except JSEvalException as error:
             raise ScriptError(str(error)) from None
 

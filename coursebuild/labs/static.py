@@ -1,6 +1,7 @@
 """The static form of a lab: what its trial recorded, as a picture, plots and a table.
 
-Entry points: `static_form(lab, main)`, `scene_solids(scene, frame)`.
+Entry points: `draw_picture(lab, main)`, `static_form(lab, main, picture)`,
+`scene_solids(scene, frame)`.
 """
 
 from __future__ import annotations
@@ -38,12 +39,10 @@ _GEOM, _DECORATION = 19, 24
 _WIDTH = 640
 
 
-def static_form(lab: Lab, main: dict[str, Any]) -> StaticForm:
-    """The static form of a lab whose trial's main run is `main`."""
+def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
+    """The start of the main run of a lab's trial, as PNG."""
     scene = unpacked(main["scene"])
-    pictures = unpacked(main["pictures"])
-    first, last = pictures[0], pictures[-1]
-    size = (_WIDTH, max(160, min(round(_WIDTH * lab.height / 480), 480)))
+    frame = unpacked(main["pictures"][0]["frame"])
     camera = scene["camera"]
     seen = Camera(
         camera["azimuth"],
@@ -52,7 +51,17 @@ def static_form(lab: Lab, main: dict[str, Any]) -> StaticForm:
         tuple(camera["target"]),
         camera["fovy"],
     )
-    pixels = draw(tuple(scene_solids(scene, first["frame"])), seen, size)
+    return png(draw(tuple(scene_solids(scene, frame)), seen, _size(lab)))
+
+
+def _size(lab: Lab) -> tuple[int, int]:
+    """Width and height of a lab's picture, pixels."""
+    return (_WIDTH, max(160, min(round(_WIDTH * lab.height / 480), 480)))
+
+
+def static_form(lab: Lab, main: dict[str, Any], picture: bytes) -> StaticForm:
+    """The static form of a lab whose trial's main run is `main`."""
+    first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
         plot_svg(plot, recorded["times"], traces, narrow=lab.dock)
@@ -62,7 +71,7 @@ def static_form(lab: Lab, main: dict[str, Any]) -> StaticForm:
         (readout.label, _shown(value, readout.digits))
         for readout, value in zip(lab.readouts, last["readouts"] or (), strict=False)
     )
-    return StaticForm(png(pixels), size, first["time"], readouts, last["time"], plots)
+    return StaticForm(picture, _size(lab), first["time"], readouts, last["time"], plots)
 
 
 def _shown(value: Any, digits: int) -> str:

@@ -114,32 +114,39 @@ _OF_MUJOCO = ("warning", "diverged")
 
 
 def _failure(lab: Lab, failure: Failure) -> Diagnostic:
-    name = _named(lab, failure.entry)
-    when = "" if failure.time is None else f" at t = {failure.time:.6g} s"
     tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
-    message = failure.message.rstrip(".")
-    help = ""
-    match failure.kind:
-        case "throws":
-            text = f"{name} throws {message}{when}"
-        case "nan" | "type":
-            text = f"{name} {message}{when}"
-        case "warning":
-            text = f"MuJoCo warns{when}: {message}"
-        case "diverged":
-            text = f"the simulation diverges{when}: {message}"
-            help = "try a smaller `timestep`, another integrator, or a narrower range"
-        case "expect":
-            text = f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}"
-        case "timeout":
-            text = f"{name} {message}"
-            if name == "the lab":
-                text = f"trying the lab took too long: it {message}"
-            help = "shorten what is run with `verify`: {`seconds`: …}, or look for an endless loop"
-        case _:
-            text = message
+    text, help = _told(lab, failure)
     span = entry_span(lab, failure.entry)
     return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
+
+
+def _told(lab: Lab, failure: Failure) -> tuple[str, str]:
+    """What is wrong, and what helps."""
+    name = _named(lab, failure.entry)
+    when = f" at t = {failure.time:.6g} s" if failure.time else ""
+    message = failure.message.rstrip(".")
+    match failure.kind:
+        case "throws":
+            return f"{name} throws{when}: {message}", ""
+        case "nan":
+            return f"{name} {message}{when}", ""
+        case "type":
+            return f"{name} {message}", ""
+        case "warning":
+            return f"MuJoCo warns{when}: {message}", ""
+        case "diverged":
+            help = "try a smaller timestep, another integrator, or a narrower range"
+            return f"the simulation diverges{when}: {message}", help
+        case "expect":
+            return f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}", ""
+        case "timeout" if message == "did not finish in time":
+            return f"trying {name} takes too long", 'run less of it: `"verify": {"seconds": …}`'
+        case "timeout":
+            return f"{name} {message}", "look for a loop or a list without an end"
+        case "engine":
+            return f"the browser's engine says: {message.replace('MuJoCo Error: ', '')}", ""
+        case _:
+            return message, ""
 
 
 def _claim(lab: Lab, entry: Entry) -> str:
@@ -159,8 +166,9 @@ def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
     yield diagnose(
         "lab-parity",
         entry_span(lab, ("verify", "rtol")),
-        f"the browser's engine and native MuJoCo part at step {parity.first} (t = {time:.6g} s), "
-        f"by up to {parity.relative:.1e} of the state, and {allowed:g} is allowed",
+        f"the browser's engine and native MuJoCo differ from step {parity.first} on "
+        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {allowed:g} is "
+        "allowed",
         help="a controller that changes `model` while it runs cannot be repeated natively; where "
         'the motion is chaotic say how far it may part: `"verify": {"rtol": …, "seconds": …}`',
     )

@@ -61,7 +61,7 @@ def prepare(options: Options, progress: Progress) -> Prepared:
     if loaded.course is None:
         report = judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
         return Prepared(report, ())
-    verified = verify(loaded.course, options, progress)
+    verified = verify(loaded.course, options, progress, static=True)
     found = [*loaded.diagnostics, *verified.diagnostics, *no_lessons(loaded.course)]
     files: tuple[OutputFile, ...] = ()
     if all(d.severity is not Severity.ERROR for d in found):

@@ -1,41 +1,47 @@
 """Trying every lab of a course: models → V8 and native MuJoCo → results and diagnostics.
 
-Entry point: `try_labs(course, models, options, engine)`.
+Entry point: `try_labs(course, models, options, engines)`.
 
 1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
 2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
    can do with it, in the engine that the browser has.
-3. The main run is repeated natively and compared; what it recorded becomes the static form.
+3. The main run is repeated natively and compared; for a build, what it recorded becomes the static
+   form.
 
-A trial is kept by the hash of all that it depends on: the model, the code, the data and the engine.
+Saved models, trials and pictures are kept, each by the hash of all that it depends on, so that
+where nothing has changed neither engine is started.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import time
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.lab_engine import LabEngine, engine_digest
-from coursebuild.effects.native import NativeEngine
-from coursebuild.effects.store import kept
+from coursebuild.effects.native import NativeEngine, NativeError, native_digest
+from coursebuild.effects.store import keep, kept, load
 from coursebuild.effects.versions import engine_version
-from coursebuild.labs.compile import LabModule, compile_lab, pieces
+from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
 from coursebuild.labs.reply import Trial, read_trial
 from coursebuild.labs.verdict import (
     Parity,
     code_diagnostic,
+    entry_span,
     parity_diagnostics,
     trial_diagnostics,
 )
 from coursebuild.model import Course, Lab, document_blocks
 from coursebuild.pipeline.options import Options
-from coursebuild.results import CompileResult, LabResult
+from coursebuild.results import CompileResult, LabResult, StaticForm
 from coursebuild.scripts.extract import owners
 
 _WALL = 60.0
@@ -43,6 +49,37 @@ _WALL = 60.0
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
+_PASSING = ("timeout", "engine")
+"""Kinds of failure that may not happen again, so that they are not kept."""
+_UNTRIED = ("id", "title", "model", "height", "toggles")
+"""Data that no trial depends on."""
+
+
+class Engines:
+    """The browser's engine and the native one; each is started when it is first needed."""
+
+    def __init__(self, root: Path) -> None:
+        self.native = NativeEngine(root)
+        self.browser = LabEngine()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            self.browser.close()
+        finally:
+            self.native.__exit__(kind, error, traceback)
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and let nothing begin."""
+        self.browser.stop()
+        self.native.interrupt()
 
 
 def labs_of(course: Course) -> Iterator[tuple[str, str, Lab]]:
@@ -57,177 +94,243 @@ def try_labs(
     course: Course,
     models: Mapping[str, CompileResult],
     options: Options,
-    engine: LabEngine,
+    engines: Engines,
     documents: frozenset[str] | None = None,
     wrong: Sequence[Diagnostic] = (),
+    *,
+    static: bool = False,
 ) -> tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]:
-    """Try the labs, of all documents or of some, whose models compile.
+    """Try the labs, of all documents or of some, whose models compile; `engines` end with it.
 
     A lab of which something is in `wrong` already, such as a keyframe that is not there, is left.
-    The engines are started only when there is a lab to try.
+    `static` forms are made when they are asked for.
     """
     results: list[LabResult] = []
     found: list[Diagnostic] = []
-    with ExitStack() as stack:
-        workshop: _Workshop | None = None
+    with engines:
         for owner, name, lab in labs_of(course):
             if documents is not None and lab.span.path not in documents:
                 continue
             if any(lab.span.contains(diagnostic.span) for diagnostic in wrong):
                 continue
-            source = _source(course, models, lab, name)
+            source = _source(course, models, lab)
             if source is None:
                 continue
-            if workshop is None:
-                workshop = _Workshop(
-                    options,
-                    stack.enter_context(NativeEngine(options.root)),
-                    stack.enter_context(engine),
-                )
-            result, diagnostics = workshop.work(owner, name, lab, source)
+            result, diagnostics = _Attempt(options.root, engines, owner, name, lab, source).run(
+                static
+            )
             found += diagnostics
-            if result is not None:
-                results.append(result)
+            results.append(result)
     return tuple(results), tuple(found)
 
 
-def _source(
-    course: Course, models: Mapping[str, CompileResult], lab: Lab, name: str
-) -> tuple[str, str] | None:
-    """Path and text of a lab's model; `None` for one that does not compile, as is told already."""
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """A lab's model as text."""
+
+    path: str
+    """Where it stands, or would."""
+    text: str
+    files: tuple[str, ...] | None
+    """Other files that it consists of; `None` where they are not known."""
+
+
+def _source(course: Course, models: Mapping[str, CompileResult], lab: Lab) -> _Source | None:
+    """A lab's model; `None` for one that does not compile, as is told already."""
     if lab.kind != "simlab":
         return None
     if lab.xml is not None:
-        return f"models/.{name}.xml", lab.xml.text
+        text = lab.xml.text
+        return _Source("models/.lab.xml", text, None if "file" in text else ())
     compiled = models.get(lab.model or "")
-    if compiled is None or compiled.error:
+    if compiled is None or compiled.facts is None:
         return None
-    return next((m.source.path, m.source.text) for m in course.models if m.name == lab.model)
+    source = next(model.source for model in course.models if model.name == lab.model)
+    return _Source(source.path, source.text, compiled.facts.includes)
 
 
-class _Workshop:
-    """The engines, and where trials are kept."""
+@dataclass(frozen=True, slots=True)
+class _Attempt:
+    """Trying one lab."""
 
-    def __init__(self, options: Options, native: NativeEngine, engine: LabEngine) -> None:
-        self.root = options.root
-        self.native = native
-        self.engine = engine
+    root: Path
+    engines: Engines
+    owner: str
+    name: str
+    lab: Lab
+    source: _Source
 
-    def work(
-        self, owner: str, name: str, lab: Lab, source: tuple[str, str]
-    ) -> tuple[LabResult | None, list[Diagnostic]]:
-        """Try one lab."""
-        code = pieces(lab)
-        wrong = self.engine.mistakes([(piece.code, piece.form) for piece in code])
-        mistakes = [
-            code_diagnostic(piece, text)
+    def run(self, static: bool) -> tuple[LabResult, list[Diagnostic]]:
+        """What became of it, and what is wrong."""
+        began = time.monotonic()
+        lab = self.lab
+        module = compile_lab(lab, self.name)
+        try:
+            mjb = self._model()
+            key = _key(lab, module, mjb)
+            reply = self._stored(key)
+            cached = reply is not None
+            if reply is None:
+                mistakes = self._mistakes()
+                if mistakes:
+                    return self._failed(module, began), mistakes
+                reply = self._try(module, mjb, key)
+        except NativeError as error:
+            told = diagnose("lab-engine", entry_span(lab, ()), f"native MuJoCo {error}")
+            return self._failed(module, began), [told]
+        trial, parity = read_trial(reply), _parity(reply)
+        found = [*trial_diagnostics(lab, trial), *self._version(trial)]
+        if parity is not None:
+            found += parity_diagnostics(lab, parity)
+        form = self._static(key, trial) if static and not found else None
+        result = LabResult(
+            span=lab.span,
+            name=module.name,
+            lesson=self.owner,
+            title=lab.title,
+            status="failed" if found else "ok",
+            seconds=time.monotonic() - began,
+            steps_per_second=trial.steps_per_second,
+            tried=trial.tried,
+            parity=parity.describe() if parity is not None else "",
+            module=module.code,
+            config=module.config,
+            mjb=mjb,
+            static=form,
+            cached=cached,
+        )
+        return result, found
+
+    def _failed(self, module: LabModule, began: float) -> LabResult:
+        """A lab that could not be tried."""
+        return LabResult(
+            span=self.lab.span,
+            name=module.name,
+            lesson=self.owner,
+            title=self.lab.title,
+            status="failed",
+            seconds=time.monotonic() - began,
+            steps_per_second=None,
+            tried=(),
+            parity="",
+            module=module.code,
+            config=module.config,
+            mjb=b"",
+            static=None,
+        )
+
+    def _model(self) -> bytes:
+        """The model as an MJB file, from the store where all that it is made of is known."""
+        path, text, files = self.source.path, self.source.text, self.source.files
+
+        def save() -> bytes:
+            return self.engines.native.save(path, text)
+
+        try:
+            parts = [(self.root / file).read_bytes() for file in files or ()]
+        except OSError:
+            files = None
+        if files is None:
+            return save()
+        digest = hashlib.sha256(engine_version().encode())
+        for part in (path.encode(), text.encode(), *parts):
+            digest.update(hashlib.sha256(part).digest())
+        return kept(self.root, "mjb", digest.hexdigest(), save)
+
+    def _mistakes(self) -> list[Diagnostic]:
+        """What no engine could run."""
+        code = pieces(self.lab)
+        wrong = self.engines.browser.mistakes([_to_parse(piece) for piece in code])
+        return [
+            code_diagnostic(self.lab, piece, text)
             for piece, text in zip(code, wrong, strict=True)
             if text is not None
         ]
-        if mistakes:
-            return None, mistakes
-        began = time.monotonic()
-        module = compile_lab(lab, name)
-        mjb = self.native.save(*source)
-        fresh = False
 
-        def make() -> bytes:
-            nonlocal fresh
-            fresh = True
-            return zlib.compress(json.dumps(self._try(lab, module, mjb)).encode())
+    def _stored(self, key: str) -> dict[str, Any] | None:
+        found = load(self.root, "labs", key)
+        return None if found is None else json.loads(zlib.decompress(found))
 
-        reply = json.loads(zlib.decompress(kept(self.root, "labs", _key(lab, module, mjb), make)))
-        trial, parity = read_trial(reply), _parity(reply)
-        found = list(trial_diagnostics(lab, trial))
-        found += self._version(lab, trial)
-        if parity is not None:
-            found += parity_diagnostics(lab, parity)
-        seconds = time.monotonic() - began
-        result = _result(owner, lab, module, mjb, trial, parity, found, seconds)
-        return _with_cached(result, not fresh), found
-
-    def _try(self, lab: Lab, module: LabModule, mjb: bytes) -> dict[str, Any]:
+    def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
         """The reply of the trial, with the comparison in place of what it was made from."""
         request = {
-            "config": json.loads(module.config),
+            "config": _data(module),
             "code": module.literal,
-            "seconds": lab.verify_seconds,
+            "seconds": self.lab.verify_seconds,
         }
-        reply = self.engine.trial(request, mjb, _WALL)
+        reply = self.engines.browser.trial(request, mjb, _WALL)
         main = reply["main"]
-        if main is None or main["parity"] is None or main["steps"] == 0:
-            return reply
-        run = main["parity"]
-        if not run["complete"] or run["modelChanged"]:
-            main["parity"] = None
-            return reply
-        horizon = run["steps"]
-        if lab.verify_rtol is None:
-            horizon = min(horizon, max(1, round(_PARITY_SECONDS / main["timestep"])))
-        main["parity"] = {
-            **self.native.parity(mjb, run, horizon, module.name),
-            "steps": run["steps"],
-        }
+        if main is not None and main["parity"] is not None:
+            main["parity"] = self._compared(main, mjb)
+        if all(failure["kind"] not in _PASSING for failure in reply["failures"]):
+            keep(self.root, "labs", key, zlib.compress(json.dumps(reply).encode()))
         return reply
 
-    def _version(self, lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
+    def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any] | None:
+        """How the main run compares with native MuJoCo; `None` where it cannot be repeated."""
+        run = main["parity"]
+        if run["steps"] == 0 or not run["complete"] or run["modelChanged"]:
+            return None
+        horizon = run["steps"]
+        if self.lab.verify_rtol is None:
+            horizon = min(horizon, max(1, round(_PARITY_SECONDS / main["timestep"])))
+        return {**self.engines.native.parity(mjb, run, horizon), "steps": run["steps"]}
+
+    def _version(self, trial: Trial) -> Iterator[Diagnostic]:
         if trial.version != engine_version():
             message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
-            yield diagnose("lab-engine", lab.span.first_line(), message)
+            yield diagnose("lab-engine", self.lab.span.first_line(), message)
+
+    def _static(self, key: str, trial: Trial) -> StaticForm | None:
+        from coursebuild.labs.static import draw_picture, static_form
+
+        lab, main = self.lab, trial.main
+        if main is None:
+            return None
+        digest = hashlib.sha256(f"{key}\0{lab.height}\0{_drawing_digest()}".encode())
+
+        def draw() -> bytes:
+            return draw_picture(lab, main)
+
+        return static_form(lab, main, kept(self.root, "pictures", digest.hexdigest(), draw))
+
+
+def _to_parse(piece: Piece) -> tuple[str, str, str, bool]:
+    return piece.code, piece.form, piece.function, piece.takes_value
+
+
+def _data(module: LabModule) -> dict[str, Any]:
+    """What of a lab's data its trial is given."""
+    config: dict[str, Any] = json.loads(module.config)
+    return {name: value for name, value in config.items() if name not in _UNTRIED}
 
 
 def _key(lab: Lab, module: LabModule, mjb: bytes) -> str:
     digest = hashlib.sha256(mjb)
     for part in (
-        module.config,
+        json.dumps(_data(module)),
         module.literal,
-        f"{lab.verify_seconds}/{lab.verify_rtol}",
+        f"{lab.verify_seconds}/{lab.verify_rtol is None}",
         engine_digest(),
+        native_digest(),
         engine_version(),
     ):
         digest.update(f"\0{part}".encode())
     return digest.hexdigest()
 
 
+@functools.lru_cache(maxsize=1)
+def _drawing_digest() -> str:
+    """A hash of how pictures are drawn."""
+    from coursebuild.labs import picture, reply, shapes, static
+
+    files = [Path(module.__file__ or "") for module in (picture, reply, shapes, static)]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
 def _parity(reply: dict[str, Any]) -> Parity | None:
     main = reply["main"]
     told = main["parity"] if main is not None else None
-    if told is None or "first" not in told:
+    if told is None:
         return None
     return Parity(told["steps"], told["timestep"], told["first"], told["relative"])
-
-
-def _result(
-    owner: str,
-    lab: Lab,
-    module: LabModule,
-    mjb: bytes,
-    trial: Trial,
-    parity: Parity | None,
-    found: list[Diagnostic],
-    seconds: float,
-) -> LabResult:
-    from coursebuild.labs.static import static_form
-
-    main, speed = trial.main, trial.steps_per_second
-    return LabResult(
-        span=lab.span,
-        name=module.name,
-        lesson=owner,
-        title=lab.title,
-        status="failed" if found else "ok",
-        seconds=seconds,
-        steps_per_second=speed,
-        tried=trial.tried,
-        parity=parity.describe() if parity is not None else "",
-        module=module.code,
-        config=module.config,
-        mjb=mjb,
-        static=static_form(lab, main) if main is not None and not found else None,
-    )
-
-
-def _with_cached(result: LabResult, cached: bool) -> LabResult:
-    from dataclasses import replace
-
-    return replace(result, cached=cached)

@@ -11,6 +11,7 @@ Entry point: `verify(course, options, progress, lessons)`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,11 +23,10 @@ from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.effects import mjcf
 from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
-from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
-from coursebuild.pipeline.labs import try_labs
+from coursebuild.pipeline.labs import Engines, try_labs
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.report import LabLine, ScriptLine
@@ -57,24 +57,33 @@ class Verified:
 
 
 def verify(
-    course: Course, options: Options, progress: Progress, documents: frozenset[str] | None = None
+    course: Course,
+    options: Options,
+    progress: Progress,
+    documents: frozenset[str] | None = None,
+    *,
+    static: bool = False,
 ) -> Verified:
-    """Verify a course, or only what stands in the documents with these paths."""
+    """Verify a course, or only what stands in the documents with these paths.
+
+    `static`: with the static forms of labs, which only a build needs.
+    """
     extracted = extract_scripts(course, options)
     chosen: Sequence[Extraction] = extracted.runnable
     if documents is not None:
         leaned_on = _leaned_on(course, documents)
         chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
     models, compiled = _compile(course, options, progress)
-    engine = LabEngine()
+    engines = Engines(options.root)
     with ThreadPoolExecutor(1, "labs") as beside:
-        trying = beside.submit(try_labs, course, dict(models), options, engine, documents, compiled)
+        work = functools.partial(try_labs, course, dict(models), options, engines, static=static)
+        trying = beside.submit(work, documents, compiled)
         try:
             runs = run(chosen, options, progress)
             with progress.stage("trying labs"):
                 labs, lab_findings = trying.result()
         except BaseException:  # Ctrl-C does not wait for a lab
-            engine.stop()
+            engines.stop()
             raise
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]

@@ -5,7 +5,7 @@ Entry point: `fence_block`.
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import diagnose
+from coursebuild.diagnostics import Note, diagnose
 from coursebuild.model import Block, CodeBlock, Script
 from coursebuild.syntax.fence import Fence, near_kind
 from coursebuild.syntax.info import parse_info, read_keys
@@ -24,7 +24,7 @@ _HEAD_RULES = frozenset(
 
 def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
     """The block of a fence that records no output."""
-    if not fence.closed:
+    if not fence.closed or fence.inner is not None:
         return _unclosed(fence, session)
     match fence.kind:
         case "python":
@@ -51,14 +51,16 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
 
 
 def _unclosed(fence: Fence, session: Session) -> CodeBlock:
-    """What follows may be anything, so that nothing is said about it."""
+    """What is inside may be anything, so that nothing is said about it."""
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
     help = f"close it with a line of {len(marks)} {name} in the same quote or list item"
-    session.report(
-        diagnose("fence-unclosed", fence.head, "this code fence is never closed", help=help)
-    )
-    if fence.kind == "python":
+    message, notes = "this code fence is never closed", []
+    if fence.inner is not None:
+        message = "this code fence is not closed before another one begins"
+        notes = [Note("this line is read as text of the fence above it", fence.inner)]
+    session.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
+    if fence.kind == "python" or fence.inner is not None:
         session.script, session.script_wrong = None, True
     return fence.code()
 

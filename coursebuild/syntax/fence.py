@@ -44,6 +44,8 @@ class Fence:
     closed: bool
     nested: bool
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
+    inner: Span | None
+    """A line inside that was surely meant to begin another fence, which then closed this one."""
 
     @property
     def kind(self) -> str:
@@ -70,7 +72,15 @@ def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_at + len(token.info.rstrip()))
     body_span, prefix = (body.span(), "") if nested else _lines(span, head, closed)
-    return Fence(span, head, info, body, body_span, prefix, closed, nested)
+    inner = _inner(body, token.markup)
+    return Fence(span, head, info, body, body_span, prefix, closed, nested, inner)
+
+
+def _inner(body: Excerpt, marks: str) -> Span | None:
+    """The first line that would begin a fence of these marks, were it not inside one."""
+    opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
+    found = opening.search(body.text)
+    return None if found is None else body.span(found.start(1), found.end(1))
 
 
 def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:

@@ -38,7 +38,7 @@ def record_fence(
     caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: Session
 ) -> Recording | None:
     """The recording whose body may be this fence."""
-    if not fence.closed:
+    if not fence.closed or fence.inner is not None:
         return None
     if fence.kind != "text":
         if fence.kind in OURS:

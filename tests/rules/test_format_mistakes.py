@@ -95,3 +95,109 @@ def test_a_mistake_is_told_once_at_its_place(case: Case, tmp_path: Path) -> None
     assert [str(place) for place in found] == [str(place) for place in wanted]
     assert status == (1 if any(RULES[p.rule].severity == "error" for p in wanted) else 0)
     assert len(wanted) <= 1, "one mistake at a time"
+
+
+TOGETHER = """\
+=== content/course.toml
+[course]
+title = "T"
+engine = ‸"3.1.0"
+
+[[level]]
+id = "1"
+title = "L"
+
+[[level.lesson]]
+id = "1.1"
+slug = "first"
+title = "F"
+status = "complete"
+prerequisites = [‸"1.9"]
+
+[[level.lesson]]
+id = "1.2"
+slug = "second"
+title = "S"
+status = "complete"
+=== content/lessons/1.1-first.md
+‸# #
+
+See [this](‸lesson:4.3) and $‸\\nothing$.
+
+```python file=examples/x.py ‸timout=3
+print("a 1.0")
+```
+
+Output:
+
+```text
+a ‸2.0
+```
+
+> [!‸nte]
+> So `‸3.0`{out}.
+
+```quiz
+{"id": "q", "questions": [
+  {"kind": "open", "q": "Q", ‸"refrence": "R"},
+  {"kind": "mcq", "q": "Which?", "options": ["a", "b"], "answer": ‸2}‸,
+]}
+```
+=== content/lessons/1.2-second.md
+```python file=examples/second.py
+‸raise ValueError
+```
+
+```mjcf
+<mujoco>
+  ‸<world/>
+</mujoco>
+```
+
+```lab ‸simlb
+{"xml": "<mujoco/>"}
+```
+=== content/lessons/1.3-third.md
+‸Text ‸![](none.png).
+=== models/box.xml
+<mujoco>
+  ‸<world/>
+</mujoco>
+"""
+RULES_TOGETHER = """\
+engine-version
+prerequisite-unknown
+heading-top heading-empty
+link-lesson
+math-syntax
+fence-key-unknown
+output-drift
+callout-unknown
+binding-mismatch
+field-unknown
+quiz-answer
+json-syntax
+script-failed
+mjcf-error
+lab-kind
+lesson-unlisted
+image-alt
+model-error
+"""
+
+
+def test_everything_wrong_is_told_in_one_run_in_order(tmp_path: Path) -> None:
+    layout = Layout.of(TOGETHER)
+    places = marked(layout)
+    layout.write(tmp_path)
+    status, report = run(tmp_path, "check", "--format", "json")
+    found = [f"{d['rule']} {d['path']}:{d['line']}:{d['column']}" for d in report["diagnostics"]]
+    rules = [line.split() for line in RULES_TOGETHER.splitlines()]
+    wanted = [
+        f"{rule} {path}:{row}:{column}"
+        for (path, row, column), names in zip(places, rules, strict=True)
+        for rule in names
+    ]
+    assert sorted(found) == sorted(wanted)
+    assert [line.rsplit(" ", 1)[1] for line in found] == [line.rsplit(" ", 1)[1] for line in wanted]
+    assert status == 1

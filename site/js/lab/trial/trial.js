@@ -20,6 +20,7 @@ import { picture, record, withoutTextures } from './record.js'
 const SECONDS = 5 // of simulated time, unless the lab says otherwise
 const STEPS = 20_000 // at most, unless the lab says for how long
 const PROBE = { seconds: 0.5, steps: 500 } // after each act
+const PACE = 2000 // steps, at most
 const SLICE = 64 // steps between two looks at the clock
 const CHECKS = 100 // looks at the readouts during the main run
 
@@ -59,12 +60,24 @@ class Trial {
         })
       }
       this.claims()
+      if (reply.main !== null && this.took === 0) this.pace(reply.main)
     } catch (error) {
       if (error instanceof OutOfTime) this.fail(current.trying ?? [], 'timeout', 'did not finish in time', null)
       else this.fail([], 'engine', String(error.message ?? error), null)
     }
     const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
     return { ...reply, tried: this.tried, failures: this.failures, stepsPerSecond }
+  }
+
+  /** How fast a lab runs of which nothing but the recorded run was tried: once more, without recording. */
+  pace({ steps }) {
+    const lab = new Lab(this.engine, this.bytes, this.config, this.code)
+    try {
+      lab.start()
+      this.advance(lab, Infinity, Math.min(steps, PACE), ['stopAt', 'code'])
+    } finally {
+      lab.dispose()
+    }
   }
 
   // --- one attempt

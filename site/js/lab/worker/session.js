@@ -9,7 +9,6 @@ import { Clock } from '../core/clock.js'
 import { Lab } from '../core/lab.js'
 import { LabError } from '../core/piece.js'
 
-const BUFFERS = 2 // frames that may be under way
 const CHUNK = 2 // ms of stepping between two looks at the clock
 const LEAST = 4 // ms between two frames of a lab that runs
 
@@ -26,7 +25,7 @@ export class Session {
     this.clock = new Clock()
     this.visible = true
     this.playing = false
-    this.buffers = Array.from({ length: BUFFERS }, () => null)
+    this.buffers = [null] // one frame is under way at a time: then there is one for each refresh of the page
     this.stale = true
     this.sent = -Infinity
     this.chunk = 1
@@ -143,7 +142,7 @@ export class Session {
     this.clock.ran(steps, timestep, begun / 1000)
     if (steps > 0) this.stale = true
     if (!this.playing) return Infinity
-    return owed > 0 ? 0 : 1000 * this.clock.wait(timestep)
+    return owed > 0 ? 0 : Math.max(1, 1000 * this.clock.wait(timestep))
   }
 
   /** Choose how many steps to make between two looks at the clock. */
