@@ -194,7 +194,10 @@ def _command(
 
 def _lessons(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "lessons", nargs="*", metavar="LESSON", help="id, slug or file of a lesson (default: all)"
+        "lessons",
+        nargs="*",
+        metavar="LESSON",
+        help="id, slug or file of a lesson or page (default: all)",
     )
 
 

@@ -135,7 +135,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "recording-body",
         "error",
-        "`Output:` is followed by something that is not a `text` fence or a table.",
+        "`Output:` is followed by something that is not a `text` fence or a table with rows.",
     ),
     (
         "recording-keys",

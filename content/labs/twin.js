@@ -72,7 +72,7 @@ export function mount(element, config, api) {
     twins.push(twin)
   })
   const settings = api.createControls(
-    [{ type: 'select', label: 'nudge', options: nudge.sizes.map((size) => [api.formatNumber(size, null).trim(), size]) }],
+    [{ type: 'select', label: 'nudge', options: nudge.sizes.map((size) => [String(size), size]) }],
     { set: (_, value) => twins.forEach((twin, which) => twin.set(1, which === 0 ? 0 : value)) }, // which resets both
   )
   settings.show([nudge.sizes[0]])

@@ -21,16 +21,18 @@ def changes(root: Path, stop: threading.Event) -> Iterator[frozenset[str]]:
     The first set is empty: it says that from now on no change is missed, also while the caller does
     something else.
     """
-    first = True
+    begun: frozenset[str] | None = frozenset()
     while not stop.is_set():
         folders = _present(root)
-        if not first:
-            yield frozenset(_FOLDERS)
         for changed in _below(root, folders, stop):
-            if changed or first:
-                first = False
+            if begun is not None:
+                yield begun | changed
+                begun = None
+            elif changed:
                 yield changed
             if _present(root) != folders:
+                # Told of once these folders are watched: a file may still be put into a new one.
+                begun = frozenset(path.name for path in {*folders} ^ {*_present(root)})
                 break
 
 

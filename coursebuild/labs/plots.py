@@ -9,15 +9,21 @@ the style sheet defines for light and dark; the text takes the page's colour.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from html import escape
+from itertools import pairwise
 
-from coursebuild.model import LabPlot
+from coursebuild.model import LabPlot, LabTrace
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
-_LEFT, _TOP, _BOTTOM = 46.0, 12.0, 38.0
+_TOP, _BOTTOM = 12.0, 38.0
+_LETTER = 6.2
+"""Width of a letter or a digit."""
 _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
 _LABEL_GAP = 13.0
+_LARGEST = 4e307
+"""What is beyond is drawn there, so that the range of an axis is finite."""
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:
@@ -25,17 +31,53 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     span = high - low
     if not (span > 0 and math.isfinite(span)):
         return [low]
-    raw = span / about
-    power = 10.0 ** math.floor(math.log10(raw))
-    step = next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
+    step = _step(span, about)
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
-    return [round(i * step, 12) for i in range(first, last + 1)]
+    # The product has the rounding error of the step; a tick is the nearest double to what it says.
+    return [float(f"{i * step:.15g}") for i in range(first, last + 1)] or [low]
 
 
-def number(value: float) -> str:
-    """A tick's text, with a real minus."""
-    return f"{value:.6g}".replace("-", "\u2212")
+def _step(span: float, about: int) -> float:
+    """The distance of the ticks: 1, 2, 2.5 or 5 times a power of ten."""
+    raw = span / about
+    power = 10.0 ** math.floor(math.log10(raw))
+    return next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
+
+
+def tick_texts(values: Sequence[float]) -> list[str]:
+    """Ticks as text: with as many digits as tell them apart, and a real minus."""
+    step = min((b - a for a, b in pairwise(values)), default=0.0)
+    largest = max(abs(value) for value in values)
+    if largest == 0:
+        return ["0" for _ in values]
+    allowed = 1e-6 * (step or largest)
+    plain = _digits(values, "f", allowed) if largest < 1e15 else None
+    if plain is not None and 1e-4 <= largest < 1e6:
+        return plain
+    powers = _digits(values, "e", allowed) or [_readable(f"{v:.3e}") for v in values]
+    longest = max(map(len, powers))
+    return powers if plain is None or max(map(len, plain)) > longest else plain
+
+
+def _digits(values: Sequence[float], form: str, allowed: float) -> list[str] | None:
+    """The values as text with the fewest digits that say them; `None` where none do."""
+    for digits in range(18):
+        texts = [f"{value:.{digits}{form}}" for value in values]
+        if all(abs(float(t) - v) <= allowed for t, v in zip(texts, values, strict=True)):
+            return [_readable(text) for text in texts]
+    return None
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _readable(text: str) -> str:
+    mantissa, _, exponent = text.partition("e")
+    mantissa = mantissa.replace("-", "\u2212")
+    if float(text) == 0:
+        return "0" if exponent else mantissa.lstrip("\u2212")
+    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}" if exponent else mantissa
 
 
 def plot_svg(
@@ -47,132 +89,204 @@ def plot_svg(
 ) -> str:
     """The plot as an `svg` element; values that are no finite numbers interrupt their line.
 
-    A narrow one is for the margin: its text has the same size there.
+    A narrow one is for the margin: its text has the same size there. Empty where nothing was
+    recorded.
     """
-    shown = [
-        (t, i) for i, t in enumerate(times) if plot.window is None or t >= times[-1] - plot.window
-    ]
+    start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
+    shown = [(t, i) for i, t in enumerate(times) if t >= start]
     if not shown:
         return ""
-    low_t, high_t = shown[0][0], max(shown[-1][0], shown[0][0] + 1e-9)
+    low_t, high_t = shown[0][0], shown[-1][0]
     values = [
         v for line in traces for _, i in shown if (v := line[i]) is not None and math.isfinite(v)
     ]
     values += [y for y, _ in plot.ref_lines]
     low, high = _range(values, plot.ymin, plot.ymax)
-    width = _NARROW if narrow else _WIDE
-    longest = max((len(trace.label) for trace in plot.traces), default=0)
-    margin = min(14.0 + 6.2 * longest, 0.35 * width)
-    frame = _Frame(low_t, high_t, low, high, width, margin)
-    parts = [*_axes(frame, plot)]
-    for y, label in plot.ref_lines:
-        if low <= y <= high:
-            parts.append(_reference(frame, y, label))
+    labels = [trace.label for trace in plot.traces]
+    frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
+    lines: list[str] = []
     ends: list[tuple[float, str, int]] = []
     for n, (trace, line) in enumerate(zip(plot.traces, traces, strict=True)):
         points = [(t, line[i]) for t, i in shown]
-        parts.append(_line(frame, points, n))
+        lines.append(_line(frame, points, n, _dash(trace, n)))
         last = next((v for _, v in reversed(points) if v is not None and math.isfinite(v)), None)
         if last is not None:
             ends.append((frame.y(min(max(last, low), high)), trace.label, n))
-    parts += _labels(frame, ends)
+    references = [_reference(frame, y, text) for y, text in plot.ref_lines if low <= y <= high]
+    parts = [*_axes(frame, plot), *references, *lines, *_labels(frame, ends)]
     title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
-    names = ", ".join(trace.label for trace in plot.traces)
     return (
-        f'<svg class="lab-plot" viewBox="0 0 {width:g} {_HEIGHT:g}" role="img" '
-        f'aria-label="{escape(f"{title}: {names}")}">' + "".join(parts) + "</svg>"
+        f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
+        f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
     )
 
 
+def _text(text: str) -> str:
+    """Text for markup; characters that no markup can hold are left out."""
+    return escape("".join(c for c in text if c >= " " and c not in "\x7f\ufffe\uffff"))
+
+
+def _dash(trace: LabTrace, n: int) -> str:
+    if trace.dash is True:
+        return _DASHES[1]
+    return _DASHES[n % len(_DASHES)] if not trace.dash else " ".join(f"{x:g}" for x in trace.dash)
+
+
+def _frame(
+    low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
+) -> _Frame:
+    """The frame, with room for the ticks at its left and the names of the lines at its right."""
+    width = _NARROW if narrow else _WIDE
+    longest = max((len(text) for text in tick_texts(ticks(low, high))), default=0)
+    left = min(26.0 + _LETTER * longest, 0.35 * width)
+    room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
+    return _Frame(low_t, high_t, low, high, left, width - room, width)
+
+
+@dataclass(frozen=True, slots=True)
 class _Frame:
     """From values to places."""
 
-    def __init__(
-        self, low_t: float, high_t: float, low: float, high: float, width: float, margin: float
-    ) -> None:
-        self.low_t, self.high_t, self.low, self.high = low_t, high_t, low, high
-        self.right = width - margin
+    low_t: float
+    high_t: float
+    low: float
+    high: float
+    left: float
+    right: float
+    width: float
 
     def x(self, t: float) -> float:
-        return _LEFT + (t - self.low_t) / (self.high_t - self.low_t) * (self.right - _LEFT)
+        part = (t - self.low_t) / (self.high_t - self.low_t)
+        return self.left + part * (self.right - self.left)
 
     def y(self, v: float) -> float:
-        return (
-            _HEIGHT - _BOTTOM - (v - self.low) / (self.high - self.low) * (_HEIGHT - _TOP - _BOTTOM)
-        )
+        part = (v - self.low) / (self.high - self.low)
+        return _HEIGHT - _BOTTOM - part * (_HEIGHT - _TOP - _BOTTOM)
 
 
 def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple[float, float]:
     low = min(values, default=0.0) if ymin is None else ymin
     high = max(values, default=1.0) if ymax is None else ymax
-    if not high > low:
-        pad = abs(low) * 0.1 or 1.0
-        return low - pad, low + pad
+    low, high = max(low, -_LARGEST), min(high, _LARGEST)
+    size = max(abs(low), abs(high))
+    if not high - low > 1e-12 * size:
+        pad = size * 0.1 or 1.0
+        middle = high if ymin is None and ymax is not None else low
+        return middle - pad, middle + pad
     pad = 0.04 * (high - low)
     return (low if ymin is not None else low - pad), (high if ymax is not None else high + pad)
 
 
 def _axes(frame: _Frame, plot: LabPlot) -> list[str]:
-    right, bottom = frame.right, _HEIGHT - _BOTTOM
+    left, right, bottom = frame.left, frame.right, _HEIGHT - _BOTTOM
     parts = []
-    for value in ticks(frame.low, frame.high):
+    values = ticks(frame.low, frame.high)
+    for value, text in zip(values, tick_texts(values), strict=True):
         y = frame.y(value)
-        parts.append(f'<path class="lab-grid" d="M{_LEFT:g} {y:.1f}H{right:g}"/>')
-        parts.append(
-            f'<text x="{_LEFT - 6:g}" y="{y + 3.5:.1f}" text-anchor="end">{number(value)}</text>'
-        )
-    for value in ticks(frame.low_t, frame.high_t, 6):
+        parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
+        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
+    values = _fitting(frame)
+    for value, text in zip(values, tick_texts(values), strict=True):
         x = frame.x(value)
         parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
-        parts.append(
-            f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{number(value)}</text>'
-        )
-    parts.append(f'<path class="lab-axis" d="M{_LEFT:g} {_TOP:g}V{bottom:g}H{right:g}"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
+    parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
     middle = (_TOP + bottom) / 2
     parts.append(
         f'<text transform="translate(13 {middle:g}) rotate(-90)" text-anchor="middle">'
-        f"{escape(plot.ylabel)}</text>"
+        f"{_text(plot.ylabel)}</text>"
     )
-    centre = (_LEFT + right) / 2
+    centre = (left + right) / 2
     parts.append(
-        f'<text x="{centre:g}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
-        f"{escape(plot.xlabel)}</text>"
+        f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
+        f"{_text(plot.xlabel)}</text>"
     )
     return parts
+
+
+def _fitting(frame: _Frame) -> list[float]:
+    """Ticks of the time, so many that their texts do not touch."""
+    for about in (6, 4, 3, 2):
+        values = ticks(frame.low_t, frame.high_t, about)
+        longest = max(len(text) for text in tick_texts(values))
+        if len(values) * (longest + 1.5) * _LETTER <= frame.right - frame.left:
+            return values
+    return values[:1]
 
 
 def _reference(frame: _Frame, y: float, label: str) -> str:
     at = frame.y(y)
     return (
-        f'<path class="lab-reference" d="M{_LEFT:g} {at:.1f}H{frame.right:g}"/>'
-        f'<text x="{_LEFT + 4:g}" y="{at - 4:.1f}">{escape(label)}</text>'
+        f'<path class="lab-reference" d="M{frame.left:.1f} {at:.1f}H{frame.right:.1f}"/>'
+        f'<text x="{frame.left + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
+        f"{_text(label)}</text>"
     )
 
 
-def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int) -> str:
+def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
     path: list[str] = []
-    pen = False
+    for run in _runs(points):
+        path += _drawn(frame, run)
+    style = f' stroke-dasharray="{dash}"' if dash else ""
+    style += ' stroke-linecap="round"' if "h0" in path else ""
+    return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
+
+
+def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
+    """The stretches between values that are no finite numbers."""
+    run: list[tuple[float, float]] = []
     for t, v in points:
-        if v is None or not math.isfinite(v):
+        if v is not None and math.isfinite(v):
+            run.append((t, min(max(v, -_LARGEST), _LARGEST)))
+        elif run:
+            yield run
+            run = []
+    if run:
+        yield run
+
+
+def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
+    """A stretch as path commands, cut at the frame's lower and upper edges."""
+    if len(run) == 1:
+        t, v = run[0]
+        if frame.low <= v <= frame.high:
+            yield from (f"M{frame.x(t):.1f} {frame.y(v):.1f}", "h0")  # round ends make a point seen
+        return
+    pen = False
+    for (t0, v0), (t1, v1) in pairwise(run):
+        begin, end = _within(frame, v0, v1)
+        if begin > end:
             pen = False
             continue
-        # What leaves the frame is drawn a little beyond it and cut by the view.
-        v = min(max(v, frame.low), frame.high)
-        path.append(f"{'L' if pen else 'M'}{frame.x(t):.1f} {frame.y(v):.1f}")
-        pen = True
-    dash = _DASHES[n % len(_DASHES)]
-    style = f' stroke-dasharray="{dash}"' if dash else ""
-    return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
+        if not pen:
+            at = t0 + begin * (t1 - t0), v0 + begin * (v1 - v0)
+            yield f"M{frame.x(at[0]):.1f} {frame.y(at[1]):.1f}"
+        at = (t1, v1) if end == 1 else (t0 + end * (t1 - t0), v0 + end * (v1 - v0))
+        yield f"L{frame.x(at[0]):.1f} {frame.y(at[1]):.1f}"
+        pen = end == 1
+
+
+def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
+    """From where to where (0 to 1) a segment is inside the frame; the end first where nowhere."""
+    if v0 == v1:
+        return (0.0, 1.0) if frame.low <= v0 <= frame.high else (1.0, 0.0)
+    # Halved, so that the difference of two large numbers is finite.
+    change = v1 / 2 - v0 / 2
+    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.low, frame.high))
+    return max(cuts[0], 0.0), min(cuts[1], 1.0)
 
 
 def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
     """Names at the ends of the lines, moved apart where they would overlap."""
-    placed: list[str] = []
-    last = -math.inf
-    for y, label, n in sorted(ends):
-        last = max(y, last + _LABEL_GAP)
-        placed.append(
-            f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:g}" '
-            f'y="{last + 3.5:.1f}">{escape(label)}</text>'
-        )
-    return placed
+    places: list[float] = []
+    for y, _, _ in sorted(ends):
+        places.append(max(y, places[-1] + _LABEL_GAP) if places else y)
+    most = _HEIGHT - _BOTTOM
+    for i in reversed(range(len(places))):  # those that were pushed out at the bottom go up again
+        most = places[i] = min(places[i], most)
+        most -= _LABEL_GAP
+    return [
+        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:.1f}" '
+        f'y="{place + 3.5:.1f}">{_text(label)}</text>'
+        for (_, label, n), place in zip(sorted(ends), places, strict=True)
+    ]

@@ -114,20 +114,25 @@ def _box(size: tuple[float, ...]) -> Surface:
 @lru_cache(maxsize=1)
 def _unit_sphere() -> Surface:
     rows = _AROUND // 2 + 1
-    polar = np.linspace(0.0, np.pi, rows)
-    around = np.linspace(0.0, 2 * np.pi, _AROUND + 1)
-    t, p = np.meshgrid(polar, around, indexing="ij")
-    xyz = np.stack((np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)), axis=-1)
-    vertices = xyz.reshape(-1, 3)
+    vertices = _turned(np.linspace(0.0, np.pi, rows))
     return Surface(vertices, vertices, _grid_faces(rows, _AROUND + 1))
 
 
+def _turned(polar: Array) -> Array:
+    """Points of the unit sphere: a row all around for each angle from the pole."""
+    around = np.linspace(0.0, 2 * np.pi, _AROUND + 1)
+    t, p = np.meshgrid(polar, around, indexing="ij")
+    xyz = np.stack((np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)), axis=-1)
+    return xyz.reshape(-1, 3)
+
+
 def _capsule(radius: float, half: float) -> Surface:
-    unit = _unit_sphere()
-    shift = np.where(unit.vertices[:, 2] >= 0, half, -half)
-    vertices = unit.vertices * radius
-    vertices[:, 2] += shift
-    return Surface(vertices, unit.vertices, unit.faces)
+    rows = _AROUND // 4 + 1
+    upper = np.linspace(0.0, np.pi / 2, rows)
+    normals = _turned(np.concatenate((upper, np.pi - upper[::-1])))
+    vertices = normals * radius
+    vertices[:, 2] += np.repeat((half, -half), rows * (_AROUND + 1))
+    return Surface(vertices, normals, _grid_faces(2 * rows, _AROUND + 1))
 
 
 def _cylinder(radius: float, half: float) -> Surface:

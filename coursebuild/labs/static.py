@@ -31,12 +31,20 @@ _KINDS: dict[int, Kind] = {
     8: "sdf",
 }
 """mjtGeom."""
+_HEIGHT_FIELD = 1
+_MESHES = (7, 8)
+_LONG = (3, 5)
+"""Capsules and cylinders."""
 _ARROWS = (100, 101, 102)
 _VISIBLE = (0, 1, 2)
 """Groups that MuJoCo shows by itself."""
 _GEOM, _DECORATION = 19, 24
 """Floats of a geom and of a decoration in a frame."""
 _WIDTH = 640
+_FROM_AFAR = 1000.0
+_LARGE = 1e9
+"""From here on numbers are shown as powers of ten, as in the live lab."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
@@ -44,13 +52,12 @@ def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
     scene = unpacked(main["scene"])
     frame = unpacked(main["pictures"][0]["frame"])
     camera = scene["camera"]
-    seen = Camera(
-        camera["azimuth"],
-        camera["elevation"],
-        camera["distance"],
-        tuple(camera["target"]),
-        camera["fovy"],
-    )
+    distance, fovy = camera["distance"], camera["fovy"]
+    if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
+        distance *= _FROM_AFAR
+        fovy = math.degrees(2 * math.atan(fovy / 2 / distance))
+    target = tuple(camera["target"])
+    seen = Camera(camera["azimuth"], camera["elevation"], distance, target, fovy)
     return png(draw(tuple(scene_solids(scene, frame)), seen, _size(lab)))
 
 
@@ -77,8 +84,13 @@ def static_form(lab: Lab, main: dict[str, Any], picture: bytes) -> StaticForm:
 def _shown(value: Any, digits: int) -> str:
     if isinstance(value, str):
         return value
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        return str(value)
+    if not isinstance(value, int | float):
+        return "\u2013"
+    if not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "\u221e" if value > 0 else "\u2212\u221e"
+    if abs(value) >= _LARGE:
+        mantissa, exponent = f"{value:.{max(2, digits)}e}".split("e")
+        return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "\u2212")
     text = f"{value:.{digits}f}"
     if float(text) == 0:
         text = text.lstrip("-")
@@ -100,14 +112,17 @@ def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
             solid = _solid(item["type"], data, row, (meshes, fields), _square(scene, item))
             if solid is not None:
                 yield solid
+    yield from _soft(scene, frame)
     start = layout["trail"] + 3 * int(frame[2])
     for i in range(int(frame[1])):
         row = frame[start + _DECORATION * i : start + _DECORATION * (i + 1)]
         kind, data = int(row[0]), int(row[1])
         size = row[4:7]
-        if kind in (3, 5):  # the visualizer's capsules and cylinders have their half-length last
+        if kind in _LONG:  # the visualizer's have their half-length last
             size = size[[0, 2, 2]]
         placed = np.concatenate((row[7:10], row[10:19], size, row[19:23]))
+        # The visualizer counts a mesh and its hull: both have the mesh's shape here.
+        data = data // 2 if kind in _MESHES else data
         solid = _solid(kind, data, placed, (meshes, fields), 0.0)
         if solid is not None:
             yield solid
@@ -116,6 +131,8 @@ def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
 def _solid(
     kind: int, data: int, row: Array, shapes: tuple[list[Surface], list[Surface]], square: float
 ) -> Solid | None:
+    if not np.isfinite(row[:15]).all():
+        return None  # the simulation blew up
     position, rotation, size = row[:3], row[3:12].reshape(3, 3), row[12:15]
     rgba = cast("tuple[float, float, float, float]", tuple(float(x) for x in row[15:19]))
     if kind in _ARROWS:
@@ -124,10 +141,9 @@ def _solid(
         position = position + rotation[:, 2] * half
     elif kind in _KINDS:
         given = None
-        # The visualizer counts a mesh and its hull: both have the mesh's shape here.
-        if kind in (7, 8) and data >= 0:
-            given = shapes[0][data if data < len(shapes[0]) else data // 2]
-        elif kind == 1 and data >= 0:
+        if kind in _MESHES and 0 <= data < len(shapes[0]):
+            given = shapes[0][data]
+        elif kind == _HEIGHT_FIELD and 0 <= data < len(shapes[1]):
             given = shapes[1][data]
         shape = surface(_KINDS[kind], tuple(float(x) for x in size), given)
     else:
@@ -135,6 +151,21 @@ def _solid(
     if shape is None:
         return None
     return Solid(shape, position, rotation, rgba, square if kind == 0 else 0.0)
+
+
+def _soft(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
+    """Flexes with a surface, and skins: their vertices are in the frame, in the world."""
+    for part, floats in (("flexes", 3), ("skins", 6)):
+        begin = scene["layout"]["flex" if part == "flexes" else "skin"]
+        for item in scene[part]:
+            faces = np.asarray(item["elements" if part == "flexes" else "faces"], dtype=np.int64)
+            if item["group"] not in _VISIBLE or faces.size == 0 or item.get("dim", 2) < 2:
+                continue
+            first = begin + floats * item["start"]
+            rows = frame[first : first + floats * item["count"]].reshape(-1, floats)
+            shape = mesh_surface(rows[:, :3], faces.reshape(-1, 3))
+            rgba = cast("tuple[float, float, float, float]", tuple(float(x) for x in item["rgba"]))
+            yield Solid(shape, np.zeros(3), np.eye(3), rgba)
 
 
 def _square(scene: dict[str, Any], item: dict[str, Any]) -> float:

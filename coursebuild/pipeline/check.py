@@ -32,7 +32,7 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
-    chosen = select(course, names)
+    chosen = select(course, names, options.root)
     verified = verify(course, options, progress, chosen.documents)
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)
@@ -72,7 +72,7 @@ def _no_scripts(
 
 
 def _chosen(chosen: Selection) -> str:
-    ids = ", ".join(lesson.id for lesson in chosen.lessons)
     if chosen.documents is None:
         return "the course has"
-    return f"lessons {ids} have" if len(chosen.lessons) > 1 else f"lesson {ids} has"
+    ids = [*(lesson.id for lesson in chosen.lessons), *(page.id for page in chosen.pages)]
+    return f"{', '.join(ids)} {'have' if len(ids) > 1 else 'has'}"

@@ -40,10 +40,12 @@ from coursebuild.labs.verdict import (
     trial_diagnostics,
 )
 from coursebuild.model import Course, Lab, document_blocks
+from coursebuild.pipeline.custom_labs import custom_lab
 from coursebuild.pipeline.options import Options
 from coursebuild.results import CompileResult, LabResult, StaticForm
 from coursebuild.scripts.extract import owners
 
+_OURS = "simlab"
 _WALL = 60.0
 """Seconds that a trial may take."""
 _PARITY_SECONDS = 1.0
@@ -113,6 +115,14 @@ def try_labs(
                 continue
             if any(lab.span.contains(diagnostic.span) for diagnostic in wrong):
                 continue
+            if lab.kind != _OURS:
+                native = engines.native.save
+                result, diagnostics = custom_lab(
+                    options.root, course, models, owner, name, lab, native
+                )
+                found += diagnostics
+                results += [result] if result is not None else []
+                continue
             source = _source(course, models, lab)
             if source is None:
                 continue
@@ -137,8 +147,6 @@ class _Source:
 
 def _source(course: Course, models: Mapping[str, CompileResult], lab: Lab) -> _Source | None:
     """A lab's model; `None` for one that does not compile, as is told already."""
-    if lab.kind != "simlab":
-        return None
     if lab.xml is not None:
         text = lab.xml.text
         return _Source("models/.lab.xml", text, None if "file" in text else ())

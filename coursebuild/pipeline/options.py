@@ -5,13 +5,14 @@ Entry points: `Options`, `find_course(directory)`, `select`.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from coursebuild.diagnostics import did_you_mean
+from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import find_root
-from coursebuild.model import Course, Lesson, Status
+from coursebuild.model import Course, Lesson, Page, Status
 
 
 class UsageError(Exception):
@@ -43,35 +44,56 @@ def find_course(directory: str | None) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The lessons that a command is about."""
+    """The lessons and pages that a command is about."""
 
     lessons: tuple[Lesson, ...]
+    pages: tuple[Page, ...]
     documents: frozenset[str] | None
-    """Paths of their files; `None`: everything, pages included."""
+    """Paths of their files; `None`: everything."""
 
 
-def select(course: Course, names: tuple[str, ...]) -> Selection:
-    """The lessons that the names mean (id, slug, `id-slug`, or path); all where there are none.
+def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
+    """What the names mean: lessons by id, slug, `id-slug` or file, pages by id or file.
 
-    Raises `UsageError` for a name that means no lesson, or one that is not written yet.
+    Everything where there are none. A file may be given from the course's folder or from the
+    working directory.
+
+    Raises `UsageError` for a name that means nothing, or a lesson that is not written yet.
     """
     if not names:
         written = tuple(lesson for lesson in course.lessons if lesson.document is not None)
-        return Selection(written, None)
-    by_name: dict[str, Lesson] = {}
+        return Selection(written, course.pages, None)
+    chosen = [_named(course, name, root) for name in names]
+    lessons = tuple(lesson for lesson in course.lessons if lesson in chosen)
+    pages = tuple(page for page in course.pages if page in chosen)
+    paths = {lesson.path for lesson in lessons} | {page.path for page in pages}
+    return Selection(lessons, pages, frozenset(paths))
+
+
+def _named(course: Course, name: str, root: Path) -> Lesson | Page:
+    by_name: dict[str, Lesson | Page] = {}
+    for page in course.pages:
+        by_name |= {page.id: page, page.path: page}
     for lesson in course.lessons:
         file = f"{lesson.id}-{lesson.slug}"
         for alias in (lesson.slug, file, f"{file}.md", lesson.path, lesson.id):
             by_name[alias] = lesson
-    chosen: dict[str, Lesson] = {}
-    for name in names:
-        found = by_name.get(name) or by_name.get(Path(name).name)
-        if found is None:
-            slugs = [lesson.slug for lesson in course.lessons]
-            help = did_you_mean(name, [lesson.id for lesson in course.lessons] + slugs)
-            raise UsageError(f"no lesson is called `{name}`" + (f"; {help}" if help else ""))
-        if found.status is Status.PLANNED:
-            raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
-        chosen[found.id] = found
-    lessons = tuple(lesson for lesson in course.lessons if lesson.id in chosen)
-    return Selection(lessons, frozenset(lesson.path for lesson in lessons))
+    found = by_name.get(name) or by_name.get(_from_root(name, root))
+    if found is None:
+        near = nearest(name, [alias for alias in by_name if ("/" in alias) == ("/" in name)])
+        written = [lesson.id for lesson in course.lessons if lesson.status is not Status.PLANNED]
+        known = did_you_mean("", [*written, *(page.id for page in course.pages)])
+        help = f"did you mean `{near}`?" if near is not None else known
+        raise UsageError(f"no lesson or page is called `{name}`" + (f"; {help}" if help else ""))
+    if isinstance(found, Lesson) and found.status is Status.PLANNED:
+        raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
+    return found
+
+
+def _from_root(name: str, root: Path) -> str:
+    """A path as the course names it: given from its folder, or from the working directory."""
+    for start in (root, Path.cwd()):
+        path = Path(os.path.normpath(start / name))
+        if path.exists() and path.is_relative_to(root):
+            return path.relative_to(root).as_posix()
+    return name

@@ -49,7 +49,7 @@ def _update(
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
-    chosen = select(course, names)
+    chosen = select(course, names, options.root)
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
     first = run(scripts, options, progress)

@@ -11,6 +11,7 @@ Entry point: `verify(course, options, progress, lessons)`.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,8 +26,9 @@ from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
+from coursebuild.effects.write import remove_leftovers
 from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
-from coursebuild.pipeline.labs import Engines, try_labs
+from coursebuild.pipeline.labs import Engines, labs_of, try_labs
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.report import LabLine, ScriptLine
@@ -80,7 +82,8 @@ def verify(
         trying = beside.submit(work, documents, compiled)
         try:
             runs = run(chosen, options, progress)
-            with progress.stage("trying labs"):
+            there_are_labs = any(True for _ in labs_of(course))
+            with progress.stage("trying labs") if there_are_labs else contextlib.nullcontext():
                 labs, lab_findings = trying.result()
         except BaseException:  # Ctrl-C does not wait for a lab
             engines.stop()
@@ -128,6 +131,7 @@ class ExtractedScripts:
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     """Bring `examples/` up to date, as far as nobody's edits are lost."""
     parsed = extract(course)
+    remove_leftovers({(options.root / d.source.path).parent for d in course.documents})
     try:
         report = write_examples(options.root, [(e.path, e.data) for e in parsed.value])
     except OutsideProjectError as error:

@@ -65,6 +65,8 @@ def lab_line(line: LabLine, style: Style) -> str:
     """One lab: verdict, name, how fast it ran, what was tried, how it compares."""
     verdict = style.paint(f"{line.status:<8}", _GREEN if line.status == "ok" else _RED)
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
+    if line.status == "ok" and line.tried == 0:
+        return f"{verdict} {line.name}  {style.paint('not tried: a kind of its own', _FAINT)}"
     parts += [f"{line.tried} things tried"] + ([line.parity] if line.parity else [])
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), _FAINT)}"

@@ -67,6 +67,10 @@ def record_table(
 ) -> Recording:
     """The recording whose body is a table."""
     span, script = caption_span.to(table.span), _script(caption_span, session)
+    if not any(cell.text.text for row in table.rows for cell in row):
+        message = "the recorded table has no rows, so that nothing is compared"
+        help = "write what the script prints into the rows below the header"
+        session.report(diagnose("recording-body", table.span.first_line(), message, help=help))
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 

@@ -29,8 +29,7 @@ globalThis.reserve = (name, size) => {
 globalThis.boot = () => {
   const module = new WebAssembly.Module(buffers.get('wasm'))
   buffers.delete('wasm')
-  const instantiate = (imports) => ({ instance: new WebAssembly.Instance(module, imports), module })
-  createEngine(loadMujoco, instantiate, (text) => printed.push(text)).then(
+  createEngine(loadMujoco, module, (text) => printed.push(text)).then(
     (started) => (engine = started),
     (error) => (failure = error.message),
   )

@@ -15,13 +15,11 @@ const host = new Host({
     const response = await get(url)
     return new Uint8Array(await response.arrayBuffer())
   },
-  async instantiate(imports, url) {
+  async compile(url) {
     const response = await get(url)
     // Compiling while it arrives needs the right media type, which not every server sends.
-    if (/^application\/wasm\b/.test(response.headers.get('Content-Type') ?? '')) {
-      return WebAssembly.instantiateStreaming(response, imports)
-    }
-    return WebAssembly.instantiate(await response.arrayBuffer(), imports)
+    const streams = /^application\/wasm\b/.test(response.headers.get('Content-Type') ?? '')
+    return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer())
   },
 })
 

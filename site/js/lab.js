@@ -32,7 +32,7 @@ export async function mountLab(element, texts) {
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
     return instrument
   } catch (error) {
-    element.prepend(h('p', { class: 'lab-message lab-is-wrong', role: 'alert' }, error.message))
+    element.querySelector('.lab-title').after(h('p', { class: 'lab-message lab-is-wrong', role: 'alert' }, error.message))
     return null
   }
 }

@@ -8,11 +8,10 @@ import { saveModel } from '../js/lab/trial/parity.js'
 
 export const here = (name) => new URL(name, import.meta.url)
 export const wasm = new WebAssembly.Module(readFileSync(new URL(import.meta.resolve('@mujoco/mujoco/mujoco.wasm'))))
-export const instantiate = (imports) => ({ instance: new WebAssembly.Instance(wasm, imports), module: wasm })
 export { loadMujoco }
 
 /** A new engine; most tests of a file share one. */
-export const newEngine = (log) => createEngine(loadMujoco, instantiate, log)
+export const newEngine = (log) => createEngine(loadMujoco, wasm, log)
 
 /** An MJCF text as the bytes of a compiled model. */
 export function compile(engine, xml) {

@@ -81,6 +81,7 @@ def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:
     name = ""
     for raw in stream:
         line = raw.decode().rstrip("\r\n")
+        assert line != ": still here", "nothing was told for 15 s"
         if line.startswith("event: "):
             name = line.removeprefix("event: ")
         elif line.startswith("data: "):

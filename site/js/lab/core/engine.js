@@ -1,8 +1,8 @@
 /**
  * MuJoCo's WebAssembly build, and the models that it holds.
  *
- *   createEngine(loadMujoco, instantiate) → Promise<Engine>
- *   engine.load(bytes)                    → Handles
+ *   createEngine(loadMujoco, module) → Promise<Engine>
+ *   engine.load(bytes)               → Handles
  *
  * The bindings hand out C++ objects that JavaScript does not collect. Here each has one owner, who deletes it once:
  * `Handles` owns a model with its data, and whoever calls `load` owns the handles. `model.opt`, `data.warning` and the like
@@ -21,31 +21,26 @@ export class EngineError extends Error {
 /**
  * Start the engine.
  *
+ * It is compiled beforehand, for the glue goes on waiting for a module that does not come.
+ *
  * @param {(module: object) => Promise<object>} loadMujoco the default export of @mujoco/mujoco
- * @param {(imports: object) => {instance: WebAssembly.Instance, module: WebAssembly.Module} | Promise<...>} instantiate
- *   at once where it returns a result, as an engine without an event loop needs
+ * @param {WebAssembly.Module} module mujoco.wasm
  * @param {(text: string) => void} [log] what the engine prints
  * @returns {Promise<Engine>}
  */
-export async function createEngine(loadMujoco, instantiate, log = () => {}) {
-  let fail
-  const failed = new Promise((_, reject) => (fail = reject))
-  const loaded = loadMujoco({
-    print: log,
-    printErr: log,
-    instantiateWasm(imports, done) {
-      const started = readableBooleans(imports.env)
-      const use = ({ instance, module }) => {
+export async function createEngine(loadMujoco, module, log = () => {}) {
+  try {
+    const mj = await loadMujoco({
+      print: log,
+      printErr: log,
+      instantiateWasm(imports, done) {
+        const started = readableBooleans(imports.env)
+        const instance = new WebAssembly.Instance(module, imports)
         started(instance)
         done(instance, module)
-      }
-      const result = instantiate(imports)
-      if (typeof result.then === 'function') result.then(use, fail)
-      else use(result)
-    },
-  })
-  try {
-    return new Engine(await Promise.race([loaded, failed]))
+      },
+    })
+    return new Engine(mj)
   } catch (error) {
     throw new EngineError(`the engine does not start: ${error.message ?? error}`, true)
   }

@@ -9,12 +9,15 @@
  * new and everything derived from them is old), and looking, however often, changes no bit of the motion.
  */
 
-import { contactList, createLib } from './lib.js'
-import { call, readable } from './piece.js'
+import { Controls } from './controls.js'
 import { Drag } from './drag.js'
-import { generator } from './random.js'
+import { environment } from './environment.js'
 import { Pictures } from './frame.js'
+import { keyframe, siteOf } from './names.js'
+import { call, readable } from './piece.js'
+import { generator } from './random.js'
 import { Sampler } from './sampler.js'
+import { State } from './state.js'
 import { Watch } from './watch.js'
 
 export class Lab {
@@ -42,7 +45,6 @@ export class Lab {
 
   build() {
     const { engine, config, code, handles } = this
-    const { mj, k } = engine
     const { model, data, shown } = handles
     Watch.keep(engine, model)
     this.model = model
@@ -51,63 +53,33 @@ export class Lab {
     this.paused = !config.autoplay
     this.key = keyframe(engine, model, config.key)
     this.ctx = {}
-    this.scratch = { force: handles.own(new mj.DoubleBuffer(6)) }
+    this.scratch = { force: handles.own(new engine.mj.DoubleBuffer(6)) }
     this.watch = new Watch(engine, model, data)
     this.sampler = new Sampler(config, code, siteOf(engine, model, config.trail))
     this.pictures = new Pictures(engine, handles, config, this.sampler)
     this.drag = new Drag(engine, handles, this.pictures.scene)
-    this.signature = k.state.INTEGRATION
-    this.stateSize = mj.mj_stateSize(model, this.signature)
-    this.stateBuffer = handles.own(new mj.DoubleBuffer(Math.max(1, this.stateSize)))
-    this.env = this.environment(data, true)
-    this.view = this.environment(shown, false)
+    this.physics = new State(engine, handles)
+    this.env = environment(this, data, true)
+    this.view = environment(this, shown, false)
+    this.controls = new Controls(config.controls, code.controls, this.env)
     this.warnings = []
     this.forget()
-  }
-
-  /** What lab code sees; code that only looks (`acts` is false) may not act. */
-  environment(data, acts) {
-    const { engine, model, ctx, scratch } = this
-    const act = (name, action) =>
-      acts
-        ? action
-        : () => {
-            throw new Error(`${name}() is not for code that only looks`)
-          }
-    const random = act('lib.random', () => this.draw())
-    const lab = this
-    const sim = Object.freeze({
-      get time() {
-        return data.time
-      },
-      get paused() {
-        return lab.paused
-      },
-      play: act('sim.play', () => this.setPaused(false)),
-      pause: act('sim.pause', () => this.setPaused(true)),
-      reset: act('sim.reset', () => this.reset()),
-      step: act('sim.step', (n = 1) => void this.step(n)),
-      contacts: () => contactList(engine, model, data, scratch),
-    })
-    return Object.freeze({ model, data, mj: engine.mj, sim, ctx, lib: createLib(engine, model, data, scratch, random) })
   }
 
   // --- life
 
   /** Begin: every control at its value, then as after a reset. Controls without `init` are applied here only. */
   start() {
-    this.values = this.config.controls.map(initialValue)
-    this.applyParams()
+    this.controls.restart()
+    this.controls.applyParams()
     this.toKeyframe()
-    this.config.controls.forEach((control, i) => {
-      if (!control.init && !this.isParam(i)) this.apply(i)
-    })
+    this.controls.applyOnce()
     this.prepare()
   }
 
   /** The keyframe, the parameters, `setup`, then the controls with `init`. */
   reset() {
-    this.applyParams()
+    this.controls.applyParams()
     this.toKeyframe()
     this.prepare()
   }
@@ -123,9 +95,7 @@ export class Lab {
 
   prepare() {
     if (this.code.setup) call(['setup'], () => this.code.setup(this.env))
-    this.config.controls.forEach((control, i) => {
-      if (control.init && !this.isParam(i)) this.apply(i)
-    })
+    this.controls.applyInit()
     this.forget()
     this.settle()
   }
@@ -167,37 +137,24 @@ export class Lab {
 
   // --- controls
 
-  isParam(i) {
-    return this.config.controls[i].param != null
-  }
-
-  applyParams() {
-    this.config.controls.forEach((_, i) => {
-      if (this.isParam(i)) this.apply(i)
-    })
-  }
-
-  apply(i) {
-    const control = this.code.controls[i]
-    const value = this.values[i]
-    if (control.set && value !== null) call(['controls', i], () => control.set(this.env, value))
+  /** The value of each control; `null`: it has none, or none yet. */
+  get values() {
+    return this.controls.values
   }
 
   /** Set a slider or a list to a value. */
   setControl(i, value) {
-    checkValue(this.config.controls[i], i, value)
-    this.values[i] = value
-    this.apply(i)
+    this.controls.take(i, value)
+    this.engine.mj.mj_forward(this.model, this.data)
+    this.controls.apply(i)
     if (this.config.controls[i].reset) this.reset()
     else this.settle()
   }
 
   /** Press a button. */
   press(i) {
-    const control = this.code.controls[i]
-    if (!control?.run) throw new RangeError(`control ${i} is not a button`)
     this.engine.mj.mj_forward(this.model, this.data)
-    call(['controls', i, 'run'], () => control.run(this.env))
+    this.controls.press(i)
     this.settle()
   }
 
@@ -247,7 +204,7 @@ export class Lab {
     this.dirty = true
     const findings = this.watch.look(before)
     if (findings !== null) {
-      findings.warnings.forEach((finding) => this.note(finding))
+      this.warnings.push(...findings.warnings)
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
     }
     const timestep = this.option.timestep
@@ -261,9 +218,8 @@ export class Lab {
   /** Bring `shown` up to date, and return what looking code sees. */
   sync() {
     if (this.dirty) {
-      const { mj } = this.engine
-      mj.mj_copyState(this.model, this.data, this.view.data, this.signature)
-      mj.mj_forward(this.model, this.view.data)
+      this.physics.copy(this.view.data)
+      this.engine.mj.mj_forward(this.model, this.view.data)
       this.dirty = false
     }
     return this.view
@@ -328,59 +284,20 @@ export class Lab {
 
   /** All that the motion depends on, given model and code: can be cloned and sent. */
   state() {
-    const { mj } = this.engine
-    mj.mj_getState(this.model, this.data, this.stateBuffer, this.signature)
-    return {
-      values: [...this.values],
-      steps: this.steps,
-      time: this.data.time,
-      physics: Float64Array.from(this.stateBuffer.GetView().subarray(0, this.stateSize)),
-    }
+    return { values: [...this.values], steps: this.steps, time: this.data.time, physics: this.physics.read() }
   }
 
   /** Go to a state: its controls, a reset, and then its physics where it holds any. */
   restore({ values, steps = 0, physics = null }) {
     values.forEach((value, i) => {
-      if (value === null || this.config.controls[i]?.type === 'button') return
-      checkValue(this.config.controls[i], i, value)
-      this.values[i] = value
+      if (value !== null) this.controls.take(i, value)
     })
-    this.config.controls.forEach((_, i) => this.apply(i))
+    this.controls.each()
     this.reset()
     if (physics === null) return
-    if (physics.length !== this.stateSize) {
-      throw new RangeError(`a state of ${physics.length} numbers does not fit the model, which has ${this.stateSize}`)
-    }
-    this.engine.mj.mj_setState(this.model, this.data, Array.from(physics), this.signature)
+    this.physics.write(physics)
     this.forget()
     this.steps = steps
     this.settle()
   }
-}
-
-function initialValue(control) {
-  if (control.type === 'button') return null
-  if (control.type === 'select') return control.value ?? control.options[0][1]
-  return control.value
-}
-
-function checkValue(control, i, value) {
-  if (control === undefined || control.type === 'button') throw new RangeError(`control ${i} takes no value`)
-  const fits =
-    control.type === 'select' ? control.options.some((option) => option[1] === value) : Number.isFinite(value)
-  if (!fits) throw new RangeError(`the control "${control.label}" cannot be set to ${JSON.stringify(value)}`)
-}
-
-function keyframe(engine, model, key) {
-  if (key === null || key === undefined) return -1
-  const index = typeof key === 'number' ? key : engine.mj.mj_name2id(model, engine.k.obj.KEY, key)
-  if (!(Number.isInteger(index) && index >= 0 && index < model.nkey)) throw new RangeError(`the model has no keyframe ${JSON.stringify(key)}`)
-  return index
-}
-
-function siteOf(engine, model, name) {
-  if (!name) return -1
-  const site = engine.mj.mj_name2id(model, engine.k.obj.SITE, name)
-  if (site < 0) throw new RangeError(`the model has no site "${name}"`)
-  return site
 }

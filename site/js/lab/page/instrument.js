@@ -30,7 +30,7 @@ export class Instrument {
     Object.assign(this, { element, config, words })
     this.values = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
-    this.time = 0
+    this.rest = null // what to say of a pause, with the time of its picture
     this.pressed = false
     this.wanted = null
     this.build()
@@ -148,8 +148,7 @@ export class Instrument {
       this.notices.clear()
       this.notices.say(this.words('lab.live.said_playing'))
     }
-    const key = { user: 'said_paused', code: 'said_paused', stopAt: 'said_stopped' }[reason]
-    if (key) this.notices.say(this.words(`lab.live.${key}`, { t: formatTime(this.simulation.latest?.time ?? 0) }))
+    this.rest = { user: 'said_paused', code: 'said_paused', stopAt: 'said_stopped' }[reason] ?? null
   }
 
   collect({ times, values }, fresh) {
@@ -165,6 +164,8 @@ export class Instrument {
   /** Numbers and plots follow the picture, though not as often. */
   refresh({ time, readouts, realtime }, now) {
     const resting = this.state !== 'playing'
+    if (this.rest !== null) this.notices.say(this.words(`lab.live.${this.rest}`, { t: formatTime(time) }))
+    this.rest = null
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
@@ -197,6 +198,7 @@ export class Instrument {
 
   reset() {
     this.simulation.reset()
+    this.rest = null
     this.notices.say(this.words('lab.live.said_reset'))
   }
 

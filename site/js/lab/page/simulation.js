@@ -14,7 +14,8 @@
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
  *   noPicture()            the browser has no WebGL
  *
- * Buffers of frames go back to the worker once for each refresh of the screen, which makes the worker send one for each.
+ * Every frame is answered at the next refresh of the screen, which makes the worker send one for each. The answer is the buffer of
+ * the frame before: the newest one stays here, to be drawn again when the camera moves.
  */
 
 import { connection } from './connection.js'
@@ -38,7 +39,7 @@ export class Simulation {
 
   connect() {
     const { config, address } = this
-    this.spent = []
+    this.spent = [] // one for each frame that was not answered yet; null: a new buffer has to be made
     this.latest = null
     this.epoch = null
     this.diverged = false
@@ -150,8 +151,8 @@ export class Simulation {
 
   took(frame) {
     const { buffer, samples } = frame
-    const spent = this.view === null ? { buffer } : this.view.setFrame(new Float32Array(buffer))
-    if (spent !== null) this.spent.push(spent.buffer)
+    const before = this.view === null ? { buffer } : this.view.setFrame(new Float32Array(buffer))
+    this.spent.push(before?.buffer ?? null)
     this.latest = frame
     const fresh = samples.epoch !== this.epoch
     this.epoch = samples.epoch
@@ -165,7 +166,7 @@ export class Simulation {
 
   refresh(now) {
     this.request = 0
-    for (const buffer of this.spent.splice(0)) this.send({ type: 'frame', buffer }, [buffer])
+    for (const buffer of this.spent.splice(0)) this.send({ type: 'frame', buffer }, buffer === null ? [] : [buffer])
     this.on.refresh?.(this.latest, now)
   }
 }

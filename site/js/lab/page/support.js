@@ -6,7 +6,6 @@
  * @returns {string | null} the key of the word that says it
  */
 export function missing() {
-  if (window.location.protocol === 'file:') return 'lab.live.from_disk'
   if (typeof WebAssembly !== 'object') return 'lab.live.no_wasm'
   if (typeof Worker !== 'function') return 'lab.live.no_worker'
   return null

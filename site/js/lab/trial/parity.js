@@ -14,14 +14,11 @@ const MOST_WRITES = 1_000_000
 export class ParityRecorder {
   /** @param {import('../core/lab.js').Lab} lab; @param {Uint8Array} sent the model that it was made of; @param {number} steps at most */
   constructor(lab, sent, steps) {
-    const { mj } = lab.engine
     this.lab = lab
-    this.model = lab.model
-    this.before = lab.handles.own(new mj.DoubleBuffer(Math.max(1, lab.stateSize)))
-    this.after = lab.handles.own(new mj.DoubleBuffer(Math.max(1, lab.stateSize)))
+    this.before = null
     this.mjb = saveModel(lab)
     this.asSent = equalBytes(this.mjb, sent)
-    this.start = lab.state().physics
+    this.start = lab.physics.read()
     this.width = lab.model.nq + lab.model.nv + lab.model.na
     this.stride = Math.max(1, Math.ceil((steps * this.width) / MOST_NUMBERS))
     this.rows = []
@@ -32,23 +29,20 @@ export class ParityRecorder {
 
   /** Before the controller. */
   begin() {
-    const { lab } = this
-    if (lab.code.controller) lab.engine.mj.mj_getState(lab.model, lab.data, this.before, lab.signature)
+    if (this.lab.code.controller) this.before = this.lab.physics.read()
   }
 
   /** Between the controller and the step. */
   controlled() {
-    const { lab, writes } = this
-    if (!lab.code.controller) return
-    lab.engine.mj.mj_getState(lab.model, lab.data, this.after, lab.signature)
-    const old = bits(this.before.GetView())
-    const view = this.after.GetView()
-    const now = bits(view)
-    for (let i = 0; i < lab.stateSize; i++) {
+    if (this.before === null || !this.complete) return
+    const { writes } = this
+    const after = this.lab.physics.read()
+    const [old, now] = [bits(this.before), bits(after)]
+    for (let i = 0; i < after.length; i++) {
       if (old[2 * i] === now[2 * i] && old[2 * i + 1] === now[2 * i + 1]) continue
       writes.steps.push(this.sums.length)
       writes.indices.push(i)
-      writes.values.push(view[i])
+      writes.values.push(after[i])
     }
     if (writes.steps.length > MOST_WRITES) this.complete = false
   }
@@ -67,7 +61,7 @@ export class ParityRecorder {
       mjb: this.asSent ? null : this.mjb,
       modelChanged: !equalBytes(this.mjb, saveModel(this.lab)),
       complete: this.complete,
-      signature: this.lab.signature,
+      signature: this.lab.physics.signature,
       start: this.start,
       steps: this.sums.length,
       stride: this.stride,

@@ -18,7 +18,7 @@ export class Host {
    * @param {(action: () => void, ms: number) => unknown} around.later
    * @param {(url: string) => Promise<Uint8Array>} around.fetchBytes
    * @param {(url: string) => Promise<object>} around.importModule
-   * @param {(imports: object, url: string) => Promise<{instance: object, module: object}>} around.instantiate
+   * @param {(url: string) => Promise<WebAssembly.Module>} around.compile
    * @param {(module: object) => Promise<object>} around.loadMujoco
    */
   constructor(around) {
@@ -51,8 +51,8 @@ export class Host {
   /** Start the engine, once. */
   start(wasm) {
     if (this.engine === null) {
-      const { loadMujoco, instantiate } = this.around
-      this.engine = createEngine(loadMujoco, (imports) => instantiate(imports, wasm))
+      const { loadMujoco, compile } = this.around
+      this.engine = compile(wasm).then((module) => createEngine(loadMujoco, module))
       this.engine.catch(() => (this.engine = null)) // the network may be back for the next lab
     }
     return this.engine

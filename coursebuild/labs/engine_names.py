@@ -1,0 +1,149 @@
+"""What of MuJoCo lab code can use and have translated: names of the bindings and their types.
+
+Entry points: `ARRAYS`, `SCALARS`, `CALLS`.
+
+In JavaScript every array is flat, in Python one of several numbers a row has two dimensions. A test
+holds these tables against the bindings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+Element: TypeAlias = Literal["f64", "f32", "int"]
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayField:
+    """An array of the model or the data: what it holds, and whether NumPy sees rows."""
+
+    element: Element
+    rows: bool
+
+
+_ARRAYS: dict[tuple[str, Element, bool], str] = {
+    ("model", "f32", False): """
+        light_cutoff light_exponent light_softness mat_emission mat_reflectance mat_shininess
+        mat_specular
+    """,
+    ("model", "f64", False): """
+        actuator_armature actuator_cranklength actuator_damping actuator_length0 body_gravcomp
+        body_margin body_mass body_subtreemass cam_fovy cam_ipd dof_armature dof_damping
+        dof_frictionloss dof_invweight0 geom_adhesion geom_gap geom_margin geom_rbound geom_solmix
+        jnt_margin jnt_stiffness key_time qpos0 qpos_spring sensor_cutoff sensor_noise
+        tendon_armature tendon_damping tendon_frictionloss tendon_invweight0 tendon_length0
+        tendon_margin tendon_stiffness tendon_width
+    """,
+    ("model", "int", False): """
+        actuator_actadr actuator_actearly actuator_actlimited actuator_actnum actuator_biastype
+        actuator_ctrllimited actuator_dyntype actuator_forcelimited actuator_gaintype
+        actuator_group actuator_trntype body_conaffinity body_contype body_dofadr body_dofnum
+        body_geomadr body_geomnum body_jntadr body_jntnum body_mocapid body_parentid body_rootid
+        body_treeid body_weldid cam_bodyid cam_mode cam_projection cam_targetbodyid dof_bodyid
+        dof_jntid dof_parentid dof_treeid eq_active0 eq_obj1id eq_obj2id eq_objtype eq_type
+        geom_bodyid geom_conaffinity geom_condim geom_contype geom_dataid geom_group geom_matid
+        geom_priority geom_type jnt_actfrclimited jnt_actgravcomp jnt_actuatorid jnt_bodyid
+        jnt_dofadr jnt_group jnt_limited jnt_qposadr jnt_type light_active light_bodyid
+        light_castshadow light_mode light_targetbodyid light_type sensor_adr sensor_datatype
+        sensor_dim sensor_needstage sensor_objid sensor_objtype sensor_refid sensor_reftype
+        sensor_type site_bodyid site_dataid site_group site_matid site_type tendon_actfrclimited
+        tendon_actuatorid tendon_adr tendon_group tendon_limited tendon_matid tendon_num
+    """,
+    ("model", "f32", True): """
+        geom_rgba light_ambient light_diffuse light_specular mat_rgba site_rgba tendon_rgba
+    """,
+    ("model", "f64", True): """
+        actuator_actrange actuator_biasprm actuator_ctrlrange actuator_dynprm actuator_forcerange
+        actuator_gainprm actuator_gear actuator_lengthrange body_inertia body_invweight0 body_ipos
+        body_iquat body_pos body_quat cam_mat0 cam_pos cam_pos0 cam_poscom0 cam_quat dof_solimp
+        dof_solref eq_data eq_solimp eq_solref geom_aabb geom_fluid geom_friction geom_pos
+        geom_quat geom_size geom_solimp geom_solref jnt_actfrcrange jnt_axis jnt_pos jnt_range
+        jnt_solimp jnt_solref key_act key_ctrl key_mpos key_qpos key_qvel light_dir light_dir0
+        light_pos light_pos0 light_poscom0 site_pos site_quat site_size tendon_actfrcrange
+        tendon_lengthspring tendon_range tendon_solimp_fri tendon_solimp_lim tendon_solref_fri
+        tendon_solref_lim
+    """,
+    ("model", "int", True): """
+        actuator_trnid sensor_intprm
+    """,
+    ("data", "f64", False): """
+        act act_dot actuator_force actuator_length actuator_velocity ctrl energy qacc qacc_smooth
+        qacc_warmstart qfrc_actuator qfrc_adhesion qfrc_applied qfrc_bias qfrc_constraint
+        qfrc_damper qfrc_fluid qfrc_gravcomp qfrc_inverse qfrc_passive qfrc_smooth qfrc_spring
+        qpos qvel sensordata ten_length ten_velocity userdata
+    """,
+    ("data", "int", False): """
+        eq_active
+    """,
+    ("data", "f64", True): """
+        cacc cam_xmat cam_xpos cdof cdof_dot cfrc_ext cfrc_int cinert crb cvel geom_xmat geom_xpos
+        light_xdir light_xpos mocap_pos mocap_quat site_xmat site_xpos subtree_angmom subtree_com
+        subtree_linvel xanchor xaxis xfrc_applied ximat xipos xmat xpos xquat
+    """,
+}
+
+
+def _fields() -> Iterator[tuple[tuple[str, ...], ArrayField]]:
+    for (owner, element, rows), names in _ARRAYS.items():
+        for name in names.split():
+            yield (owner, name), ArrayField(element, rows)
+    for name in "gravity magnetic o_friction o_solimp o_solref wind".split():
+        yield ("model", "opt", name), ArrayField("f64", False)
+    yield ("model", "stat", "center"), ArrayField("f64", False)
+
+
+ARRAYS: dict[tuple[str, ...], ArrayField] = dict(_fields())
+"""Arrays by the way to them: `("model", "opt", "gravity")`."""
+
+SIZES = frozenset(
+    """
+        nq nv nu na nbody njnt ngeom nsite ncam nlight neq nkey nmocap nsensor nsensordata ntendon
+        nuserdata nmat
+    """.split()
+)
+"""Numbers of things in a model, which nothing changes."""
+
+_SCALARS = {
+    "data": ({"time": "float"} | dict.fromkeys("ncon nefc ne nf nl nisland".split(), "size")),
+    "model opt": (
+        dict.fromkeys(
+            """
+                ccd_iterations cone disableactuator disableflags enableflags integrator iterations
+                jacobian ls_iterations noslip_iterations sdf_initpoints sdf_iterations solver
+            """.split(),
+            "int",
+        )
+        | dict.fromkeys(
+            """ccd_tolerance density impratio ls_tolerance noslip_tolerance o_margin
+            sleep_tolerance timestep tolerance viscosity""".split(),
+            "float",
+        )
+    ),
+    "model stat": dict.fromkeys("extent meaninertia meanmass meansize".split(), "float"),
+}
+SCALARS: dict[tuple[str, ...], str] = {
+    (*owner.split(), name): kind
+    for owner, fields in _SCALARS.items()
+    for name, kind in fields.items()
+}
+"""Single numbers by the way to them: `float`, `int`, or `size`, which is only read."""
+
+_STAGES = """
+    mj_resetData mj_forward mj_inverse mj_step mj_step1 mj_step2 mj_fwdPosition mj_fwdVelocity
+    mj_fwdActuation mj_fwdAcceleration mj_fwdConstraint mj_sensorPos mj_sensorVel mj_sensorAcc
+    mj_energyPos mj_energyVel mj_kinematics mj_comPos mj_camlight mj_tendon mj_transmission mj_crb
+    mj_collision mj_makeConstraint mj_projectConstraint mj_referenceConstraint mj_comVel mj_passive
+    mj_subtreeVel mj_rnePostConstraint mj_setConst
+"""
+CALLS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(_STAGES.split(), ("model", "data")),
+    "mj_resetDataKeyframe": ("model", "data", "size"),
+    "mj_name2id": ("model", "int", "str"),
+    "mj_getTotalmass": ("model",),
+    "mj_setTotalmass": ("model", "float"),
+}
+"""Functions and what they take."""
+RESULTS = {"mj_name2id": "int", "mj_getTotalmass": "float"}
+"""What those give that give something."""

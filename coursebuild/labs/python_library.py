@@ -1,0 +1,210 @@
+"""Functions that an exported script brings along: `lib`, and where JavaScript counts otherwise.
+
+Entry point: `LIBRARY`, by name.
+
+Each does what its JavaScript counterpart does, bit for bit where no function of the C library is
+involved, for every number: NaN, infinities and the sign of zero included. None is part of a script
+that does not use it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Helper:
+    """A definition, what it needs, and the modules that it is written with."""
+
+    source: str
+    imports: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+
+
+_ENERGY_TYPE = '''
+class Energy(NamedTuple):
+    """Energies of everything, J."""
+
+    kinetic: float
+    potential: float  # of gravity and springs
+    total: float
+'''
+
+_ENERGY = '''
+def energy(model: mujoco.MjModel, data: mujoco.MjData) -> Energy:
+    """The energy now; `data.energy` stays as it is."""
+    before = data.energy.copy()
+    flags = data.flg_energypos, data.flg_energyvel
+    mujoco.mj_energyPos(model, data)
+    mujoco.mj_energyVel(model, data)
+    potential, kinetic = data.energy.tolist()
+    data.energy[:] = before
+    data.flg_energypos, data.flg_energyvel = flags
+    return Energy(kinetic, potential, kinetic + potential)
+'''
+
+_SUBTREE = '''
+def of_everything(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Momentum (kg m/s), and angular momentum about the common centre of mass (kg m^2/s)."""
+    before = data.subtree_linvel.copy(), data.subtree_angmom.copy()
+    flag = data.flg_subtreevel
+    mujoco.mj_subtreeVel(model, data)
+    linear = data.subtree_linvel[0] * model.body_subtreemass[0]
+    angular = data.subtree_angmom[0].copy()
+    data.subtree_linvel[:], data.subtree_angmom[:] = before
+    data.flg_subtreevel = flag
+    return linear, angular
+'''
+
+_MOMENTUM = '''
+def momentum(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """The momentum of everything, kg m/s."""
+    return of_everything(model, data)[0]
+'''
+
+_ANGMOM = '''
+def angular_momentum(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """The angular momentum of everything about its common centre of mass, kg m^2/s."""
+    return of_everything(model, data)[1]
+'''
+
+_NORMAL_FORCE = '''
+def normal_force(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int | str | None = None
+) -> float:
+    """The normal forces of all contacts, or of those of one geom, added up, in N."""
+    only = None if geom is None else model.geom(geom).id
+    total, force = 0.0, np.zeros(6)
+    for i, contact in enumerate(data.contact):
+        if only is None or only in (contact.geom1, contact.geom2):
+            mujoco.mj_contactForce(model, data, i, force)
+            total += float(force[0])
+    return total
+'''
+
+_NORM = '''
+def norm(vector: Iterable[float]) -> float:
+    """The Euclidean length of a vector."""
+    total = 0.0
+    for x in vector:
+        total += float(x) * float(x)
+    return np.sqrt(total)
+'''
+
+_RAD = '''
+def rad(degrees: float) -> float:
+    """An angle in radians."""
+    return degrees / (180 / math.pi)
+'''
+
+_DEG = '''
+def deg(radians: float) -> float:
+    """An angle in degrees."""
+    return radians * (180 / math.pi)
+'''
+
+_INDEX = '''
+def index(number: float) -> int:
+    """A number as an index: from 0, and whole."""
+    if not (number >= 0 and number == int(number)):
+        raise IndexError(f"{number} is no index")
+    return int(number)
+'''
+
+_MAXIMUM = '''
+def maximum(*numbers: float) -> float:
+    """The largest of some numbers; NaN if one of them is."""
+    if any(math.isnan(x) for x in numbers):
+        return math.nan
+    return max(numbers, key=lambda x: (x, math.copysign(1.0, x)))
+'''
+
+_MINIMUM = '''
+def minimum(*numbers: float) -> float:
+    """The smallest of some numbers; NaN if one of them is."""
+    if any(math.isnan(x) for x in numbers):
+        return math.nan
+    return min(numbers, key=lambda x: (x, math.copysign(1.0, x)))
+'''
+
+_SIGN = '''
+def sign(x: float) -> float:
+    """-1.0, 0.0 or 1.0."""
+    return x if x == 0 or math.isnan(x) else math.copysign(1.0, x)
+'''
+
+_ROUNDED = '''
+def rounded(x: float) -> float:
+    """The nearest whole number, and of two the larger."""
+    if not math.isfinite(x) or x == 0:
+        return x
+    down = math.floor(x)
+    return math.copysign(float(down + (x - down >= 0.5)), x)
+'''
+
+_POWER = '''
+def power(base: float, exponent: float) -> float:
+    """`base` to the power of `exponent`."""
+    if math.isnan(exponent) or (abs(base) == 1 and math.isinf(exponent)):
+        return math.nan
+    return np.power(float(base), float(exponent))
+'''
+
+
+_RANDOM = '''
+class Random:
+    """The lab's random numbers: xoshiro128** by Blackman and Vigna, seeded by splitmix32."""
+
+    def __init__(self, seed: float) -> None:
+        self.seed = seed
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin the sequence again."""
+        low, high = struct.unpack("<2I", struct.pack("<d", self.seed))
+        z = low ^ high * 0x9E3779B1 & WORD
+        state = []
+        for _ in range(4):
+            z = z + 0x9E3779B9 & WORD
+            x = (z ^ z >> 16) * 0x85EBCA6B & WORD
+            x = (x ^ x >> 13) * 0xC2B2AE35 & WORD
+            state.append(x ^ x >> 16)
+        self.state = state
+
+    def __call__(self) -> float:
+        """A number in [0, 1)."""
+        return ((self._word() >> 5) * 2**26 + (self._word() >> 6)) / 2**53
+
+    def _word(self) -> int:
+        a, b, c, d = self.state
+        c, d = c ^ a, d ^ b
+        self.state = [a ^ d, b ^ c, c ^ b << 9 & WORD, _rotated(d, 11)]
+        return _rotated(b * 5 & WORD, 7) * 9 & WORD
+
+
+def _rotated(x: int, by: int) -> int:
+    return (x << by | x >> 32 - by) & WORD
+
+
+WORD = 2**32 - 1
+'''
+
+LIBRARY: dict[str, Helper] = {
+    "Energy": Helper(_ENERGY_TYPE, ("from typing import NamedTuple",)),
+    "energy": Helper(_ENERGY, needs=("Energy",)),
+    "of_everything": Helper(_SUBTREE, ("import numpy as np",)),
+    "momentum": Helper(_MOMENTUM, ("import numpy as np",), ("of_everything",)),
+    "angular_momentum": Helper(_ANGMOM, ("import numpy as np",), ("of_everything",)),
+    "normal_force": Helper(_NORMAL_FORCE, ("import numpy as np",)),
+    "norm": Helper(_NORM, ("from collections.abc import Iterable", "import numpy as np")),
+    "rad": Helper(_RAD, ("import math",)),
+    "deg": Helper(_DEG, ("import math",)),
+    "index": Helper(_INDEX),
+    "maximum": Helper(_MAXIMUM, ("import math",)),
+    "minimum": Helper(_MINIMUM, ("import math",)),
+    "sign": Helper(_SIGN, ("import math",)),
+    "rounded": Helper(_ROUNDED, ("import math",)),
+    "power": Helper(_POWER, ("import math", "import numpy as np")),
+    "Random": Helper(_RANDOM, ("import struct",)),
+}
+"""What a script can bring along, by name, in the order in which it stands there."""

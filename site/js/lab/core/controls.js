@@ -1,0 +1,72 @@
+/**
+ * The controls of a lab: their values, and applying them.
+ *
+ * A parameter (`param`) is put into `ctx` before anything else runs, at the start and at every reset. A control with `init` is applied
+ * after `setup`, each time. Every other one is applied once at the start, before `setup`, so that the page shows what is.
+ */
+
+import { call } from './piece.js'
+
+export class Controls {
+  /** @param {object[]} data of the controls; @param {object[]} code of the same; @param {object} env what the code sees */
+  constructor(data, code, env) {
+    this.data = data
+    this.code = code
+    this.env = env
+    this.values = data.map(initialValue)
+  }
+
+  /** Back to the values of the start, which the caller has to apply. */
+  restart() {
+    this.values = this.data.map(initialValue)
+  }
+
+  applyParams() {
+    this.each((control) => control.param != null)
+  }
+
+  applyOnce() {
+    this.each((control) => control.param == null && !control.init)
+  }
+
+  applyInit() {
+    this.each((control) => control.param == null && control.init)
+  }
+
+  /** Apply all controls of a kind that have a value. */
+  each(chosen = () => true) {
+    this.data.forEach((control, i) => {
+      if (chosen(control)) this.apply(i)
+    })
+  }
+
+  apply(i) {
+    const control = this.code[i]
+    const value = this.values[i]
+    if (control.set && value !== null) call(['controls', i], () => control.set(this.env, value))
+  }
+
+  /** Take a new value, which is not yet applied; one that the page could not have sent is refused. */
+  take(i, value) {
+    const control = this.data[i]
+    if (control === undefined || control.type === 'button') throw new RangeError(`control ${i} takes no value`)
+    const fits =
+      control.type === 'select' ? control.options.some((option) => option[1] === value) : Number.isFinite(value)
+    if (!fits) throw new RangeError(`the control "${control.label}" cannot be set to ${JSON.stringify(value)}`)
+    this.values[i] = value
+  }
+
+  /** Run the code of a button. */
+  press(i) {
+    const control = this.code[i]
+    if (!control?.run) throw new RangeError(`control ${i} is not a button`)
+    call(['controls', i, 'run'], () => control.run(this.env))
+  }
+}
+
+/** The value with which a control starts; `null`: it has none until it is used. */
+function initialValue(control) {
+  if (control.type === 'button') return null
+  if (control.type === 'select') return control.value ?? control.options[0][1]
+  return control.value
+}

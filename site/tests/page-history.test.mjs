@@ -1,0 +1,46 @@
+/** The samples behind a plot. */
+
+import assert from 'node:assert/strict'
+import { test } from 'node:test'
+import { History } from '../js/lab/page/history.js'
+
+const filled = (history, count, dt = 0.01) => {
+  for (let i = 0; i < count; i++) history.push(i * dt, [9, i, -i], 1)
+  return history
+}
+
+test('samples come out in order, each trace from its place', () => {
+  const [times, a, b] = filled(new History(2, null), 3, 1).data()
+  assert.deepEqual([[...times], [...a], [...b]], [[0, 1, 2], [0, 1, 2], [-0, -1, -2]])
+})
+
+test('a window keeps one sample before it, however long the run', () => {
+  const history = filled(new History(2, 5), 100_000)
+  const [times, a] = history.data()
+  assert.ok(times[0] < history.last - 5 && times[1] >= history.last - 5 - 1e-9)
+  assert.equal(a[a.length - 1], 99_999)
+  assert.ok(times.every((time, i) => i === 0 || time > times[i - 1]))
+  assert.ok(history.columns[0].length <= 4096, `${history.columns[0].length} places`)
+})
+
+test('a plot of everything thins out and still spans the whole run', () => {
+  const history = filled(new History(2, null), 50_000)
+  const [times, a, b] = history.data()
+  assert.ok(history.length > 1500 && history.length <= 4000, String(history.length))
+  assert.equal(times[0], 0)
+  assert.ok(history.last > 499)
+  times.forEach((time, i) => {
+    assert.equal(a[i], Math.round(time * 100))
+    assert.equal(b[i], -a[i])
+  })
+  const gaps = times.slice(1).map((time, i) => Math.round((time - times[i]) * 100))
+  assert.ok(gaps.every((gap) => gap === gaps[0]), 'evenly')
+})
+
+test('cleared, it begins anew', () => {
+  const history = filled(new History(2, null), 50_000)
+  history.clear()
+  assert.equal(history.length, 0)
+  assert.equal(history.last, 0)
+  assert.equal(filled(history, 10).length, 10)
+})

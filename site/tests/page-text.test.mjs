@@ -1,0 +1,103 @@
+/** Numbers, texts, links and scripts that the page writes. */
+
+import assert from 'node:assert/strict'
+import { test } from 'node:test'
+import { fillScript, pythonLiteral } from '../js/lab/page/export.js'
+import { placeOf } from '../js/lab/page/notices.js'
+import { digitsOfStep, formatLabel, formatNumber, formatRatio, formatReadout, formatTime, superscript } from '../js/lab/page/numbers.js'
+import { readLink, writeLink } from '../js/lab/page/share.js'
+import { spread } from '../js/lab/page/spread.js'
+import { fill } from '../js/lab/page/words.js'
+
+test('numbers keep their width when the sign changes, and zero has none', () => {
+  assert.equal(formatNumber(-6, 3), '−6.000')
+  assert.equal(formatNumber(6, 3), '\u20076.000')
+  assert.equal(formatNumber(-0.0001, 3), '\u20070.000')
+  assert.equal(formatNumber(-0, 2), '\u20070.00')
+  assert.equal(formatNumber(0.0624, 5).length, formatNumber(-0.0624, 5).length)
+})
+
+test('numbers without digits have six significant figures; very large and small ones a power of ten', () => {
+  assert.equal(formatNumber(Math.PI, null).trim(), '3.14159')
+  assert.equal(formatNumber(0, null).trim(), '0')
+  assert.equal(formatNumber(1.5e12, null).trim(), '1.5000·10¹²')
+  assert.equal(formatNumber(-2.5e-9, null), '−2.5000·10⁻⁹')
+  assert.equal(formatNumber(3e12, 3).trim(), '3.000·10¹²')
+})
+
+test('what is no number is said', () => {
+  assert.equal(formatNumber(NaN, 3), 'NaN')
+  assert.equal(formatNumber(Infinity, 3), '∞')
+  assert.equal(formatNumber(-Infinity, 3), '−∞')
+  assert.equal(formatReadout('stuck', 3), 'stuck')
+  assert.equal(formatReadout(undefined, 3), '–')
+})
+
+test('labels, times, ratios', () => {
+  assert.equal(formatLabel(-0.30000000000000004), '−0.3')
+  assert.equal(formatLabel(0), '0')
+  assert.equal(formatLabel(2e8), '2.000·10⁸')
+  assert.equal(formatTime(3.14159), '3.14')
+  assert.equal(formatTime(-1), '−1.00')
+  assert.equal(formatRatio(0.412), '0.4')
+  assert.equal(formatRatio(0.0312), '0.03')
+  assert.equal(superscript(-12), '⁻¹²')
+})
+
+test('a slider shows as many digits as its steps need', () => {
+  for (const [step, digits] of [[1, 0], [0.5, 1], [0.25, 2], [0.1, 1], [0.3, 1], [0.001, 3], [10, 0], [null, 2], [1 / 3, 6]]) {
+    assert.equal(digitsOfStep(step), digits, String(step))
+  }
+})
+
+test('values become Python literals', () => {
+  const cases = [[1, '1'], [0.1, '0.1'], [-0, '-0.0'], [1e300, '1e+300'], [NaN, 'float("nan")'], [-Infinity, 'float("-inf")'], [true, 'True'], [null, 'None'], ['a "b"\n', '"a \\"b\\"\\n"']]
+  for (const [value, text] of cases) assert.equal(pythonLiteral(value), text)
+})
+
+test('a script takes the values of the controls, and dollars stay dollars', () => {
+  assert.equal(fillScript('m = {{control:1}}  # $& {{control}}\nn = {{control:0}}', [3, "it's $1"]), 'm = "it\'s $1"  # $& {{control}}\nn = 3')
+})
+
+test('texts take values by name', () => {
+  assert.equal(fill('at {t} s, {x}: {t}', { t: '1.20' }), 'at 1.20 s, {x}: 1.20')
+})
+
+test('a state comes back from a link bit for bit, whatever its values', () => {
+  const physics = new Float64Array([0, -0, NaN, 1 / 3, -1e-310, Infinity])
+  const state = { values: [null, 0.1, 'ä?&#', true], steps: 1234, time: 2.468, physics }
+  const link = writeLink('4.2-lab-1', state)
+  assert.match(link, /^#lab=4\.2-lab-1&s=[\w-]+$/)
+  const { id, state: back } = readLink(link)
+  assert.equal(id, '4.2-lab-1')
+  assert.deepEqual([back.values, back.steps, back.time], [state.values, 1234, 2.468])
+  assert.deepEqual(new Uint8Array(back.physics.buffer), new Uint8Array(physics.buffer))
+})
+
+test('a state too long for a link keeps its controls', () => {
+  const { state } = readLink(writeLink('a', { values: [1], steps: 5, time: 1, physics: new Float64Array(1000) }))
+  assert.deepEqual(state, { values: [1], steps: 5, time: 1, physics: null })
+})
+
+test('links that are not of a lab, or broken, give no state', () => {
+  assert.equal(readLink(''), null)
+  assert.equal(readLink('#section-2'), null)
+  for (const text of ['%', 'AAAA', 'e30', 'bnVsbA', btoa('{"v":3}')]) assert.deepEqual(readLink(`#lab=x&s=${text}`), { id: 'x', state: null })
+  assert.deepEqual(readLink('#lab=x'), { id: 'x', state: null })
+})
+
+test('an entry is named as its author finds it', () => {
+  const config = { controls: [{}, { label: 'push' }], plots: [{ traces: [{ label: 'ω' }] }] }
+  assert.equal(placeOf(['controls', 1, 'run'], config), 'controls[1].run (“push”)')
+  assert.equal(placeOf(['plots', 0, 'traces', 0, 'expr'], config), 'plots[0].traces[0].expr (“ω”)')
+  assert.equal(placeOf(['setup'], config), 'setup')
+})
+
+test('labels that would lie on each other move apart, as little as can be', () => {
+  assert.deepEqual(spread([10, 50, null], 12, 0, 100), [10, 50, null])
+  assert.deepEqual(spread([50, 50], 10, 0, 100), [45, 55])
+  assert.deepEqual(spread([99, 98, 97], 10, 0, 100), [100, 90, 80])
+  assert.deepEqual(spread([0, 1], 10, 0, 100), [0, 10])
+  // A group that grows into the next takes it in.
+  assert.deepEqual(spread([40, 42, 55], 10, 0, 100), [35.666666666666664, 45.666666666666664, 55.666666666666664])
+})

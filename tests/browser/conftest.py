@@ -1,0 +1,76 @@
+"""A built course with labs, served, and a browser that draws without a graphics processor."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import shutil
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
+
+from coursekit import Folder
+from labcourse import LESSON, PENDULUM, ZOO
+
+ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@pytest.fixture(scope="session")
+def course(tmp_path_factory: pytest.TempPathFactory, font_store: Path) -> Folder:
+    """A course of one lesson with labs, built."""
+    folder = Folder(tmp_path_factory.mktemp("labs") / "course")
+    folder.fill([LESSON], font_store)
+    folder.write("models/pendulum.xml", PENDULUM)
+    folder.write("models/zoo.xml", ZOO)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return folder
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@pytest.fixture(scope="session")
+def base(course: Folder) -> Iterator[str]:
+    """The address of the site."""
+    handler = functools.partial(Quiet, directory=str(course.root / "public"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+        thread.join()
+
+
+def launch(playwright: object, *arguments: str) -> Browser:
+    chromium = shutil.which("chromium")
+    assert chromium is not None, "no chromium: install Debian's package `chromium`"
+    start = playwright.chromium.launch  # type: ignore[attr-defined]
+    browser: Browser = start(executable_path=chromium, args=[*ARGUMENTS, *arguments])
+    return browser
+
+
+@pytest.fixture(scope="session")
+def browsers() -> Iterator[dict[str, Browser]]:
+    """Browsers: one with WebGL, one without."""
+    with sync_playwright() as playwright:
+        found = {"webgl": launch(playwright), "plain": launch(playwright, "--disable-3d-apis")}
+        yield found
+        for browser in found.values():
+            browser.close()
+
+
+@pytest.fixture
+def context(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
+    """A window of a desk's size."""
+    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+        yield context

@@ -1,0 +1,434 @@
+"""Labs in a headless Chromium: what a reader does with them, and that the physics is MuJoCo's."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import mujoco
+import numpy as np
+import pytest
+from coursekit import Folder
+from labcourse import PAGE
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route
+
+pytestmark = pytest.mark.browser
+
+AXE = Path(__file__).parents[2] / "site" / "node_modules" / "axe-core" / "axe.min.js"
+SWING, AUTO, ALL = 0, 1, 2
+
+
+def watched(context: BrowserContext) -> tuple[Page, list[str]]:
+    """A page, and what it says to the console."""
+    page, said = context.new_page(), list[str]()
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
+    return page, said
+
+
+def until(page: Page, true: str, argument: object = None, tries: int = 400) -> None:
+    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
+    for _ in range(tries):
+        if page.evaluate(true, argument):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never true: {true}")
+
+
+def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
+    """A lab of the page, in the window and started."""
+    found = page.locator(".lab").nth(number)
+    found.scroll_into_view_if_needed()
+    if state is not None:
+        reach(page, number, state)
+    return found
+
+
+def reach(page: Page, number: int, state: str) -> None:
+    until(
+        page,
+        "([n, state]) => document.querySelectorAll('.lab')[n].dataset.state === state",
+        [number, state],
+    )
+
+
+def readout(found: Locator, label: str) -> str:
+    row = found.locator(".lab-live .lab-readouts > div").filter(has_text=label)
+    return row.locator("dd").inner_text().strip().replace("−", "-")
+
+
+def time_of(found: Locator) -> float:
+    return float(found.locator(".lab-time").inner_text().removesuffix("s").strip())
+
+
+def state_of(page: Page, found: Locator) -> dict[str, object]:
+    """What the link of a lab's state holds."""
+    before = page.evaluate("() => location.href")
+    found.get_by_role("button", name="Copy link").click()
+    for _ in range(100):
+        if page.evaluate("() => location.href") != before:
+            break
+        page.wait_for_timeout(20)
+    return parsed(page.evaluate("() => location.href"))
+
+
+def parsed(address: str) -> dict[str, object]:
+    fields = parse_qs(urlsplit(address).fragment)
+    state: dict[str, object] = json.loads(base64.urlsafe_b64decode(fields["s"][0] + "=="))
+    return state
+
+
+def floats(state: dict[str, object]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(str(state["p"])), dtype="<f8")
+
+
+def native(course: Folder, steps: int, angle: float, gravity: float = -9.8) -> np.ndarray:
+    """The state of the pendulum after so many steps, of native MuJoCo."""
+    model = mujoco.MjModel.from_xml_path(str(course.root / "models/pendulum.xml"))
+    model.opt.gravity[2] = gravity
+    data = mujoco.MjData(model)
+    data.qpos[0] = angle
+    mujoco.mj_forward(model, data)
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+    return np.array([data.time, *data.qpos, *data.qvel])
+
+
+def test_nothing_of_the_engine_comes_before_a_lab_is_near(
+    context: BrowserContext, base: str
+) -> None:
+    page, said = watched(context)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(base + PAGE, wait_until="networkidle")
+    assert not [url for url in asked if "/labs/" in url and not url.endswith(".png")]
+    lab(page)
+    names = sorted({re.sub(r"\.[0-9a-f]{8}", "", url.rsplit("/", 1)[1]) for url in asked})
+    assert {"lab.js", "worker.js", "mujoco.wasm"} <= set(names)
+    assert len([url for url in asked if url.endswith(".wasm")]) == 1
+    assert said == []
+
+
+def test_the_state_is_that_of_native_mujoco(
+    context: BrowserContext, base: str, course: Folder
+) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(1500)
+    swing.get_by_role("button", name="Pause").click()
+    reach(page, SWING, "paused")
+    state = state_of(page, swing)
+    steps = int(str(state["n"]))
+    assert steps > 100
+    expected = native(course, steps, 2.5)
+    np.testing.assert_allclose(floats(state)[:3], expected, rtol=1e-9)
+    assert readout(swing, "angle") == f"{expected[1]:.3f}"
+    assert time_of(swing) == pytest.approx(expected[0], abs=0.006)
+    assert said == []
+
+
+def test_time_goes_by_as_on_a_watch(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    reach(page, SWING, "playing")
+    page.wait_for_timeout(500)
+    clock = "() => [performance.now() / 1000, document.querySelector('.lab-time').textContent]"
+    begun, first = page.evaluate(clock)
+    page.wait_for_timeout(2000)
+    ended, last = page.evaluate(clock)
+    simulated = float(last.split()[0]) - float(first.split()[0])
+    assert simulated == pytest.approx(ended - begun, abs=0.35)
+
+
+def test_controls_do_what_they_say(context: BrowserContext, base: str, course: Folder) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    assert readout(swing, "angle") == "2.500"
+    swing.get_by_label("start").select_option("low")
+    until(page, "() => document.querySelector('.lab-live dd').textContent.includes('0.500')")
+    slider = swing.get_by_label("gravity")
+    slider.fill("3.7")
+    assert swing.locator(".lab-value").inner_text() == "3.7\u00a0m/s²"
+    assert slider.get_attribute("aria-valuetext") == "3.7\u00a0m/s²"
+    for _ in range(5):
+        swing.get_by_role("button", name="One step").click()
+    state = state_of(page, swing)
+    assert state["v"] == [3.7, 0.5, None]
+    np.testing.assert_allclose(floats(state)[:3], native(course, 5, 0.5, -3.7), rtol=1e-12)
+    swing.get_by_role("button", name="Push").click()
+    assert floats(state_of(page, swing))[2] == pytest.approx(3, abs=0.1)
+    swing.get_by_role("button", name="Reset").click()
+    until(page, "() => document.querySelector('.lab-time').textContent.startsWith('0.00')")
+    assert floats(state_of(page, swing))[:3].tolist() == [0, 0.5, 0]
+    assert said == []
+
+
+def test_a_link_leads_back_to_the_state(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_label("start").select_option("low")
+    swing.get_by_role("button", name="Push").click()
+    for _ in range(7):
+        swing.get_by_role("button", name="One step").click()
+    state = state_of(page, swing)
+    other, said = watched(context)
+    other.goto(page.evaluate("() => location.href"))
+    reach(other, SWING, "paused")
+    again = other.locator(".lab").nth(SWING)
+    until(other, "() => document.querySelector('.lab-time').textContent.startsWith('0.01')")
+    assert again.bounding_box()["y"] < 800  # type: ignore[index]
+    assert again.get_by_label("start").input_value() == "0"
+    for where, which in ((page, swing), (other, again)):
+        which.get_by_role("button", name="One step").click()
+        where.wait_for_timeout(200)
+    there, here = state_of(page, swing), state_of(other, again)
+    assert there["n"] == here["n"] == int(str(state["n"])) + 1
+    assert floats(there)[:3].tobytes() == floats(here)[:3].tobytes()
+    assert said == []
+
+
+def test_keys_on_the_picture(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    view = swing.locator(".lab-view")
+    view.focus()
+    page.keyboard.press(".")
+    until(page, "() => document.querySelector('.lab-time').textContent.startsWith('0.00')")
+    page.wait_for_timeout(200)
+    first = view.screenshot()
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_timeout(200)
+    turned = view.screenshot()
+    page.keyboard.press("+")
+    page.wait_for_timeout(200)
+    nearer = view.screenshot()
+    page.keyboard.press("0")
+    page.wait_for_timeout(200)
+    assert first != turned != nearer
+    assert view.screenshot() == first
+    page.keyboard.press(" ")
+    reach(page, SWING, "playing")
+    page.keyboard.press(" ")
+    reach(page, SWING, "paused")
+    page.keyboard.press("r")
+    until(page, "() => document.querySelector('.lab-announce').textContent === 'Reset.'")
+    assert readout(swing, "angle") == "2.500"
+
+
+def test_a_body_is_pulled_by_a_spring(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_label("gravity").fill("0")
+    box = swing.locator(".lab-view").bounding_box()
+    assert box is not None
+    # The rod at 2.5 rad from below: its end is up and to one side of the middle of the picture.
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
+    end = (middle[0] - 0.4 * np.sin(2.5) * scale, middle[1] + 0.4 * np.cos(2.5) * scale)
+    swing.get_by_role("button", name="Play").click()
+    reach(page, SWING, "playing")
+    page.mouse.move(*end)
+    page.keyboard.down("Control")
+    page.mouse.down()
+    page.mouse.move(middle[0], middle[1] + 0.45 * scale, steps=5)
+    page.wait_for_timeout(2500)
+    held = float(readout(swing, "angle"))
+    page.mouse.up()
+    page.keyboard.up("Control")
+    assert abs(held) < 0.6, "the rod hangs where it was drawn to"
+
+
+def test_out_of_sight_it_waits(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(500)
+    page.evaluate("() => window.scrollTo(0, 0)")
+    page.wait_for_timeout(400)
+    away = time_of(swing)
+    page.wait_for_timeout(1000)
+    assert time_of(swing) == away
+    swing.scroll_into_view_if_needed()
+    page.wait_for_timeout(600)
+    assert away < time_of(swing) < away + 0.95
+
+
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_it_starts_by_itself_only_where_motion_is_welcome(
+    browsers: dict[str, Browser], base: str, motion: str
+) -> None:
+    with browsers["webgl"].new_context(reduced_motion=motion) as context:  # type: ignore[arg-type]
+        page, _ = watched(context)
+        page.goto(base + PAGE)
+        found = lab(page, AUTO, "playing" if motion == "no-preference" else "paused")
+        page.wait_for_timeout(500)
+        assert (time_of(found) > 0) == (motion == "no-preference")
+
+
+def test_every_kind_of_geom_and_overlay_is_drawn(context: BrowserContext, base: str) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    found = lab(page, ALL)
+    page.wait_for_timeout(300)
+    pictures = [found.locator(".lab-view").screenshot()]
+    for box in found.locator(".lab-check input").all():
+        box.check()
+    found.get_by_role("button", name="Play").click()
+    reach(page, ALL, "playing")
+    page.wait_for_timeout(1500)
+    pictures.append(found.locator(".lab-view").screenshot())
+    assert pictures[0] != pictures[1]
+    assert said == []
+
+
+def test_no_long_task_while_a_lab_runs(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(1000)
+    page.evaluate(
+        """() => {
+          window.tasks = []
+          const note = (list) => window.tasks.push(...list.getEntries().map((e) => e.duration))
+          new PerformanceObserver(note).observe({ entryTypes: ['longtask'] })
+        }"""
+    )
+    session = context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def busy() -> tuple[float, float]:
+        found = session.send("Performance.getMetrics")["metrics"]
+        values = {metric["name"]: metric["value"] for metric in found}
+        return values["Timestamp"], values["TaskDuration"]
+
+    begun = busy()
+    page.wait_for_timeout(4000)
+    ended = busy()
+    assert page.evaluate("() => window.tasks") == []
+    assert (ended[1] - begun[1]) / (ended[0] - begun[0]) < 0.25
+
+
+def replace_module(page: Page, code: str) -> None:
+    """Serve other code for the first lab's module."""
+
+    def answer(route: Route) -> None:
+        text = route.fetch().text() + code
+        route.fulfill(body=text, headers={"content-type": "text/javascript"})
+
+    page.context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.js$"), answer)
+
+
+def test_divergence_is_shown_and_a_reset_goes_on(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    blow = "\ncontrols[2].run = ({data}) => { data.qvel[0] = 1e11 }\n"
+    replace_module(page, blow)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(300)
+    swing.get_by_role("button", name="Push").click()
+    message = swing.locator(".lab-message:visible")
+    message.wait_for()
+    assert re.match(r"Diverged at t = \d\.\d\d s: ", message.inner_text())
+    reach(page, SWING, "paused")
+    swing.get_by_role("button", name="Play").click()
+    reach(page, SWING, "playing")
+    assert message.count() == 0
+
+
+def test_an_error_of_lab_code_is_told_with_its_entry(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    replace_module(page, "\ncontrols[2].run = () => { throw new Error('no rope') }\n")
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Push").click()
+    message = swing.locator(".lab-message:visible")
+    message.wait_for()
+    assert "controls[2].run (“Push”)" in message.inner_text()
+    assert "no rope" in message.inner_text()
+
+
+def test_without_webgl_everything_else_works(browsers: dict[str, Browser], base: str) -> None:
+    with browsers["plain"].new_context() as context:
+        page = context.new_page()
+        page.goto(base + PAGE)
+        swing = lab(page)
+        assert "no WebGL" in swing.locator(".lab-view").inner_text()
+        swing.get_by_role("button", name="Play").click()
+        until(page, "() => !document.querySelector('.lab-live dd').textContent.includes('2.500')")
+        assert time_of(swing) > 0
+
+
+def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Folder) -> None:
+    page, said = watched(context)
+    page.goto((course.root / "public" / PAGE).as_uri())
+    swing = page.locator(".lab").first
+    assert "http.server" in swing.locator(".lab-message").inner_text()
+    assert swing.locator(".lab-static").is_visible()
+    assert said == []
+
+
+def test_a_missing_file_is_told(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.route("**/*.mjb", lambda route: route.fulfill(status=404, body=""))
+    context.route("**/*.mjb", lambda route: route.fulfill(status=404, body=""))
+    page.goto(base + PAGE)
+    swing = lab(page, SWING, "ended")
+    assert "404" in swing.locator(".lab-message:visible").inner_text()
+
+
+def test_a_running_lab_has_no_accessibility_fault(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_role("button", name="Play").click()
+    reach(page, SWING, "playing")
+    session = context.new_cdp_session(page)
+    session.send("Runtime.evaluate", {"expression": AXE.read_text(encoding="utf-8")})
+    faults = page.evaluate("async () => (await axe.run('.lab')).violations.map((v) => v.id)")
+    assert faults == []
+
+
+def test_mounting_and_disposing_leaves_nothing(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    lab(page)
+    session = context.new_cdp_session(page)
+    session.send("Performance.enable")
+    again = """async (times) => {
+      const place = document.querySelectorAll('.lab')[2]
+      const script = new URL(place.dataset.script, document.baseURI).href
+      const { mountLab } = await import(script)
+      for (let i = 0; i < times; i++) {
+        const made = await mountLab(place, (key) => key)
+        await new Promise((done) => setTimeout(done, 60))
+        made.dispose()
+      }
+    }"""
+
+    def listeners() -> tuple[int, int]:
+        session.send("HeapProfiler.collectGarbage")
+        found = session.send("Performance.getMetrics")["metrics"]
+        values = {metric["name"]: metric["value"] for metric in found}
+        return int(values["JSEventListeners"]), int(values["Nodes"])
+
+    page.evaluate(again, 10)
+    before = listeners()
+    page.evaluate(again, 40)
+    after = listeners()
+    assert after[0] <= before[0] + 5, (before, after)
+    assert after[1] <= before[1] + 50, (before, after)

@@ -1,0 +1,63 @@
+"""Labs for tests: from JSON to a `Lab`, to a request, to what the engine replies."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from coursebuild.effects.lab_engine import LabEngine
+from coursebuild.effects.native import NativeEngine
+from coursebuild.labs.compile import compile_lab
+from coursebuild.model import Lab
+from coursebuild.source import Source
+from coursebuild.syntax.document import parse_document
+
+BALL = (
+    "<mujoco><worldbody><body name='ball'><freejoint/><geom name='g' size='.1'/>"
+    "<site name='tip' pos='.1 0 0'/></body></worldbody></mujoco>"
+)
+
+
+def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
+    """The lab of a fence with this JSON, in the third line of a lesson."""
+    body = text if text is not None else json.dumps({"xml": BALL, **fields}, ensure_ascii=False)
+    source = Source("content/lessons/4.2-x.md", f"Text.\n\n```lab simlab\n{body}\n```\n")
+    parsed = parse_document(source, frozenset(), lesson=True)
+    assert parsed.diagnostics == (), [d.message for d in parsed.diagnostics]
+    (lab,) = (block for block in parsed.value.blocks if isinstance(block, Lab))
+    return lab
+
+
+def request(lab: Lab, **more: Any) -> dict[str, Any]:
+    """What the trial is asked."""
+    module = compile_lab(lab, "4.2-lab-1")
+    seconds = lab.verify_seconds
+    config = json.loads(module.config)
+    return {"config": config, "code": module.literal, "seconds": seconds, **more}
+
+
+def xml_of(lab: Lab) -> str:
+    assert lab.xml is not None
+    return lab.xml.text
+
+
+class Bench:
+    """Both engines."""
+
+    def __init__(self, root: Path) -> None:
+        self.native = NativeEngine(root)
+        self.browser = LabEngine()
+
+    def trial(self, lab: Lab, wall: float = 30.0, **more: Any) -> dict[str, Any]:
+        mjb = self.native.save("models/x.xml", xml_of(lab))
+        return self.browser.trial(request(lab, **more), mjb, wall)
+
+    def parity(self, lab: Lab, **more: Any) -> dict[str, Any]:
+        """The comparison of the main run."""
+        mjb = self.native.save("models/x.xml", xml_of(lab))
+        reply = self.browser.trial(request(lab, **more), mjb, 30.0)
+        assert reply["failures"] == []
+        run = reply["main"]["parity"]
+        horizon = max(1, round(1.0 / reply["main"]["timestep"]))
+        return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}

@@ -1,0 +1,288 @@
+"""Pictures without a graphics processor: where things are, what hides what, and the file."""
+
+from __future__ import annotations
+
+import math
+import struct
+import warnings
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from coursebuild.labs.picture import Camera, Solid, draw, png
+from coursebuild.labs.shapes import Kind, mesh_surface, surface
+
+FRONT = Camera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
+"""Looks along +y: x is to the right, z is up."""
+SIZE = (80, 60)
+RED, GREEN, BLUE = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)
+Pixels = NDArray[np.uint8]
+
+
+def solid(
+    kind: Kind = "box",
+    at: tuple[float, float, float] = (0, 0, 0),
+    size: tuple[float, ...] = (0.5, 0.5, 0.5),
+    rgba: tuple[float, float, float, float] = RED,
+    rotation: NDArray[np.float64] | None = None,
+    checker: float = 0.0,
+) -> Solid:
+    shape = surface(kind, size)
+    assert shape is not None
+    turn = np.eye(3) if rotation is None else rotation
+    return Solid(shape, np.array(at, dtype=float), turn, rgba, checker)
+
+
+def covered(pixels: Pixels) -> NDArray[np.bool_]:
+    return pixels[..., 3] > 127
+
+
+def colour_at(pixels: Pixels, x: int, y: int) -> str:
+    r, g, b, a = (int(v) for v in pixels[y, x])
+    if a == 0:
+        return "clear"
+    return "red" if r > max(g, b) else "green" if g > b else "blue" if b else "black"
+
+
+def test_nothing_is_clear() -> None:
+    pixels = draw((), FRONT, SIZE)
+    assert pixels.shape == (60, 80, 4)
+    assert not pixels.any()
+
+
+def test_the_size_on_the_screen_is_that_of_the_perspective() -> None:
+    seen = covered(draw((solid(size=(0.5, 0.5, 0.5)),), FRONT, (200, 200)))
+    # The nearest face is 1 m wide and 3.5 m away; the picture is 2·tan(22.5°) wide at 1 m.
+    wide = 200 * (1 / 3.5) / (2 * math.tan(math.radians(22.5)))
+    rows, columns = np.nonzero(seen)
+    assert columns.max() - columns.min() + 1 == pytest.approx(wide, abs=1.5)
+    assert rows.max() - rows.min() + 1 == pytest.approx(wide, abs=1.5)
+    assert (columns.min() + columns.max()) / 2 == pytest.approx(99.5, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("at", "x", "y"),
+    [((1, 0, 0), 60, 30), ((-1, 0, 0), 20, 30), ((0, 0, 0.8), 40, 14), ((0, 0, -0.8), 40, 46)],
+)
+def test_right_is_right_and_up_is_up(at: tuple[float, float, float], x: int, y: int) -> None:
+    pixels = draw((solid(at=at, size=(0.2, 0.2, 0.2)),), FRONT, SIZE)
+    assert colour_at(pixels, x, y) == "red"
+    assert colour_at(pixels, 79 - x if x != 40 else x, 59 - y if y != 30 else y) == "clear"
+
+
+def test_cameras_of_mujoco() -> None:
+    """MuJoCo's free camera: azimuth 0 looks along +x, elevation −90 down, with +x up then."""
+    front = solid(at=(0, -1, 0), size=(0.1, 0.1, 0.1))
+    pixels = draw((front,), Camera(0, 0, 4, (0, 0, 0)), SIZE)
+    columns = np.nonzero(covered(pixels))[1]
+    assert columns.min() > 40, "looking along +x, −y is to the right"
+    above = draw((solid(at=(1, 0, 0), size=(0.1, 0.1, 0.1)),), Camera(0, -90, 4, (0, 0, 0)), SIZE)
+    assert np.nonzero(covered(above))[0].max() < 30, "from above +x is up"
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
+def test_the_nearest_is_seen_whatever_comes_first(order: tuple[int, ...]) -> None:
+    solids = (
+        solid(at=(0, -1, 0), size=(0.2, 0.1, 0.2), rgba=GREEN),
+        solid(at=(0, 0, 0), size=(0.6, 0.1, 0.6), rgba=RED),
+        solid(at=(0, 1, 0), size=(1.5, 0.1, 1.0), rgba=BLUE),
+    )
+    pixels = draw(tuple(solids[i] for i in order), FRONT, SIZE)
+    assert [colour_at(pixels, x, 30) for x in (40, 50, 57, 79)] == ["green", "red", "blue", "clear"]
+
+
+def test_what_goes_through_each_other_is_cut_where_they_meet() -> None:
+    turn = np.array(
+        [(math.cos(0.6), -math.sin(0.6), 0), (math.sin(0.6), math.cos(0.6), 0), (0, 0, 1)]
+    )
+    flat = solid(size=(1, 0.001, 1), rgba=RED)
+    slanted = solid(size=(1, 0.001, 1), rgba=BLUE, rotation=turn)
+    pixels = draw((flat, slanted), FRONT, SIZE)
+    assert (colour_at(pixels, 30, 30), colour_at(pixels, 50, 30)) == ("blue", "red")
+
+
+def test_a_plane_that_goes_on_behind_the_camera() -> None:
+    camera = Camera(90, -10, 4, (0, 0, 0.5))
+    pixels = draw((solid("plane", size=(0, 0, 1)),), camera, SIZE)
+    assert covered(pixels)[-1].all(), "it reaches the lower edge"
+    assert not covered(pixels)[0].any()
+    assert covered(pixels).mean() > 0.5
+
+
+def test_what_is_behind_the_camera_is_not_drawn() -> None:
+    assert not draw((solid(at=(0, -9, 0)),), FRONT, SIZE).any()
+    assert not draw((solid(at=(0, -4.5, 0), size=(0.1, 0.1, 0.1)),), FRONT, SIZE).any()
+
+
+def test_the_camera_within_a_thing_sees_its_inside() -> None:
+    assert covered(draw((solid(size=(10, 10, 10)),), FRONT, SIZE)).all()
+
+
+class TestTransparency:
+    def test_what_is_behind_shines_through(self) -> None:
+        glass = solid(at=(0, -1, 0), size=(0.5, 0.001, 0.5), rgba=(0, 0, 1, 0.5))
+        pixels = draw((glass, solid(rgba=RED)), FRONT, SIZE)
+        r, _, b, a = (int(v) for v in pixels[30, 40])
+        assert a == 255 and r > 40 and b > 60
+
+    def test_alone_it_covers_partly(self) -> None:
+        pixels = draw((solid(size=(0.5, 0.001, 0.5), rgba=(1, 0, 0, 0.5)),), FRONT, SIZE)
+        # Two sheets, the front and the back, each half.
+        assert int(pixels[30, 40, 3]) == pytest.approx(255 * 0.75, abs=2)
+        assert colour_at(pixels, 40, 30) == "red"
+
+    def test_the_order_does_not_matter(self) -> None:
+        sheets = [
+            solid(at=(0, y, 0), size=(0.5, 0.001, 0.5), rgba=rgba)
+            for y, rgba in ((-1, (1, 0, 0, 0.5)), (0, (0, 1, 0, 0.5)), (1, (0, 0, 1, 0.5)))
+        ]
+        assert np.array_equal(draw(sheets, FRONT, SIZE), draw(sheets[::-1], FRONT, SIZE))
+
+    def test_behind_something_it_is_hidden(self) -> None:
+        front = solid(at=(0, -1, 0), rgba=RED)
+        glass = solid(at=(0, 2, 0), size=(0.2, 0.1, 0.2), rgba=(0, 0, 1, 0.5))
+        assert np.array_equal(draw((front, glass), FRONT, SIZE), draw((front,), FRONT, SIZE))
+
+    def test_the_invisible_is_not_drawn(self) -> None:
+        assert not draw((solid(rgba=(1, 1, 1, 0)),), FRONT, SIZE).any()
+
+
+def test_light_makes_round_things_round() -> None:
+    pixels = draw((solid("sphere", size=(1, 0, 0), rgba=(1, 1, 1, 1)),), FRONT, SIZE)
+    middle, edge = int(pixels[30, 40, 0]), int(pixels[46, 52, 0])
+    assert middle > edge + 20
+    assert len(np.unique(pixels[covered(pixels)][:, 0])) > 40
+
+
+def test_colours_stay_in_range() -> None:
+    pixels = draw((solid("sphere", size=(1,), rgba=(9.0, -3.0, 0.5, 1.0)),), FRONT, SIZE)
+    assert (pixels[30, 40, 0], pixels[30, 40, 1]) == (255, 0)
+
+
+def test_a_pattern_has_its_width() -> None:
+    camera = Camera(0, -90, 10, (0, 0, 0))
+    floor = replace(solid("plane", size=(3, 3, 1), rgba=(1, 1, 1, 1)), checker=1.0)
+    row = draw((floor,), camera, (200, 200))[110, :, 0].astype(int)
+    bright = row[30:170] > (row[30:170].max() + row[30:170].min()) / 2
+    changes = np.nonzero(np.diff(bright))[0]
+    # A metre at 10 m, where 200 samples are 2·tan(22.5°)·10 m.
+    assert np.abs(np.diff(changes) - 200 / (20 * math.tan(math.radians(22.5)))).max() <= 1
+    assert len(changes) == 5
+
+
+def test_the_same_each_time() -> None:
+    solids = [
+        solid(
+            "sphere", at=(0.3 * i, 0.1 * i, 0), size=(0.3, 0.4, 0.5), rgba=(0.1 * i, 0.5, 0.5, 1.0)
+        )
+        for i in range(5)
+    ] + [solid("capsule", at=(0, 0, 0.5), size=(0.2, 0.6), rgba=(1, 0, 0, 0.4))]
+    assert png(draw(solids, FRONT, SIZE)) == png(draw(solids, FRONT, SIZE))
+
+
+def test_many_small_triangles_look_as_few_large_ones() -> None:
+    """The same square as two triangles and as eight thousand."""
+    steps = np.linspace(-0.8, 0.8, 65)
+    grid = np.stack(np.meshgrid(steps, [0.0], steps, indexing="ij"), axis=-1).reshape(65, 65, 3)
+    index = np.arange(65 * 65).reshape(65, 65)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    fine = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    corners = np.array([(-0.8, 0, -0.8), (0.8, 0, -0.8), (0.8, 0, 0.8), (-0.8, 0, 0.8)])
+    coarse = np.array([(0, 1, 2), (0, 2, 3)])
+    camera = replace(FRONT, azimuth=70, elevation=-15)
+    pictures = [
+        draw((Solid(mesh_surface(v, f), np.zeros(3), np.eye(3), RED),), camera, (120, 90))
+        for v, f in ((grid.reshape(-1, 3), fine), (corners, coarse))
+    ]
+    assert np.array_equal(covered(pictures[0]), covered(pictures[1]))
+    both = [p[covered(p)].astype(int) for p in pictures]
+    assert np.abs(both[0] - both[1]).max() <= 12  # brightness is worked out at corners
+
+
+class TestBlownUp:
+    @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e300, 1e15])
+    @pytest.mark.parametrize("rgba", [RED, (1.0, 0.0, 0.0, 0.5)])
+    def test_what_is_nowhere_is_left_out(
+        self, value: float, rgba: tuple[float, float, float, float]
+    ) -> None:
+        gone = solid(at=(value, 0, 0), rgba=rgba)
+        here = solid("sphere", size=(0.3,), rgba=GREEN)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert np.array_equal(draw((gone, here), FRONT, SIZE), draw((here,), FRONT, SIZE))
+
+    def test_rotations_and_sizes_that_are_no_numbers(self) -> None:
+        broken = [
+            solid(rotation=np.full((3, 3), math.nan)),
+            solid(size=(math.nan, 1, 1)),
+            solid(size=(0.0, 0.0, 0.0)),
+        ]
+        assert not draw(broken, FRONT, SIZE).any()
+
+    def test_a_camera_at_its_target(self) -> None:
+        assert draw((solid(),), replace(FRONT, distance=0.0), SIZE).shape == (60, 80, 4)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(-720, 720),
+    st.floats(-90, 90),
+    st.floats(0.01, 100),
+    st.tuples(*[st.floats(-5, 5)] * 3),
+    st.floats(1, 170),
+)
+def test_any_camera(
+    azimuth: float,
+    elevation: float,
+    distance: float,
+    target: tuple[float, float, float],
+    fovy: float,
+) -> None:
+    camera = Camera(azimuth, elevation, distance, target, fovy)
+    solids = (
+        solid("plane", size=(0, 0, 1)),
+        solid("sphere", size=(0.5,), rgba=GREEN),
+        solid("capsule", at=(1, 1, 1), size=(0.2, 0.5), rgba=(0, 0, 1, 0.5)),
+    )
+    pixels = draw(solids, camera, (24, 18))
+    assert pixels.dtype == np.uint8 and pixels.shape == (18, 24, 4)
+
+
+class TestPng:
+    def decoded(self, data: bytes) -> Pixels:
+        """By hand: the chunks, the checksums and the filters of PNG."""
+        assert data[:8] == b"\x89PNG\r\n\x1a\n"
+        at, chunks = 8, []
+        while at < len(data):
+            (length,) = struct.unpack(">I", data[at : at + 4])
+            name, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+            assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(
+                name + body
+            )
+            chunks.append((name, body))
+            at += 12 + length
+        assert [name for name, _ in chunks] == [b"IHDR", b"IDAT", b"IEND"]
+        width, height, depth, colour, *rest = struct.unpack(">IIBBBBB", chunks[0][1])
+        assert (depth, colour, rest) == (8, 6, [0, 0, 0])
+        raw = np.frombuffer(zlib.decompress(chunks[1][1]), np.uint8).reshape(height, -1)
+        assert raw.shape[1] == 4 * width + 1
+        rows = np.zeros((height, 4 * width), np.uint8)
+        for i, (kind, *row) in enumerate(raw):
+            assert kind in (0, 2)
+            rows[i] = np.array(row, np.uint8) + (rows[i - 1] if kind == 2 and i else 0)
+        return rows.reshape(height, width, 4)
+
+    @pytest.mark.parametrize("size", [(1, 1), (7, 3), (64, 48)])
+    def test_it_is_read_back_as_it_was(self, size: tuple[int, int]) -> None:
+        random = np.random.default_rng(0)
+        pixels = random.integers(0, 256, (size[1], size[0], 4), dtype=np.uint8)
+        assert np.array_equal(self.decoded(png(pixels)), pixels)
+
+    def test_a_drawing(self) -> None:
+        pixels = draw((solid("sphere", size=(0.5,)),), FRONT, SIZE)
+        assert np.array_equal(self.decoded(png(pixels)), pixels)

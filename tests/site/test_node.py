@@ -1,0 +1,71 @@
+"""The tests of the browser's half that need no browser: Node runs them, one file at a time."""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT / "site" / "tests").glob("*.test.mjs"))
+
+
+@pytest.fixture(scope="session")
+def node() -> tuple[str, ...]:
+    if not (ROOT / "site" / "node_modules" / "@mujoco" / "mujoco").is_dir():
+        pytest.fail("site/node_modules is not installed: run python site/bundle.py packages")
+    found: tuple[str, ...] = runpy.run_path(str(ROOT / "site" / "bundle.py"))["find_node"]().node
+    return found
+
+
+def test_there_are_some() -> None:
+    assert len(FILES) > 8
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name.removesuffix(".test.mjs"))
+def test_file(path: Path, node: tuple[str, ...]) -> None:
+    done = subprocess.run(
+        [*node, "--test", "--test-reporter=tap", str(path)],
+        cwd=ROOT,
+        env={**os.environ, "NODE_OPTIONS": ""},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+    counts = dict(line[2:].split(" ", 1) for line in done.stdout.splitlines() if line[:2] == "# ")
+    assert int(counts["pass"]) > 0
+    assert (counts["fail"], counts["skipped"], counts["todo"], counts["cancelled"]) == ("0",) * 4
+
+
+def test_reference_values_are_those_of_this_mujoco() -> None:
+    """The values that the JavaScript is compared with can be made again."""
+    script = runpy.run_path(str(ROOT / "site" / "tests" / "native.py"))
+    made = json.loads(script["text"]())
+    kept = json.loads((ROOT / "site" / "tests" / "native.json").read_text("utf-8"))
+    assert list(leaves(made)) == pytest.approx(list(leaves(kept)), rel=1e-10, abs=1e-12)
+    assert shape(made) == shape(kept)
+
+
+def leaves(value: Any) -> Iterator[float]:
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from leaves(item)
+    elif not isinstance(value, str):
+        yield value
+
+
+def shape(value: Any) -> Any:
+    """The value with every number replaced."""
+    if isinstance(value, dict):
+        return {key: shape(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [shape(item) for item in value]
+    return value if isinstance(value, str) else 0

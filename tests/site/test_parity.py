@@ -1,0 +1,178 @@
+"""The browser's engine and native MuJoCo make the same steps, to the last bit where they can.
+
+Models that use much of the engine run through a lab's trial in V8; native MuJoCo repeats each run
+from what the trial recorded, as coursebuild does for every lab.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coursebuild.effects.lab_engine import LabEngine
+from coursebuild.effects.native import NativeEngine
+
+STACK = "".join(
+    f'<body pos="0 {0.01 * i} {0.11 + 0.22 * i}" euler="0 0 {20 * i}"><freejoint/>'
+    '<geom type="box" size=".1 .1 .1"/></body>'
+    for i in range(4)
+)
+GROUND = '<geom type="plane" size="3 3 .1"/>'
+ARM = """<body pos="0 0 1"><joint name="a" axis="0 1 0"/>
+  <geom name="upper" type="capsule" size=".03" fromto="0 0 0 .3 0 0"/>
+  <site name="s" pos=".1 0 .05"/>
+  <body pos=".3 0 0"><joint name="b" axis="0 1 0" damping=".1"/>
+  <geom name="lower" type="capsule" size=".03" fromto="0 0 0 .3 0 0"/><site name="e" pos=".3 0 0"/>
+  </body></body>"""
+
+
+def model(body: str, option: str = "", more: str = "") -> str:
+    return f"<mujoco><option {option}/><worldbody>{body}</worldbody>{more}</mujoco>"
+
+
+TUMBLE = model(
+    '<body><freejoint/><geom type="box" size=".1 .05 .02" mass="1"/></body>',
+    'integrator="{}" gravity="0 0 0"',
+)
+MODELS = {
+    **{
+        f"tumbling, {name}": (TUMBLE.format(name), "data.qvel.set([0, 0, 0, 0.001, 6, 0])", None)
+        for name in ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+    },
+    "stack, pyramidal": (model(GROUND + STACK), None, None),
+    "stack, elliptic, PGS": (
+        model(GROUND + STACK, 'cone="elliptic" solver="PGS" noslip_iterations="3"'),
+        None,
+        None,
+    ),
+    "stack, CG": (model(GROUND + STACK, 'solver="CG" integrator="implicitfast"'), None, None),
+    "arm, actuators, tendon, sensors": (
+        model(
+            ARM,
+            'integrator="implicitfast"',
+            """<tendon><spatial name="t" limited="true" range="0 .8">
+            <site site="s"/><site site="e"/></spatial></tendon>
+            <actuator><position joint="a" kp="20" kv="2"/><motor joint="b" gear="2"/>
+            <muscle tendon="t" lengthrange=".1 .7"/><velocity joint="a" kv=".1"/></actuator>
+            <sensor><jointpos joint="a"/><tendonpos tendon="t"/><accelerometer site="e"/>
+            </sensor>""",
+        ),
+        None,
+        "data.ctrl[0] = Math.round(3 * data.time) % 2; data.ctrl[1] = -0.1 * data.sensordata[1];"
+        "data.ctrl[2] = 0.5; data.xfrc_applied[8] = data.time > 0.5 ? 1 : 0",
+    ),
+    "a controller that moves the state": (
+        model(ARM),
+        None,
+        "if (data.time > 0.3 && data.time < 0.31) data.qvel[0] = 1;"
+        "if (data.time > 0.6) data.time += 1",
+    ),
+    "mesh, height field, ellipsoid": (
+        """<mujoco><asset><mesh name="m" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/>
+        <hfield name="h" nrow="3" ncol="3" size="2 2 .2 .1" elevation="0 1 0 1 0 1 0 1 0"/></asset>
+        <worldbody><geom type="hfield" hfield="h"/>
+        <body pos="0 0 .5"><freejoint/><geom type="mesh" mesh="m"/></body>
+        <body pos=".5 .3 .6"><freejoint/><geom type="ellipsoid" size=".1 .2 .15"/></body>
+        <body pos="-.5 .3 .6"><freejoint/><geom type="cylinder" size=".1 .1"/></body>
+        </worldbody></mujoco>""",
+        None,
+        None,
+    ),
+    "cloth on a ball": (
+        model(
+            '<geom size=".2"/><flexcomp name="cloth" type="grid" count="6 6 1" spacing=".1 .1 .1"'
+            ' pos="0 0 .4" dim="2" radius=".01" mass="1"><edge equality="true"/></flexcomp>',
+            'solver="CG" timestep=".005"',
+        ),
+        None,
+        None,
+    ),
+    "equality, friction loss, limits, mocap": (
+        model(
+            '<body name="hand" mocap="true" pos="0 0 1">'
+            '<geom size=".02" contype="0" conaffinity="0"/></body>'
+            '<body name="load" pos="0 0 .8"><freejoint/><geom size=".05"/></body>'
+            '<body pos="1 0 1"><joint type="ball" frictionloss=".1" range="0 .5" limited="true"/>'
+            '<geom type="capsule" size=".02" fromto="0 0 0 .3 0 .1"/></body>',
+            "",
+            '<equality><connect body1="hand" body2="load" anchor="0 0 -.1"/></equality>',
+        ),
+        None,
+        "data.mocap_pos[0] = 0.25 * Math.round(4 * data.time)",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def engines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[NativeEngine, LabEngine]]:
+    root: Path = tmp_path_factory.mktemp("course")
+    with NativeEngine(root) as native, LabEngine() as browser:
+        yield native, browser
+
+
+def lab(setup: str | None, controller: str | None) -> dict[str, Any]:
+    """A request for a lab without controls, readouts and plots."""
+    lists = ("toggles", "overlays", "controls", "readouts", "plots", "expect")
+    empty = ("key", "camera", "forceScale", "stopAt", "trail", "seed")
+    code = ["controls: []", "readouts: []", "plots: []", "expect: []"]
+    for name, text in (("setup", setup), ("controller", controller)):
+        if text is not None:
+            code.append(f"{name}: ({{model, data, mj, sim, ctx, lib}}) => {{ {text} }}")
+    config = {"id": "x", "autoplay": False} | dict.fromkeys(empty) | {name: [] for name in lists}
+    return {"config": config, "code": f"({{{', '.join(code)}}})", "seconds": 1.5}
+
+
+LIBM = {
+    "arm, actuators, tendon, sensors",
+    "a controller that moves the state",
+    "equality, friction loss, limits, mocap",
+}
+"""Sines and cosines of joint angles, which two C libraries round differently in the last bit."""
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_same_motion(name: str, engines: tuple[NativeEngine, LabEngine]) -> None:
+    native, browser = engines
+    xml, setup, controller = MODELS[name]
+    mjb = native.save("models/m.xml", xml)
+    assert native.save("models/m.xml", xml) == mjb, "the same bytes each time"
+    reply = browser.trial(lab(setup, controller), mjb, 60.0)
+    assert reply["failures"] == []
+    run = reply["main"]["parity"]
+    assert run["complete"]
+    assert not run["modelChanged"]
+    assert run["steps"] >= 300 or "moves the state" in name
+    second = round(1 / reply["main"]["timestep"])
+    found = native.parity(mjb, run, horizon=second if name in LIBM else run["steps"])
+    assert found["relative"] < 1e-9, json.dumps(found)
+    if name not in LIBM:
+        assert found["first"] is None, json.dumps(found)
+
+
+def test_a_difference_is_found(engines: tuple[NativeEngine, LabEngine]) -> None:
+    native, browser = engines
+    mjb = native.save("models/m.xml", model(GROUND + STACK))
+    run = browser.trial(lab(None, None), mjb, 60.0)["main"]["parity"]
+    other = native.save("models/m.xml", model(GROUND + STACK, 'gravity="0 0 -9.80665"'))
+    found = native.parity(other, {**run, "mjb": None}, horizon=run["steps"])
+    assert found["first"] == 1
+    assert found["relative"] == 0.0 or found["relative"] > 1e-9
+
+
+def test_the_model_comes_back_as_it_was_but_for_the_reset_of_diverged_states(
+    engines: tuple[NativeEngine, LabEngine],
+) -> None:
+    native, browser = engines
+    mjb = native.save("models/m.xml", model(ARM, "", ""))
+    first = browser.trial(lab(None, None), mjb, 60.0)["main"]["parity"]["mjb"]
+    frozen = native.save(
+        "models/m.xml",
+        model(ARM).replace("<option />", '<option><flag autoreset="disable"/></option>'),
+    )
+    second = browser.trial(lab(None, None), frozen, 60.0)["main"]["parity"]["mjb"]
+    assert first is not None
+    assert second is None
