@@ -33,6 +33,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("map-syntax", "error", "course.toml is not valid TOML."),
     ("id-repeated", "error", "A level, lesson or page id occurs twice in the course map."),
     ("lesson-unlisted", "error", "A file in content/lessons is not named by the course map."),
+    ("page-unlisted", "error", "A file in content/pages is not named by the course map."),
     ("lesson-missing", "error", "The course map names a lesson whose file is missing."),
     ("lesson-planned-file", "error", "A lesson that the map calls planned has a file."),
     ("prerequisite-unknown", "error", "A prerequisite is not a lesson of the map."),
@@ -129,8 +130,18 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("binding-attribute", "error", "The attribute of a bound number cannot be read."),
     # scripts and recorded outputs
     ("script-path", "error", "The path of a script is not one that a script may have."),
+    (
+        "script-kind",
+        "error",
+        "A block with a `file` is not of kind `python`, so that nothing runs it.",
+    ),
     ("script-repeated", "error", "Two blocks are extracted to the same path."),
     ("python-syntax", "error", "A Python block does not parse."),
+    (
+        "recording-caption",
+        "warning",
+        "A `text` block has a caption like that of a recorded output, and is compared with nothing.",
+    ),
     ("recording-orphan", "error", "A recorded output has no script above it."),
     (
         "recording-body",

@@ -23,13 +23,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+STORES = ("fonts", "compressed")
+
+
 @pytest.fixture(scope="session")
-def font_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for `.coursebuild/fonts` of scratch courses, so that a font is cut once a session.
+def stores(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Stores for the `.coursebuild` of scratch courses, so that a font is cut once a session.
 
     Worker processes share it: an entry is named by what it is made from, and is whole or not there.
     """
     base = tmp_path_factory.getbasetemp()
-    store = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "fonts"
-    store.mkdir(exist_ok=True)
-    return store
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "stores"
+    for name in STORES:
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    return folder

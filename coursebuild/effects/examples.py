@@ -56,6 +56,8 @@ class Blocked:
     """What the file holds; bytes that are not UTF-8 as `\\xNN`. Empty for a link or a folder."""
     diff: str
     """Unified diff from the lesson's block to the file; empty where there is nothing to compare."""
+    diverged: bool = False
+    """Of an edited one: the lesson's block was changed as well since the file was extracted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +218,10 @@ class _Update:
                 f"{path} (in the lesson)",
                 f"{path} (on the disk)",
             )
-        self.blocked.append(Blocked(path, obstacle, text, diff))
+        known = self.known.get(path, ())
+        wanted = self.wanted.get(path)
+        diverged = obstacle is Obstacle.EDITED and wanted is not None and _hash(wanted) not in known
+        self.blocked.append(Blocked(path, obstacle, text, diff, diverged))
 
 
 def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:

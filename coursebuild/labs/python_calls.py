@@ -39,15 +39,16 @@ class Calls(Expressions):
             case ("Math", name):
                 return self._math(name, call)
             case ("lib", name):
-                return self._library(name, self._plain(call), single)
+                return self._library(name, self.plain(call), single)
             case ("mj", name) if name in CALLS:
-                return self._engine(name, self._plain(call))
+                return self._engine(name, self.plain(call))
         function = call.function
         if isinstance(function, Member) and function.name in ("slice", "subarray"):
-            return self._part(self.array(function.whole), function.name, self._plain(call))
+            return self.part(self.array(function.whole), function.name, self.plain(call))
         raise refuse(f"a call of `{'.'.join(way)}`" if way else "a call")
 
-    def _plain(self, call: Call) -> tuple[Expression, ...]:
+    def plain(self, call: Call) -> tuple[Expression, ...]:
+        """The arguments of a call that spreads none."""
         return tuple(_unspread(argument) for argument in call.arguments)
 
     def _helper(self, name: str, arguments: str, type: Type = "num") -> Code:
@@ -58,7 +59,7 @@ class Calls(Expressions):
         self.used.modules.add("import numpy as np")
         if name in ("min", "max", "hypot"):
             return self._of_many(name, call)
-        arguments = [self.number(argument) for argument in self._plain(call)]
+        arguments = [self.number(argument) for argument in self.plain(call)]
         match name, arguments:
             case ("atan2", [y, x]):
                 self.used.exact = False
@@ -157,7 +158,8 @@ class Calls(Expressions):
         type = types[RESULTS[name]] if name in RESULTS else "nothing"
         return Code(f"mujoco.{name}({', '.join(texts)})", type)
 
-    def _part(self, array: Code, name: str, arguments: tuple[Expression, ...]) -> Code:
+    def part(self, array: Code, name: str, arguments: tuple[Expression, ...]) -> Code:
+        """Part of an array, as a copy (`slice`) or as a view."""
         ends = [self.number(argument) for argument in arguments]
         if len(ends) > 2 or any(end.type != "nat" for end in ends):
             raise refuse(f"`.{name}` other than from and to an index")

@@ -196,7 +196,8 @@ class Expressions(ABC):
             case ("ctx", name) if name in self.names.context:
                 return Code(text, self.names.context[name])
             case ("Math", name) if name in _CONSTANTS:
-                self.used.modules.add("import math")
+                if name in ("PI", "E"):
+                    self.used.modules.add("import math")
                 return Code(_CONSTANTS[name], "num")
             case ("mj", enumeration, name, "value") if enumeration.startswith("mjt"):
                 return Code(f"mujoco.{enumeration}.{name}.value", "int")

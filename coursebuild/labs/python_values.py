@@ -51,6 +51,8 @@ class Used:
 
     helpers: set[str] = field(default_factory=set)
     modules: set[str] = field(default_factory=set)
+    resets: bool = False
+    """Whether the function `reset` is called."""
     exact: bool = True
     """Whether no function is involved whose last bit may differ from one library to another."""
 

@@ -5,7 +5,9 @@ Entry points: `build(options, out)`; `prepare(options, progress)`, the same with
 
 from __future__ import annotations
 
+import functools
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,13 +42,21 @@ def build(options: Options, out: Path) -> Report:
     """Publish the course into `out` (relative to the course's folder), or nothing."""
     progress = Progress(quiet=options.quiet)
     check_out(options.root, options.root / out)
+    from coursebuild.render.compressed import compressed_files
+
     with project_lock(options.root, progress.say):
         prepared = prepare(options, progress)
         if not prepared.report.ok:
             return replace(prepared.report, remarks=(_unpublished(options.root, out),))
+        with progress.stage("compressing"):
+            copies = compressed_files(prepared.files, functools.partial(_kept_copy, options.root))
         with progress.stage("publishing"):
-            publish(options.root, options.root / out, prepared.files)
+            publish(options.root, options.root / out, (*prepared.files, *copies))
     return replace(prepared.report, remarks=(f"published {len(prepared.files)} files in {out}",))
+
+
+def _kept_copy(root: Path, key: str, make: Callable[[], bytes]) -> bytes:
+    return kept(root, "compressed", key, make)
 
 
 def _unpublished(root: Path, out: Path) -> str:

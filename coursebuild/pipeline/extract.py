@@ -75,6 +75,8 @@ def _adopt(
         extraction = by_path.get(example.path)
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
+        if example.diverged:  # taking one would lose the other; how to go on is told with it
+            continue
         data = read_bytes(options.root, example.path)
         made = adopted(extraction.script, data)
         if isinstance(made, Edit):

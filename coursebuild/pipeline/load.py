@@ -69,6 +69,7 @@ class _Loader:
         levels = tuple(self._level(level) for level in course.levels)
         self._unlisted()
         pages = self._pages(course.pages)
+        self._unlisted_pages(course)
         course = replace(
             course, levels=levels, pages=pages, models=self.files.models, files=self._others(course)
         )
@@ -123,6 +124,15 @@ class _Loader:
             message = f"the course map does not name {source.path}"
             self.found.append(diagnose("lesson-unlisted", source.span(0, 0), message, help=help))
             self._document(source, lesson=True)
+
+    def _unlisted_pages(self, course: Course) -> None:
+        named = {page.path for page in course.pages}
+        for source in self.files.pages:
+            if source.path not in named:
+                message = f"the course map does not name {source.path}"
+                help = f"add a [[page]] to {MAP}, or move the file away"
+                found = diagnose("page-unlisted", source.span(0, 0), message, help=help)
+                self.found.append(found)
 
     def _pages(self, pages: tuple[Page, ...]) -> tuple[Page, ...]:
         return tuple(self._page(page) for page in pages)

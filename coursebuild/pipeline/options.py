@@ -37,9 +37,15 @@ def find_course(directory: str | None) -> Path:
     the course.
     """
     try:
-        return find_root(None if directory is None else Path(directory), Path.cwd())
+        root = find_root(None if directory is None else Path(directory), Path.cwd())
     except EffectError as error:
         raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
+    try:
+        str(root).encode()
+    except UnicodeEncodeError:  # MuJoCo opens no file there, and a script cannot print its path
+        shown = os.fsencode(root).decode("utf-8", "backslashreplace")
+        raise UsageError(f"the path of the course is not UTF-8: {shown}") from None
+    return root
 
 
 @dataclass(frozen=True, slots=True)

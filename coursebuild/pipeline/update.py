@@ -24,7 +24,7 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.verify import extract_scripts, run, script_lines
+from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts, run, script_lines
 from coursebuild.report import Report
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.compare import verify as compare_all
@@ -54,7 +54,7 @@ def _update(
     scripts = _with_recordings(course, chosen, extracted.runnable)
     first = run(scripts, options, progress)
     again = run(scripts, options, progress, "running scripts again")
-    edits, refused = _edits(course, chosen, first, again)
+    edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
     remarks, unwritten = _write(options, edits, dry_run=dry_run)
@@ -94,8 +94,18 @@ def _with_recordings(
     return tuple(e for e in runnable if e.path in wanted)
 
 
+def _repeated(extracted: ExtractedScripts) -> frozenset[str]:
+    """Paths that several blocks have: whose output stands below them cannot be told."""
+    twice = (d for d in extracted.diagnostics if d.rule == "script-repeated")
+    return frozenset(diagnostic.span.text.strip("\"'") for diagnostic in twice)
+
+
 def _edits(
-    course: Course, chosen: Selection, first: Sequence[ScriptRun], again: Sequence[ScriptRun]
+    course: Course,
+    chosen: Selection,
+    first: Sequence[ScriptRun],
+    again: Sequence[ScriptRun],
+    doubtful: frozenset[str],
 ) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
     """What to write, by lesson, and what cannot be written."""
     good = {
@@ -106,7 +116,7 @@ def _edits(
     edits: dict[Source, list[Edit]] = {}
     refused: list[Diagnostic] = []
     for recording in _recordings(course, chosen):
-        if recording.script not in good:
+        if recording.script not in good or recording.script in doubtful:
             continue
         comparison = recording.comparison or course.comparison
         made = updated_body(recording, comparison, course.filters, *good[recording.script])

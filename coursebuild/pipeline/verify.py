@@ -169,6 +169,11 @@ def _left(blocked: Blocked, extraction: Extraction | None, course: Course) -> Di
         "`coursebuild extract --adopt` brings what the file holds into the lesson; "
         "to drop it instead, delete the file"
     )
+    if blocked.diverged:
+        help = (
+            "the block was changed as well: bring what is to stay of the file into it by hand, "
+            "then delete the file"
+        )
     notes = [Note("from the block to the file:\n" + blocked.diff.rstrip())] if blocked.diff else []
     return diagnose("example-edited", extraction.script.path_span, message, help=help, notes=notes)
 

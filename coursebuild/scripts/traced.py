@@ -96,12 +96,23 @@ class Traced:
             copied = found.end()
             written = found.expand(replacement)
             if written:
-                pieces.append(Piece(length, *self.origin(found.start(), found.end()), False))
+                pieces.append(Piece(length, *self._replaced(found.start(), found.end()), False))
                 parts.append(written)
                 length += len(written)
         self._copy(copied, len(self.text), length, pieces)
         parts.append(self.text[copied:])
         return Traced("".join(parts), tuple(pieces) or (Piece(0, 0, self.pieces[-1].end, False),))
+
+    def _replaced(self, start: int, end: int) -> tuple[int, int]:
+        """What a replacement of `text[start:end]` stands for.
+
+        Where nothing is replaced, inside or at the end of what was written by another replacement,
+        that is what the other one stands for: there is no place between its characters.
+        """
+        piece = self._piece(start)
+        if start == end and not piece.verbatim and start > piece.at:
+            return piece.start, piece.end
+        return self.origin(start, end)
 
     def _copy(self, start: int, end: int, at: int, into: list[Piece]) -> None:
         """Append the pieces of `text[start:end]`, which will stand at offset `at`."""

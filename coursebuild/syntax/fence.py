@@ -19,7 +19,6 @@ from coursebuild.syntax.spans import Placed, Row, locate, trimmed
 
 OURS = ("io", "lab", "mjcf", "python", "quiz", "text")
 
-_PYTHON = frozenset({"ipython", "py", "py3", "python2", "python3"})
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
@@ -106,16 +105,16 @@ def unescaped(info: str) -> str:
 
 
 def near_kind(fence: Fence) -> Diagnostic | None:
-    """A warning when the kind of a code block looks like a misspelt kind of ours."""
+    """What is wrong with a code block that looks like one of ours and is none."""
     kind = kind_of(fence.info)
     if not kind.text:
         return None
     name = kind.text.lower()
-    if name in _PYTHON:
-        words = parse_info(fence.info).value.words
-        if any(word.key == "file" for word in words):
-            message = f"a block of kind `{kind.text}` is shown and never run"
-            return diagnose("fence-kind-near", kind.span(), message, help="did you mean `python`?")
+    words = parse_info(fence.info).value.words
+    if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
+        message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
+        help = "a script is a block of kind `python`"
+        return diagnose("script-kind", kind.span(), message, help=help)
     if name in _LANGUAGES:
         return None
     near = "lab simlab" if name == "simlab" else nearest(name, OURS, cutoff=0.75)

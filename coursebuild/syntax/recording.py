@@ -1,6 +1,6 @@
 """Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
 
-Entry points: `is_caption`, `record_fence`, `record_table` (a caption and its body), `no_body` and
+Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body), `no_body` and
 `nothing_recorded` (what follows is none), `stray_keys` (on a fence that records nothing).
 """
 
@@ -17,6 +17,10 @@ from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
 from coursebuild.syntax.session import Session
 
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
+_NEAR_CAPTION = re.compile(
+    r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
+    re.IGNORECASE | re.DOTALL,
+)
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
@@ -32,6 +36,15 @@ _GROUPS = {
 def is_caption(inlines: tuple[Inline, ...]) -> bool:
     """Whether a paragraph begins with the word "Output" and ends with a colon."""
     return _CAPTION.fullmatch(plain_text(inlines)) is not None
+
+
+def near_caption(inlines: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+    """A warning where a `text` block looks recorded, and is compared with nothing."""
+    if _NEAR_CAPTION.fullmatch(plain_text(inlines)) is None:
+        return []
+    message = "this looks like the caption of a recorded output, and nothing is compared"
+    help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
+    return [diagnose("recording-caption", span, message, help=help)]
 
 
 def record_fence(

@@ -46,6 +46,7 @@ from coursebuild.syntax.inlines import InlineReader
 from coursebuild.syntax.markdown import block_tokens
 from coursebuild.syntax.recording import (
     is_caption,
+    near_caption,
     no_body,
     nothing_recorded,
     record_fence,
@@ -133,7 +134,14 @@ class TextReader:
             recording = self._recording(children, span)
             if recording is not None:
                 return recording
+        elif not self.nested and self._before_text():
+            self.session.diagnostics += near_caption(children, span)
         return Paragraph(span, children, token.hidden)
+
+    def _before_text(self) -> bool:
+        """Whether a `text` fence follows."""
+        token = self.tokens[self.at] if self.at < len(self.tokens) else None
+        return token is not None and token.type == "fence" and token.info.split()[:1] == ["text"]
 
     def _heading(self, token: Placed) -> Heading:
         self.at += 2

@@ -272,6 +272,17 @@ test('what lab code throws is told with its entry and pauses the lab, once', asy
   assert.equal(bench.of('playing', 'b').length, 0)
 })
 
+test('an engine that ends is told as fatal', async () => {
+  const end = () => {
+    throw new WebAssembly.RuntimeError('unreachable')
+  }
+  const bench = new Bench({ codes: { plain: code({ controller: ({ data }) => data.time > 0.1 && end() }) } })
+  await bench.load('a', { autoplay: true })
+  bench.run(1000)
+  assert.deepEqual(bench.of('error').map(({ kind, fatal, entry }) => [kind, fatal, entry]), [['engine', true, ['controller']]])
+  assert.equal(bench.of('paused')[0].reason, 'error')
+})
+
 test('an impossible message is refused and disturbs nothing', async () => {
   const bench = new Bench({ codes: { plain: code({ controls: [{ set: () => {} }] }) } })
   await bench.load('a', { autoplay: true, controls: [control({ value: 1 })] })

@@ -111,9 +111,17 @@ test('each way to be wrong, with its entry', () => {
     [{ readouts: READOUT }, { readouts: ['1 / (0.1 - Math.min(0.1, data.time))'] }, [['readouts.0.expr', 'nan', 'is Infinity', 0.1]]],
     [{ plots: [plot(2)] }, { plots: [['1', '"x"']] }, [['plots.0.traces.1.expr', 'type', 'gives the text "x", not a number', 0]]],
     [{ plots: [plot(1)] }, { plots: [['NaN']] }, [['plots.0.traces.0.expr', 'nan', 'is NaN', 0]]],
-    [{ expect: [{ after: null, t: 1, min: 0, max: null }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /^is -3\.9\d* at 1 s, less than 0$/, 1]]],
+    [
+      { expect: [{ after: null, t: 1, min: 0, max: null }] },
+      { expect: ['data.qpos[2]'] },
+      [['expect.0.expr', 'expect', /^is -3\.9\d* at 1 s, less than 0$/, 1]],
+    ],
     [{ expect: [{ after: null, t: 1, min: null, max: -5 }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /more than -5$/, 1]]],
-    [{ expect: [{ after: null, t: 0, min: 0, max: 1 }] }, { expect: ['"0.5"'] }, [['expect.0.expr', 'type', 'gives the text "0.5", not a number', 0]]],
+    [
+      { expect: [{ after: null, t: 0, min: 0, max: 1 }] },
+      { expect: ['"0.5"'] },
+      [['expect.0.expr', 'type', 'gives the text "0.5", not a number', 0]],
+    ],
     [{ expect: [{ after: 'nothing', t: 0, min: 0, max: 1 }] }, { expect: ['0'] }, [['expect.0', 'throws', 'there is no control "nothing"', 0]]],
     [{ key: 'none' }, {}, [['', 'throws', 'the model has no keyframe "none"', null]]],
     [{ trail: 'none' }, {}, [['', 'throws', 'the model has no site "none"', null]]],
@@ -172,6 +180,17 @@ test('a model that does not load', () => {
   const reply = runTrial(engine, { config: config(), code: '({controls: [], readouts: [], plots: [], expect: []})' }, new Uint8Array(9), () => 0)
   assert.deepEqual(told(reply), [['', 'engine', 'the model does not load: Failed to load from mjb', null]])
   assert.equal(reply.main, null)
+})
+
+test('an engine that ends is told, and not used again', () => {
+  const reply = attempt(
+    FALLING,
+    { controls: ['a', 'b', 'c'].map((label) => control({ label, type: 'button' })) },
+    { controls: [run('1'), run('throw new WebAssembly.RuntimeError("unreachable")'), run('1')] },
+    { seconds: 0.1 },
+  )
+  assert.deepEqual(reply.failures.map(({ entry, kind }) => [entry, kind]), [[['controls', 1, 'run'], 'engine']])
+  assert.deepEqual(reply.tried.map(({ what }) => what), ['start', 'button "a"'])
 })
 
 test('what parity needs: the start, what a controller wrote, and the way', () => {

@@ -23,10 +23,10 @@ ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftsh
 
 
 @pytest.fixture(scope="session")
-def course(tmp_path_factory: pytest.TempPathFactory, font_store: Path) -> Folder:
+def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """A course of one lesson with labs, built."""
     folder = Folder(tmp_path_factory.mktemp("labs") / "course")
-    folder.fill([LESSON], font_store)
+    folder.fill([LESSON], stores)
     folder.write("models/pendulum.xml", PENDULUM)
     folder.write("models/zoo.xml", ZOO)
     done = folder.main("build")

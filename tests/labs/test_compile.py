@@ -248,7 +248,7 @@ def test_data_arrives_to_the_last_bit(y: float, text: str, other: float) -> None
             {
                 "label": text + "!",
                 "type": "select",
-                "options": [[text, text], ["n", y]],
+                "options": [[text, text], ["n" + text, y]],
                 "param": "n",
             },
         ],
@@ -265,7 +265,7 @@ def test_data_arrives_to_the_last_bit(y: float, text: str, other: float) -> None
     slider, select = data["controls"]
     assert (slider["min"], slider["max"], slider["unit"]) == (low, high, text)
     assert str(float(slider["value"])) == str(y), "the sign of a zero too"
-    assert select["options"] == [[text, text], ["n", y]]
+    assert select["options"] == [[text, text], ["n" + text, y]]
     assert data["plots"][0]["refLines"] == [{"y": y, "label": text}]
 
 

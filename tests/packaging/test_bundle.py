@@ -31,6 +31,7 @@ def project(root: Path, packages: Path, tmp_path: Path) -> Path:
     (site / "css" / "part.css").write_text(
         "@font-face { font-family: F; src: url(../fonts/x.woff2) }\n"
     )
+    shutil.copytree(root / "site" / "licences", site / "licences")
     (site / "node_modules").symlink_to(packages)
     return tmp_path
 
@@ -65,6 +66,27 @@ def test_modules_and_imports_become_single_files(run: Run, project: Path) -> Non
     assert "first − value" in made["js/page.js"].decode()
     style = made["css/site.css"].decode()
     assert style.startswith("@font-face{font-family:F;src:url(../fonts/x.woff2)}body{")
+
+
+def test_the_engine_is_copied_and_its_glue_loses_what_is_for_node(
+    run: Run, project: Path, packages: Path
+) -> None:
+    """Modules stay modules; the trial's script is a classic one, without an address of its own."""
+    loading = "import load from '@mujoco/mujoco'\nglobalThis.started = load({})\n"
+    for name in ("page.js", "lab-trial.js"):
+        (project / "site" / "js" / name).write_text(loading)
+    made = assert_bundles(run, project)
+    engine = (packages / "@mujoco" / "mujoco" / "mujoco.wasm").read_bytes()
+    assert made["mujoco/mujoco.wasm"] == engine
+    assert b"Apache License" in made["licences/mujoco-mujoco.txt"]
+    page, trial = (made[f"js/{name}"].decode() for name in ("page.js", "lab-trial.js"))
+    assert "import.meta.url" in page
+    assert "import.meta" not in trial
+    for text in (page, trial):
+        assert "createRequire" not in text
+        assert 'import("' not in text
+        assert "instantiateWasm" in text
+    assert trial.startswith(("(()=>{", '"use strict";(()=>{'))
 
 
 def test_work_is_done_once(run: Run, project: Path) -> None:
@@ -103,13 +125,18 @@ def test_a_change_is_noticed(
     [
         (lambda site: shutil.rmtree(site / "css"), "site/css is missing"),
         (lambda site: shutil.rmtree(site / "js"), "site/js is missing"),
+        (lambda site: shutil.rmtree(site / "licences"), "site/licences is missing"),
+        (
+            lambda site: (site / "licences" / "mujoco-mujoco.txt").rename(site / "licences" / "x"),
+            "@mujoco/mujoco has no licence file",
+        ),
         (lambda site: (site / "css/site.css").unlink(), "site/css/site.css is missing"),
         (lambda site: (site / "js/page.js").unlink(), "site/js holds no script"),
         (lambda site: (site / "js/lab/a.js").write_text("export const = 1"), "js/lab/a.js:1:13"),
         (lambda site: (site / "js/page.js").write_text("import 'absent'"), '"absent"'),
         (lambda site: (site / "css/site.css").write_text("a { b: c } }"), "css/site.css:1:11"),
     ],
-    ids=["styles", "scripts", "style", "script", "syntax", "import", "css"],
+    ids="styles scripts licences licence style script syntax import css".split(),
 )
 def test_a_mistake_is_told_and_leaves_the_last_bundle(
     run: Run, project: Path, change: Callable[[Path], object], message: str

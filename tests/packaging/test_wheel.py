@@ -1,6 +1,7 @@
 """What is in the wheel and in the source distribution, and that both can be built again."""
 
 import email
+import importlib.metadata
 import io
 import json
 import re
@@ -115,6 +116,15 @@ def test_temml_is_a_classic_script_for_an_engine_without_a_page(wheel: Path) -> 
     assert "<mfrac>" in markup
 
 
+def test_the_physics_engine_runs_without_a_page(wheel: Path) -> None:
+    engine = py_mini_racer.MiniRacer()
+    engine.eval(read(wheel, "coursebuild/assets/js/lab-trial.js").decode())
+    wasm = read(wheel, "coursebuild/assets/mujoco/mujoco.wasm")
+    engine.eval(f"reserve('wasm', {len(wasm)})")[:] = wasm
+    engine.eval("boot('')")
+    assert engine.eval("booted('')") == importlib.metadata.version("mujoco")
+
+
 def test_every_shipped_package_has_its_licence(
     wheel: Path, names: list[str], full_name: str
 ) -> None:
@@ -124,6 +134,7 @@ def test_every_shipped_package_has_its_licence(
         "fontsource-stix-two-math.txt",
         "fontsource-variable-source-code-pro.txt",
         "fontsource-variable-source-serif-4.txt",
+        "mujoco-mujoco.txt",
         "temml.txt",
     } <= set(texts)
     assert all(len(text) > 500 for text in texts.values())

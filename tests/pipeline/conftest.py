@@ -14,12 +14,12 @@ from coursekit import Folder
 
 
 @pytest.fixture
-def make(tmp_path: Path, font_store: Path) -> Callable[..., Folder]:
+def make(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
     """Makes a course of these lessons, in a folder with no simple name."""
 
     def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
         folder = Folder(tmp_path / name)
-        folder.fill(lessons, font_store)
+        folder.fill(lessons, stores)
         return folder
 
     return make

@@ -48,13 +48,18 @@ class Folder:
 
     root: Path
 
-    def fill(self, lessons: Sequence[str | bytes], fonts: Path) -> None:
+    def fill(self, lessons: Sequence[str | bytes], stores: Path) -> None:
         """Write the map and the lessons 1.1, 1.2 and so on."""
         self.write("content/course.toml", course_map(len(lessons)))
         for number, text in enumerate(lessons, 1):
             self.write(self.lesson(number), text)
+        self.borrow(stores)
+
+    def borrow(self, stores: Path) -> None:
+        """Keep fonts and the like with other courses."""
         (self.root / ".coursebuild").mkdir()
-        (self.root / ".coursebuild/fonts").symlink_to(fonts)
+        for store in stores.iterdir():
+            (self.root / ".coursebuild" / store.name).symlink_to(store)
         self.tmp.mkdir(exist_ok=True)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -148,6 +149,15 @@ def test_c_takes_any_folder_from_anywhere(make: Make, tmp_path: Path) -> None:
     done = folder.run("-C", str(folder.root), "build", "--out", "../a site/öut", cwd=elsewhere)
     assert done.status == 0
     assert (tmp_path / "a site/öut/index.html").is_file()
+
+
+def test_a_folder_whose_name_is_not_utf8(make: Make) -> None:
+    odd = make(GOOD).root.with_name("caf\udce9")
+    make(GOOD, name="other").root.rename(odd)
+    done = Folder(odd).run("build")
+    assert (done.status, done.out) == (2, "")
+    assert "the path of the course is not UTF-8: " in done.err
+    assert "caf\\xe9" in done.err
 
 
 def test_without_c_the_nearest_course_counts(make: Make) -> None:
@@ -349,8 +359,10 @@ def test_the_stages_of_a_build(make: Make) -> None:
     folder = make("## One $x$\n\n" + block("one.py", "print(1)", info="norun"))
     folder.write("models/m.xml", "<mujoco/>")
     done = folder.main("build")
-    assert done.err == "compiling models\ntypesetting formulas\nrendering\npublishing\n"
-    assert "\npublished 2" in done.out
+    said = done.err.splitlines()
+    assert said[:3] == ["compiling models", "typesetting formulas", "rendering"]
+    assert said[-1] == "publishing"
+    assert re.search("^published [0-9]+ files in public$", done.out, re.MULTILINE)
 
 
 def test_jobs_run_at_a_time(make: Make) -> None:

@@ -56,7 +56,6 @@ def test_an_edited_file_is_never_overwritten(make: Make, command: str) -> None:
     assert folder.main("build").status == 0
     site = folder.tree("public")
     folder.write("examples/a.py", "print('a')  # by hand\n")
-    folder.replace(folder.lesson(), "print('a')", "print('A')")
     lesson = folder.read(folder.lesson())
     done = folder.main(command)
     assert done.status == 1
@@ -194,6 +193,25 @@ def test_only_edits_are_adopted(make: Make) -> None:
     assert "print('B')" in folder.text(folder.lesson())
     assert "print('edited')" in folder.text(folder.lesson())
     assert folder.read("examples/sub/b.py") == b"print('B')\n"
+
+
+@pytest.mark.parametrize("command", [["extract"], ["extract", "--adopt"], ["check"]])
+def test_of_two_edits_neither_is_lost(make: Make, command: list[str]) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    folder.write("examples/a.py", "print('a')  # by hand\n")
+    folder.replace(folder.lesson(), "print('a')", "print('A')")
+    lesson = folder.read(folder.lesson())
+    done = folder.main(*command)
+    assert done.status == 1
+    assert "-print('A')\n            +print('a')  # by hand\n" in done.out
+    assert "the block was changed as well" in done.out
+    assert "--adopt" not in done.out
+    assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
+    assert folder.read(folder.lesson()) == lesson
+    folder.replace(folder.lesson(), "print('A')", "print('A')  # by hand")
+    (folder.root / "examples/a.py").unlink()
+    assert folder.main("extract").status == 0
 
 
 def test_adopting_without_edits_is_extracting(make: Make) -> None:

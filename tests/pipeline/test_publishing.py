@@ -185,12 +185,12 @@ def test_deleting_the_caches_loses_nothing(make: Make) -> None:
 
 
 @pytest.mark.parametrize("damage", [b"", b"x", b"\0" * 4000])
-def test_a_damaged_cache_is_made_again(make: Make, font_store: Path, damage: bytes) -> None:
+def test_a_damaged_cache_is_made_again(make: Make, stores: Path, damage: bytes) -> None:
     folder = make(GOOD)
     assert folder.main("build").status == 0
     site = folder.tree()
     (folder.root / ".coursebuild/fonts").unlink()
-    shutil.copytree(font_store, folder.root / ".coursebuild/fonts")
+    shutil.copytree(stores / "fonts", folder.root / ".coursebuild/fonts")
     smallest = min(
         (folder.root / ".coursebuild/fonts").iterdir(), key=lambda path: path.stat().st_size
     )

@@ -17,20 +17,18 @@ FULL = ROOT / "tests/courses/full/course"
 
 
 @pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory, font_store: Path) -> Folder:
+def original(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """The course that uses everything, built in this process."""
-    folder = copy(tmp_path_factory.mktemp("original") / "course", font_store)
+    folder = copy(tmp_path_factory.mktemp("original") / "course", stores)
     done = folder.main("build", "--jobs", "1")
     assert done.status == 0, done.out
     return folder
 
 
-def copy(root: Path, fonts: Path) -> Folder:
+def copy(root: Path, stores: Path) -> Folder:
     folder = Folder(root)
     shutil.copytree(FULL, root)
-    (root / ".coursebuild").mkdir()
-    (root / ".coursebuild/fonts").symlink_to(fonts)
-    folder.tmp.mkdir()
+    folder.borrow(stores)
     return folder
 
 
@@ -46,8 +44,8 @@ def test_twice_in_one_place(original: Folder) -> None:
     assert original.tree() == before
 
 
-def test_anywhere_and_anyhow(original: Folder, tmp_path: Path, font_store: Path) -> None:
-    folder = copy(tmp_path / "anderswo ünd 別" / "a course", font_store)
+def test_anywhere_and_anyhow(original: Folder, tmp_path: Path, stores: Path) -> None:
+    folder = copy(tmp_path / "anderswo ünd 別" / "a course", stores)
     environment = {
         "TZ": "Pacific/Kiritimati",
         "LANG": "tr_TR.UTF-8",
@@ -91,9 +89,9 @@ def test_nothing_says_where_it_was_built(original: Folder) -> None:
         assert not [place for place in places if any(place in text for text in texts)], name
 
 
-def test_after_any_edits_as_after_none(original: Folder, tmp_path: Path, font_store: Path) -> None:
+def test_after_any_edits_as_after_none(original: Folder, tmp_path: Path, stores: Path) -> None:
     """A folder that has seen other courses gives what a fresh one gives."""
-    folder = copy(tmp_path / "used", font_store)
+    folder = copy(tmp_path / "used", stores)
     lesson = "content/lessons/1.1-text.md"
     text = folder.text(lesson)
     for edited in (

@@ -99,9 +99,9 @@ def serving(folder: Folder, *arguments: str) -> Iterator[Preview]:
 
 
 @pytest.fixture(scope="module")
-def preview(tmp_path_factory: pytest.TempPathFactory, font_store: Path) -> Iterator[Preview]:
+def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Preview]:
     folder = Folder(tmp_path_factory.mktemp("served") / "a cöurse")
-    folder.fill([GOOD + "![A](../pic%20ä.svg) and $x$\n"], font_store)
+    folder.fill([GOOD + "![A](../pic%20ä.svg) and $x$\n"], stores)
     folder.write("content/pic ä.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
     folder.write("secret.txt", "not of the site")
     with serving(folder) as running:

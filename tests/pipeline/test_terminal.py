@@ -293,3 +293,25 @@ def test_the_folder_of_a_course_may_vanish(make: Make, tmp_path: Path) -> None:
     done = folder.run("-C", str(folder.root), "check", cwd=tmp_path)
     assert "Traceback" not in done.err
     assert done.status in (0, 1)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_while_a_lab_is_tried(make: Make, number: int, status: int) -> None:
+    """Its code never returns; nobody waits until its time is over."""
+    lab = '{"xml": "<mujoco/>", "controller": "while (true) {}"}'
+    folder = make(GOOD + f"```lab\n{lab}\n```\n")
+    process = folder.start("check", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    with ended(process):
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line == b"trying labs\n":
+                break
+        time.sleep(0.5)
+        assert process.poll() is None
+        began = time.monotonic()
+        process.send_signal(number)
+        out, err = process.communicate(timeout=20)
+        assert time.monotonic() - began < 10
+    assert (process.returncode, out) == (status, b"")
+    assert b"Traceback" not in err
+    wait_until_alone(folder)

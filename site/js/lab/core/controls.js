@@ -1,8 +1,8 @@
 /**
  * The controls of a lab: their values, and applying them.
  *
- * A parameter (`param`) is put into `ctx` before anything else runs, at the start and at every reset. A control with `init` is applied
- * after `setup`, each time. Every other one is applied once at the start, before `setup`, so that the page shows what is.
+ * A parameter (`param`) is put into `ctx` before anything else runs, at the start and at every reset. A control with `init` is
+ * applied after `setup`, each time. Every other one is applied once at the start, before `setup`, so that the page shows what is.
  */
 
 import { call } from './piece.js'

@@ -6,7 +6,11 @@
  */
 
 export class Drag {
-  /** @param {import('./engine.js').Engine} engine; @param {import('./engine.js').Handles} handles; @param {object} scene MjvScene */
+  /**
+   * @param {import('./engine.js').Engine} engine
+   * @param {import('./engine.js').Handles} handles
+   * @param {object} scene MjvScene, whose camera has been set
+   */
   constructor(engine, handles, scene) {
     this.engine = engine
     this.model = handles.model

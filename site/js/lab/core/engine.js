@@ -47,8 +47,8 @@ export async function createEngine(loadMujoco, module, log = () => {}) {
 }
 
 /**
- * Arrays of booleans (`data.eq_active`, `model.light_active`, …) have a type that the bindings forget to register, so that reading
- * one throws. It is registered here, as bytes, when it is first met.
+ * Arrays of booleans (`data.eq_active`, `model.light_active`, …) have a type that the bindings forget to register, so that
+ * reading one throws. It is registered here, as bytes, when it is first met.
  *
  * @param {object} env the functions that the engine imports; one is replaced
  * @returns {(instance: WebAssembly.Instance) => void} to be called with the instance

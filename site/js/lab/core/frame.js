@@ -7,7 +7,7 @@
  *   geoms       19 for each geom      position 3, rotation matrix 9 (by rows), size 3, colour 4 (RGBA)
  *   sites       19 for each site      the same
  *   lights      7 for each light      position 3, direction 3, 1 if it is on
- *   cameras     13 for each camera    position 3, matrix 9 (by rows; it looks along its -z, up is its y), vertical field of view (°)
+ *   cameras     13 for each camera    position 3, matrix 9 by rows (it looks along its -z, up is its y), field of view (°, vertical)
  *   flex        3 for each flex vertex
  *   skin        6 for each skin vertex: position 3, normal 3
  *   trail       3 for each point, from the oldest to the newest
@@ -88,7 +88,8 @@ export class Pictures {
     engine.mj.mjv_updateScene(model, data, this.option, perturb, this.camera, engine.k.category.ALL, this.scene)
     const decorations = this.geoms.update()
     const most = layout.trail + 3 * this.sampler.capacity + DECORATION * decorations
-    const target = new Float32Array(buffer && buffer.byteLength >= 4 * most ? buffer : new ArrayBuffer(4 * (most + 10 * DECORATION)))
+    const fits = buffer && buffer.byteLength >= 4 * most
+    const target = new Float32Array(fits ? buffer : new ArrayBuffer(4 * (most + 10 * DECORATION)))
     this.writePoses(target)
     this.writeVertices(target)
     const points = this.sampler.writeTrail(target, layout.trail)
@@ -101,9 +102,8 @@ export class Pictures {
 
   writePoses(target) {
     const { model, data, layout } = this
-    const materials = model.mat_rgba
-    writeGeoms(target, layout.geoms, data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rgba, model.geom_matid, materials)
-    writeGeoms(target, layout.sites, data.site_xpos, data.site_xmat, model.site_size, model.site_rgba, model.site_matid, materials)
+    writeGeoms(target, layout.geoms, model, 'geom', data.geom_xpos, data.geom_xmat)
+    writeGeoms(target, layout.sites, model, 'site', data.site_xpos, data.site_xmat)
     const { light_xpos, light_xdir, cam_xpos, cam_xmat } = data
     const { light_active, cam_fovy } = model
     for (let i = 0, at = layout.lights; i < model.nlight; i++, at += LIGHT) {
@@ -142,16 +142,17 @@ export class Pictures {
   }
 }
 
-/** One row for each geom or site; the colour is resolved as MuJoCo does. */
-function writeGeoms(target, start, positions, matrices, sizes, colours, materialIds, materialColours) {
-  const count = materialIds.length
-  for (let i = 0, at = start; i < count; i++, at += GEOM) {
+/** One row for each geom or site (`kind`); the colour is resolved as MuJoCo does. */
+function writeGeoms(target, start, model, kind, positions, matrices) {
+  const [sizes, colours, materials] = ['size', 'rgba', 'matid'].map((name) => model[`${kind}_${name}`])
+  const ofMaterials = model.mat_rgba
+  for (let i = 0, at = start; i < materials.length; i++, at += GEOM) {
     target.set(positions.subarray(3 * i, 3 * i + 3), at)
     target.set(matrices.subarray(9 * i, 9 * i + 9), at + 3)
     target.set(sizes.subarray(3 * i, 3 * i + 3), at + 12)
-    const material = materialIds[i]
-    const own = material < 0 || DEFAULT_COLOUR.some((x, j) => colours[4 * i + j] !== x)
-    target.set(own ? colours.subarray(4 * i, 4 * i + 4) : materialColours.subarray(4 * material, 4 * material + 4), at + 15)
+    const own = materials[i] < 0 || DEFAULT_COLOUR.some((x, j) => colours[4 * i + j] !== x)
+    const [colour, from] = own ? [colours, 4 * i] : [ofMaterials, 4 * materials[i]]
+    target.set(colour.subarray(from, from + 4), at + 15)
   }
 }
 

@@ -267,8 +267,8 @@ export class Lab {
   /**
    * Drag a body by a spring.
    *
-   * @param {{body?: number, point?: number[], target: number[]} | null} request with a `point` (m, world) the body is taken hold of
-   *   there; the spring draws it to `target`; `null` lets go
+   * @param {{body?: number, point?: number[], target: number[]} | null} request with a `point` (m, world) the body is taken
+   *   hold of there; the spring draws it to `target`; `null` lets go
    */
   perturb(request) {
     if (request === null) return this.drag.release()

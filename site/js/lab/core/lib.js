@@ -2,7 +2,8 @@
  * What lab code finds under `lib`: quantities that take more than an index, computed by MuJoCo.
  *
  * Nothing here changes the motion. `energy`, `momentum` and `angmom` need results that MuJoCo leaves in the data only on
- * demand; the data are as before afterwards, so that a readout never changes what another one shows. Vectors are copies. SI units, world frame.
+ * demand; the data are as before afterwards, so that a readout never changes what another one shows. Vectors are copies, in
+ * SI units and the world frame.
  */
 
 const DEGREES = 180 / Math.PI
@@ -127,9 +128,9 @@ export function eachContact(data, visit) {
 }
 
 /**
- * The contacts as plain objects, what `sim.contacts()` gives: `geoms` are two ids (-1: not a geom, but part of a flex) and `names`
- * their names; `pos` (m) and `normal` (unit, from the first to the second) are in the world, `dist` is negative in penetration (m),
- * `force` is [normal, friction, friction, torsion, rolling, rolling] in the frame of the contact (N, N m).
+ * The contacts as plain objects, what `sim.contacts()` gives: `geoms` are two ids (-1: not a geom, but part of a flex) and
+ * `names` their names; `pos` (m) and `normal` (unit, from the first to the second) are in the world; `dist` is negative in
+ * penetration (m); `force` is [normal, friction, friction, torsion, rolling, rolling] in the frame of the contact (N, N m).
  */
 export function contactList(engine, model, data, scratch) {
   const { mj, k } = engine

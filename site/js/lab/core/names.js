@@ -4,7 +4,9 @@
 export function keyframe(engine, model, key) {
   if (key === null || key === undefined) return -1
   const index = typeof key === 'number' ? key : engine.mj.mj_name2id(model, engine.k.obj.KEY, key)
-  if (!(Number.isInteger(index) && index >= 0 && index < model.nkey)) throw new RangeError(`the model has no keyframe ${JSON.stringify(key)}`)
+  if (!(Number.isInteger(index) && index >= 0 && index < model.nkey)) {
+    throw new RangeError(`the model has no keyframe ${JSON.stringify(key)}`)
+  }
   return index
 }
 

@@ -160,7 +160,7 @@ function light(model, i, name) {
   }
 }
 
-/** `elements`: vertices of each line (dim 1) or triangle (dim 2); of a volume (dim 3) it is the surface. Indices within the flex. */
+/** `elements`: vertices of each line (dim 1) or triangle (dim 2), or of the surface of a volume (dim 3), counted in the flex. */
 function flex(model, i, name) {
   const dim = model.flex_dim[i]
   const elements =

@@ -2,8 +2,10 @@
  * The shapes of MuJoCo's geoms as three.js geometries.
  *
  * A shape is a list of parts; each has a geometry of unit size, shared by all labs, and says how it is scaled and shifted along
- * its z axis for a geom's size. So a size may change from frame to frame without a new geometry. Texture coordinates are x and y
- * in the unit shape (see `materials.js`).
+ * its z axis for a geom's size. So a size may change from frame to frame without a new geometry.
+ *
+ * Texture coordinates are those of MuJoCo's renderer, for a texture that is spread over the shape once: over each face of a box, around
+ * and from top to bottom of round shapes, with the first row of the texture on top. `direction` is what a cube texture is looked up by.
  */
 
 import { BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, EdgesGeometry, PlaneGeometry, SphereGeometry } from 'three'
@@ -21,33 +23,43 @@ const HEAD_LENGTH = 5
 
 const cache = new Map()
 
-function unit(name, make) {
-  if (!cache.has(name)) cache.set(name, flat(make()))
+/** `wrap(x, y, z, nx, ny, nz)` gives texture coordinates where three.js has others; `lift` moves the directions along z. */
+function unit(name, make, wrap = null, lift = 0) {
+  if (!cache.has(name)) cache.set(name, textured(make(), wrap, lift))
   return cache.get(name)
 }
 
-/** Texture coordinates of an unwrapped shape: seen from above. */
-function flat(geometry) {
-  const { position } = geometry.attributes
-  const uv = new Float32Array(2 * position.count)
+function textured(geometry, wrap, lift) {
+  const { position, normal, uv } = geometry.attributes
+  const direction = new Float32Array(3 * position.count)
   for (let i = 0; i < position.count; i++) {
-    uv[2 * i] = position.getX(i)
-    uv[2 * i + 1] = position.getY(i)
+    const at = [position.getX(i), position.getY(i), position.getZ(i)]
+    direction.set([at[0], at[1], at[2] + lift], 3 * i)
+    const own = wrap === null ? null : wrap(...at, normal.getX(i), normal.getY(i), normal.getZ(i))
+    if (own === null) uv.setY(i, 1 - uv.getY(i))
+    else uv.setXY(i, ...own)
   }
-  geometry.setAttribute('uv', new BufferAttribute(uv, 2))
+  geometry.setAttribute('direction', new BufferAttribute(direction, 3))
   return geometry
 }
 
-const standing = (geometry) => geometry.rotateX(Math.PI / 2) // three.js has its axes along y
+// three.js has its axes along y; textures of its spheres begin half a turn, those of its cylinders a quarter from MuJoCo's.
+const standing = (geometry, turn) => geometry.rotateX(Math.PI / 2).rotateZ(turn)
+const sphere = (from, angle, rings) => standing(new SphereGeometry(1, ROUND, rings, 0, 2 * Math.PI, from, angle), Math.PI)
+const barrel = (open) => standing(new CylinderGeometry(1, 1, 2, ROUND, 1, open), Math.PI / 2)
 
-const box = () => unit('box', () => new BoxGeometry(2, 2, 2))
-const ball = () => unit('ball', () => standing(new SphereGeometry(1, ROUND, 2 * QUARTER)))
-const cylinder = () => unit('cylinder', () => standing(new CylinderGeometry(1, 1, 2, ROUND)))
-const tube = () => unit('tube', () => standing(new CylinderGeometry(1, 1, 2, ROUND, 1, true)))
-const dome = () => unit('dome', () => standing(new SphereGeometry(1, ROUND, QUARTER, 0, 2 * Math.PI, 0, Math.PI / 2)))
-const bowl = () => unit('bowl', () => standing(new SphereGeometry(1, ROUND, QUARTER, 0, 2 * Math.PI, Math.PI / 2, Math.PI / 2)))
-const plane = () => unit('plane', () => new PlaneGeometry(2, 2))
-const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND)).translate(0, 0, 0.5))
+const onFace = (x, y, z, nx, ny, nz) => [(1 + (Math.abs(nx) > 0.5 ? y : x)) / 2, (1 - (Math.abs(nz) > 0.5 ? y : z)) / 2]
+const onLid = (x, y, z, nx, ny, nz) => (Math.abs(nz) > 0.9 ? [(1 + x) / 2, (1 + y) / 2] : null)
+const fromAbove = (x, y) => [(1 + x) / 2, (1 - y) / 2]
+
+const box = () => unit('box', () => new BoxGeometry(2, 2, 2), onFace)
+const ball = () => unit('ball', () => sphere(0, Math.PI, 2 * QUARTER))
+const cylinder = () => unit('cylinder', () => barrel(false), onLid)
+const tube = () => unit('tube', () => barrel(true))
+const dome = () => unit('dome', () => sphere(0, Math.PI / 2, QUARTER), null, 1)
+const bowl = () => unit('bowl', () => sphere(Math.PI / 2, Math.PI / 2, QUARTER), null, -1)
+const plane = () => unit('plane', () => new PlaneGeometry(2, 2), fromAbove)
+const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND), 0).translate(0, 0, 0.5))
 const edges = () => unit('edges', () => new EdgesGeometry(new BoxGeometry(2, 2, 2)))
 const line = () => unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
 
@@ -125,7 +137,10 @@ export function shape(type, model, given = null) {
   }
 }
 
-/** A mesh of the model; each corner has its own normal and texture coordinate, as the file had them. */
+/**
+ * A mesh of the model. Each corner has its own texture coordinate, as the file had it, and its own normal: that of the vertex, or where
+ * it is far from that of the face, the face's, as MuJoCo's renderer does it.
+ */
 export function meshGeometry(mesh) {
   const { vertices, normals, faces, faceNormals, texcoords, faceTexcoords } = mesh
   const count = faces.length
@@ -139,6 +154,7 @@ export function meshGeometry(mesh) {
       position[3 * i + j] = vertices[v + j]
       normal[3 * i + j] = normals[n + j]
     }
+    if (i % 3 === 2) sharpen(position, normal, 3 * (i - 2))
     const source = texcoords === null ? vertices : texcoords
     const t = texcoords === null ? v : 2 * faceTexcoords[i]
     uv[2 * i] = source[t]
@@ -150,6 +166,20 @@ export function meshGeometry(mesh) {
     .setAttribute('uv', new BufferAttribute(uv, 2))
 }
 
+const SMOOTH = 0.8 // cosine
+
+function sharpen(position, normal, at) {
+  const side = (k) => [0, 1, 2].map((j) => position[at + 3 * k + j] - position[at + j])
+  const [a, b] = [side(1), side(2)]
+  const face = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+  const length = Math.hypot(...face)
+  if (length === 0) return
+  for (let corner = at; corner < at + 9; corner += 3) {
+    const cosine = face.reduce((sum, x, j) => sum + x * normal[corner + j], 0) / length
+    if (cosine < SMOOTH) for (let j = 0; j < 3; j++) normal[corner + j] = face[j] / length
+  }
+}
+
 /** A height field: its surface, its four sides and its floor. */
 export function hfieldGeometry({ rows, columns, size, data }) {
   const [halfX, halfY, top, base] = size
@@ -159,7 +189,7 @@ export function hfieldGeometry({ rows, columns, size, data }) {
   const vertex = (column, row, z) => {
     const u = (2 * column) / (columns - 1) - 1
     const v = (2 * row) / (rows - 1) - 1
-    uv.push(u, v)
+    uv.push((1 + u) / 2, (1 - v) / 2)
     return position.push(halfX * u, halfY * v, z) / 3 - 1
   }
   const height = (column, row) => top * data[row * columns + column]

@@ -13,6 +13,7 @@ import {
 
 const SPECULAR = 0.5 // of a geom without a material
 const SHININESS = 0.5
+const WITHOUT_LIGHTS = 0.5 // see lights.js
 const FINE = 4 // anisotropy
 const TEXTURE_CUBE = 1
 const TEXTURE_SKY = 2
@@ -23,6 +24,7 @@ export class Materials {
     this.scene = scene
     this.textures = new Map()
     this.made = []
+    this.gloss = gloss(scene)
   }
 
   /**
@@ -33,7 +35,7 @@ export class Materials {
   make(id, { doubleSided = false } = {}) {
     const info = this.scene.materials[id]
     const shininess = Math.max(1, 128 * (info?.shininess ?? SHININESS))
-    const specular = (8 / (shininess + 2)) * (info?.specular ?? SPECULAR)
+    const specular = (8 / (shininess + 2)) * (info?.specular ?? SPECULAR) * this.gloss
     const material = new MeshPhongMaterial({ shininess })
     material.specular.setScalar(specular)
     material.userData.emission = info?.emission ?? 0
@@ -61,9 +63,9 @@ export class Materials {
   /**
    * Give a material its texture.
    *
-   * @param {boolean} wrapped whether the geometry has texture coordinates of the file, and not x and y of the unit shape
-   * @returns {((size: ArrayLike<number>, x?: number, y?: number, endless?: boolean) => void) | null} what to call when the size has
-   *   changed; x and y are where in its plane (m) an endless plane has its middle
+   * @param {boolean} wrapped whether the geometry has texture coordinates of a file
+   * @returns {((size: ArrayLike<number>, x?: number, y?: number, endless?: boolean) => void) | null} what to call when the size, which
+   *   is the visualizer's, has changed; x and y are where in its plane (m) an endless plane has its middle
    */
   dress(material, id, wrapped) {
     const info = this.scene.materials[id]
@@ -79,15 +81,11 @@ export class Materials {
       map.repeat.set(u, v)
       return null
     }
-    // The unit shape goes from -1 to 1. A uniform texture repeats u times a metre, another u times over the geom.
+    // A uniform texture is repeated for every metre of two, another as often on each face. That of an endless plane is uniform.
     return (size, x = 0, y = 0, endless = false) => {
-      if (info.texuniform || endless) {
-        map.repeat.set(u * size[0], v * size[1])
-        map.offset.set(u * x, v * y)
-      } else {
-        map.repeat.set(u / 2, v / 2)
-        map.offset.set(-u / 2, -v / 2)
-      }
+      const uniform = info.texuniform || endless
+      map.repeat.set(uniform ? u * size[0] : u, uniform ? v * size[1] : v)
+      if (endless) map.offset.set((u * (x - size[0]) + 1) / 2, (1 - v * (y + size[1])) / 2)
     }
   }
 
@@ -125,6 +123,14 @@ export class Materials {
   }
 }
 
+/** Highlights have the light's specular colour in MuJoCo, its only colour in three.js: how much weaker they are. */
+function gloss({ lights, visual: { headlight } }) {
+  if (lights.length === 0) return WITHOUT_LIGHTS
+  const all = headlight.active ? [...lights, headlight] : lights
+  const sum = (name) => all.reduce((total, light) => total + light[name][0] + light[name][1] + light[name][2], 0)
+  return sum('diffuse') > 0 ? Math.min(2, sum('specular') / sum('diffuse')) : 0
+}
+
 function finish(texture) {
   texture.colorSpace = NoColorSpace
   texture.wrapS = texture.wrapT = RepeatWrapping
@@ -150,21 +156,21 @@ function rgba({ width, channels, data }, firstRow, rows) {
   return target
 }
 
-/** A cube texture is looked up by the direction from the geom's centre, in its own axes. */
+/** A cube texture is looked up by the direction from the geom's centre, in its own axes: of the unit shape, or if `uniform` of the geom. */
 function wrapCube(material, texture, uniform) {
   const size = { value: [1, 1, 1] }
   material.onBeforeCompile = (shader) => {
     shader.uniforms.labCube = { value: texture }
     shader.uniforms.labSize = size
     shader.vertexShader = shader.vertexShader
-      .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform vec3 labSize;')
-      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = position * labSize;')
+      .replace('#include <common>', '#include <common>\nattribute vec3 direction;\nvarying vec3 vLabDirection;\nuniform vec3 labSize;')
+      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = direction * labSize;')
     shader.fragmentShader = shader.fragmentShader
       .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform samplerCube labCube;')
       .replace('#include <map_fragment>', 'diffuseColor *= textureCube(labCube, vLabDirection);')
   }
   material.customProgramCacheKey = () => 'lab-cube'
   return (now) => {
-    if (!uniform) size.value = [now[0], now[1], now[2]]
+    if (uniform) size.value = [now[0], now[1], now[2]]
   }
 }

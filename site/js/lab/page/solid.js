@@ -12,7 +12,7 @@ export class Solid {
    * @param {object} info `type` (mjtGeom), `material` (id or -1), `geometry` of a mesh or height field, `model` (see `shape`)
    */
   constructor(parent, materials, { type, material = -1, geometry = null, model = true, wrapped = false, extent = 1 }) {
-    this.materials = materials
+    Object.assign(this, { materials, type, model })
     this.endless = type === GEOM.PLANE
     this.far = FAR * extent
     this.parts = shape(type, model, geometry)
@@ -63,7 +63,14 @@ export class Solid {
     size[0] = a
     size[1] = b
     size[2] = c
-    this.fit?.(size)
+    this.fit?.(this.visible(size))
+  }
+
+  /** The size as the visualizer has it. */
+  visible(size) {
+    if (!this.model) return size
+    if (this.type === GEOM.SPHERE) return [size[0], size[0], size[0]]
+    return this.type === GEOM.CAPSULE || this.type === GEOM.CYLINDER ? [size[0], size[0], size[1]] : size
   }
 
   place(f, at, x, y, z) {

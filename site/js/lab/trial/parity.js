@@ -12,7 +12,11 @@ const MOST_NUMBERS = 200_000 // of recorded states
 const MOST_WRITES = 1_000_000
 
 export class ParityRecorder {
-  /** @param {import('../core/lab.js').Lab} lab; @param {Uint8Array} sent the model that it was made of; @param {number} steps at most */
+  /**
+   * @param {import('../core/lab.js').Lab} lab
+   * @param {Uint8Array} sent the model that it was made of
+   * @param {number} steps how many there will be at most
+   */
   constructor(lab, sent, steps) {
     this.lab = lab
     this.before = null

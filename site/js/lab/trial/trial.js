@@ -11,6 +11,7 @@
  */
 
 import { EngineError } from '../core/engine.js'
+import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, readable } from '../core/piece.js'
 import { packed } from './base64.js'
@@ -25,6 +26,9 @@ const SLICE = 64 // steps between two looks at the clock
 const CHECKS = 100 // looks at the readouts during the main run
 
 class OutOfTime extends Error {}
+
+/** What ended the engine has been told; it cannot be trusted with the rest. */
+class Ended extends Error {}
 
 export function runTrial(engine, request, bytes, now) {
   return new Trial(engine, request, bytes, now).run()
@@ -63,7 +67,7 @@ class Trial {
       if (reply.main !== null && this.took === 0) this.pace(reply.main)
     } catch (error) {
       if (error instanceof OutOfTime) this.fail(current.trying ?? [], 'timeout', 'did not finish in time', null)
-      else this.fail([], 'engine', String(error.message ?? error), null)
+      else if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
     }
     const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
     return { ...reply, tried: this.tried, failures: this.failures, stepsPerSecond }
@@ -94,7 +98,7 @@ class Trial {
       this.state(lab)
       result = action(lab)
     } catch (error) {
-      if (error instanceof OutOfTime) throw error
+      if (error instanceof OutOfTime || error instanceof Ended) throw error
       this.failed(error, lab?.time ?? null)
     } finally {
       lab?.dispose()
@@ -106,8 +110,7 @@ class Trial {
   failed(error, at) {
     if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, at)
     else this.fail(this.during.entry, error instanceof EngineError ? 'engine' : 'throws', error.message, at)
-    // An engine that ended in the middle of something cannot be trusted with the rest.
-    if (error.kind === 'engine' || error.fatal || error instanceof WebAssembly.RuntimeError) throw error
+    if (error.kind === 'engine' || error.fatal || error instanceof WebAssembly.RuntimeError) throw new Ended()
   }
 
   fail(entry, kind, message, at, key = JSON.stringify([entry, kind, message])) {
@@ -205,13 +208,16 @@ class Trial {
     }
     const parity = lab.recorder?.result() ?? null
     lab.recorder = null
+    const pictures = packed([start, picture(lab)])
+    for (const name of OVERLAYS) lab.pictures.setOverlay(name, true)
+    lab.frame(null)
     return {
       seconds: lab.time,
       steps: lab.steps,
       stopped,
       timestep,
       scene: packed(withoutTextures(lab.scene())),
-      pictures: packed([start, picture(lab)]),
+      pictures,
       plots: record(lab),
       parity,
       resetDiffers: this.resetDiffers(lab, atStart),

@@ -1,0 +1,143 @@
+"""The script that a lab's page offers, run natively and held against the lab's trial.
+
+Entry point: `exported(…)`. A script whose result is not that of the lab, or that fails for any
+value that the page may put into it, is not offered.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from coursebuild.effects.native import NativeEngine, NativeError
+from coursebuild.effects.store import keep, load
+from coursebuild.effects.versions import engine_version
+from coursebuild.labs import export_check
+from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
+from coursebuild.labs.export_text import About
+from coursebuild.labs.verdict import PARITY_RTOL, Parity
+from coursebuild.model import Course, Lab
+
+_SECONDS = 5.0
+_MOST_STEPS = 20_000
+"""How long a trial's main run is, unless the lab says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What a page offers to download, or why there is nothing."""
+
+    script: tuple[str, str] | None
+    """Name of the file and its text, with `{{control:N}}` for values of controls."""
+    reason: str = ""
+
+
+def exported(
+    root: Path,
+    native: NativeEngine,
+    course: Course,
+    lab: tuple[str, str, Lab],
+    main: dict[str, Any],
+    parity: Parity | None,
+) -> Offer:
+    """The script of a lab, given as the id of its document, its name and itself.
+
+    `main` is the main run of its trial, `parity` how that compares with native MuJoCo.
+    """
+    owner, name, itself = lab
+    seconds = _seconds(itself, main)
+    about = About(file_name(name), _origin(course, owner), course.title, engine_version(), seconds)
+    export = export_script(itself, about)
+    if isinstance(export, str):
+        return Offer(None, export)
+    if main.get("recorded") is None:
+        return Offer(None, "the lab makes no step")
+    reason = _checked(root, native, itself, export, main, parity)
+    return Offer(None, reason) if reason else Offer((export.name, export.text))
+
+
+def _origin(course: Course, owner: str) -> str:
+    for lesson in course.lessons:
+        if lesson.id == owner:
+            return f"a lab of lesson {owner}, “{lesson.title}”"
+    title = next((page.title for page in course.pages if page.id == owner), owner)
+    return f"a lab of the page “{title}”"
+
+
+def _seconds(lab: Lab, main: dict[str, Any]) -> float:
+    """Simulated time of the main run."""
+    stop = lab.stop_at
+    if lab.verify_seconds is not None:
+        return lab.verify_seconds if stop is None else min(lab.verify_seconds, stop)
+    seconds = _SECONDS if stop is None else stop
+    if main["steps"] == _MOST_STEPS:
+        seconds = min(seconds, round(float(main["steps"] * main["timestep"]), 9))
+    return seconds
+
+
+def _checked(
+    root: Path,
+    native: NativeEngine,
+    lab: Lab,
+    export: Export,
+    main: dict[str, Any],
+    parity: Parity | None,
+) -> str:
+    """Why the script cannot be offered; empty if it can."""
+    exact = export.exact and parity is not None and parity.first is None
+    rtol = PARITY_RTOL if lab.verify_rtol is None else lab.verify_rtol
+    kept = main["recorded"]
+    request = {
+        "path": str(root / "examples" / export.name),
+        "text": filled(export, initial_values(lab)),
+        "others": [filled(export, values) for values in _others(lab)],
+        "buttons": list(export.buttons),
+        "near": kept["near"],
+    }
+    asked = {"kept": kept, "pictures": [p["readouts"] for p in main["pictures"]], "exact": exact}
+    digest = hashlib.sha256(_digest().encode())
+    for part in ({**request, "path": export.name}, {**asked, "rtol": rtol}, _models(root, lab)):
+        digest.update(json.dumps(part).encode() + b"\0")
+    key = digest.hexdigest()
+    found = load(root, "exports", key)
+    if found is not None:
+        return found.decode()
+    try:
+        told = native.script(request)
+    except NativeError as error:
+        return f"the script {error}"
+    reason = told["failure"] and f"the script fails: {told['failure']}"
+    reason = reason or export_check.difference(main, told, exact=exact, rtol=rtol) or ""
+    keep(root, "exports", key, reason.encode())
+    return reason
+
+
+def _others(lab: Lab) -> list[dict[int, float | str]]:
+    """Values of the controls that a reader can choose, each control for itself."""
+    start = initial_values(lab)
+    found = []
+    for i, control in enumerate(lab.controls):
+        values: list[float | str | None] = [control.minimum, control.maximum]
+        values += [value for _, value in control.options]
+        found += [{**start, i: v} for v in values if v is not None and v != start.get(i)]
+    return found
+
+
+def _models(root: Path, lab: Lab) -> str:
+    """What the script reads besides itself."""
+    if lab.model is None:
+        return ""
+    return hashlib.sha256((root / "models" / f"{lab.model}.xml").read_bytes()).hexdigest()
+
+
+@functools.lru_cache(maxsize=1)
+def _digest() -> str:
+    """A hash of how a script is run and held against the lab."""
+    from coursebuild.effects import native_worker
+
+    files = (native_worker.__file__, export_check.__file__)
+    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()

@@ -1,0 +1,63 @@
+"""Smaller copies of a site's assets, which a server can send as they are.
+
+Entry point: `compressed_files(files, keep)`.
+
+Beside each asset that shrinks stand `NAME.br` and `NAME.gz`; a server that is told to (nginx's
+`brotli_static` and `gzip_static`, Caddy's `precompressed`) chooses by what the browser takes. Pages
+change with every build and are small, so that they are left to the server.
+
+The same bytes give the same copies: they hold no time.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+
+from coursebuild.results import OutputFile
+
+SUFFIXES = (".css", ".js", ".json", ".mjb", ".svg", ".wasm")
+_SMALLEST = 1024
+"""Bytes: below, headers outweigh what is saved."""
+_LARGE = 2 << 20
+"""Bytes: from here on the last tenth would cost a quarter of a minute."""
+_WORTH_KEEPING = 1 << 16
+"""Bytes: smaller ones are made faster than they are looked up."""
+
+Keep = Callable[[str, Callable[[], bytes]], bytes]
+"""Gives what was made under a key before, or makes it."""
+
+
+def compressed_files(files: Iterable[OutputFile], keep: Keep) -> tuple[OutputFile, ...]:
+    """The copies of all assets among the files, where they are smaller."""
+    return tuple(copy for file in files for copy in _copies(file, keep))
+
+
+def _copies(file: OutputFile, keep: Keep) -> Iterator[OutputFile]:
+    compressible = file.path.startswith("assets/") and file.path.endswith(SUFFIXES)
+    if not compressible or len(file.data) < _SMALLEST:
+        return
+    for suffix, make in (("br", _brotli), ("gz", _gzip)):
+        if len(file.data) < _WORTH_KEEPING:
+            data = make(file.data)
+        else:
+            key = hashlib.sha256(f"{suffix}/{_quality(file.data)}\0".encode() + file.data)
+            data = keep(key.hexdigest(), lambda make=make: make(file.data))  # type: ignore[misc]
+        if len(data) < len(file.data):
+            yield OutputFile(f"{file.path}.{suffix}", data)
+
+
+def _quality(data: bytes) -> int:
+    return 9 if len(data) >= _LARGE else 11
+
+
+def _brotli(data: bytes) -> bytes:
+    import brotli
+
+    packed: bytes = brotli.compress(data, quality=_quality(data))
+    return packed
+
+
+def _gzip(data: bytes) -> bytes:
+    return gzip.compress(data, 9, mtime=0)

@@ -1,0 +1,247 @@
+"""The browser's engine in this process: what hangs, eats memory or breaks it is told, and goes."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "labs"))
+from labkit import BALL, Bench, make_lab, request
+
+from coursebuild.effects import lab_engine
+from coursebuild.effects.lab_engine import engine_digest
+from coursebuild.effects.versions import engine_version
+
+LOOP = "for (;;) ;"
+SLIDER = {"label": "a", "min": 0, "max": 1, "value": 0}
+ENDLESS = "(() => { for (;;) ; })()"
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(tmp_path)
+    with bench.browser, bench.native:
+        yield bench
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lab_engine, "_MARGIN", 0.3)
+
+
+def told(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
+    return [(tuple(f["entry"]), f["kind"], f["message"]) for f in reply["failures"]]
+
+
+def test_it_is_started_when_it_is_needed_and_kept(bench: Bench) -> None:
+    assert bench.browser._isolate is None
+    first = bench.trial(make_lab())
+    assert (first["version"], told(first)) == (engine_version(), [])
+    isolate = bench.browser._isolate
+    again = bench.trial(make_lab())
+    assert bench.browser._isolate is isolate
+    assert {**first, "stepsPerSecond": 0} == {**again, "stepsPerSecond": 0}
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize(
+    ("fields", "entry"),
+    [
+        ({"setup": LOOP}, ("setup",)),
+        ({"controller": f"if (sim.time > 0.05) {LOOP}"}, ("controller",)),
+        ({"readouts": [{"label": "r", "expr": ENDLESS}]}, ("readouts", 0, "expr")),
+        (
+            {"plots": [{"ylabel": "y", "traces": [{"label": "t", "expr": ENDLESS}]}]},
+            ("plots", 0, "traces", 0, "expr"),
+        ),
+        (
+            {
+                "controls": [
+                    {"type": "button", "label": "a", "run": "ctx.a = 1"},
+                    {"type": "button", "label": "b", "run": LOOP},
+                ]
+            },
+            ("controls", 1, "run"),
+        ),
+        (
+            {"controls": [{**SLIDER, "apply": f"if (value === 1) {LOOP}"}]},
+            ("controls", 0),
+        ),
+        ({"expect": [{"t": 0.1, "expr": ENDLESS, "min": 0}]}, ("expect", 0, "expr")),
+    ],
+)
+def test_an_endless_loop_is_told_at_its_entry_and_the_next_lab_is_tried(
+    bench: Bench, fields: dict[str, Any], entry: tuple[Any, ...]
+) -> None:
+    began = time.monotonic()
+    reply = bench.trial(make_lab(**fields), wall=0.7)
+    assert told(reply) == [(entry, "timeout", "ran for more than 1 s")]
+    assert (reply["main"], reply["version"]) == (None, engine_version())
+    assert time.monotonic() - began < 15
+    assert told(bench.trial(make_lab())) == []
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_model_that_is_too_slow_ends_by_itself(bench: Bench) -> None:
+    reply = bench.trial(make_lab(verify={"seconds": 100_000}), wall=0.3)
+    assert told(reply) == [((), "timeout", "did not finish in time")]
+    assert bench.browser._isolate is not None, "which needs no new engine"
+
+
+def test_memory_that_runs_out_takes_no_other_lab_along(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lab_engine, "_MEMORY", 160 << 20)
+    eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
+    reply = bench.trial(make_lab(setup=eat))
+    assert told(reply) == [((), "timeout", "took more than 160 MiB")]
+    assert told(bench.trial(make_lab())) == []
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "ctx.all = []; for (;;) ctx.all.push(new mj.DoubleBuffer(5000000))",
+        "ctx.all = []; for (;;) ctx.all.push(new ArrayBuffer(100000000))",
+        "(function f() { return f() + 1 })()",
+        "ctx.s = 'x'; for (;;) ctx.s += ctx.s",
+        "throw null",
+        "throw {toString() { throw 1 }}",
+        "Promise.reject(1); null.x",
+        "mj.MjModel.from_xml_string('<mujoco')",
+        "model.delete()",
+    ],
+)
+def test_what_lab_code_may_do_to_the_engine(bench: Bench, code: str) -> None:
+    reply = bench.trial(make_lab(setup=code), wall=20.0)
+    assert reply["main"] is None
+    assert {kind for _, kind, _ in told_kinds(reply)} <= {"throws", "engine"}
+    assert told(bench.trial(make_lab())) == []
+
+
+def told_kinds(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
+    assert reply["failures"]
+    return [(f["entry"], f["kind"], f.get("message", "")) for f in reply["failures"]]
+
+
+def test_code_that_breaks_what_all_share(bench: Bench) -> None:
+    first = bench.trial(make_lab(setup="JSON.stringify = null"))
+    ((entry, kind, message),) = told(first)
+    assert (entry, kind) == ((), "engine")
+    assert re.match("the trial broke: .*TypeError: ", message)
+    assert told(bench.trial(make_lab())) == []
+
+
+def test_a_model_that_the_engine_does_not_take(bench: Bench) -> None:
+    reply = bench.browser.trial(request(make_lab()), b"no model at all" * 100, 5.0)
+    assert [kind for _, kind, _ in told(reply)] == ["engine"]
+    assert told(bench.trial(make_lab())) == []
+
+
+def test_it_can_be_closed_and_used_again(bench: Bench) -> None:
+    assert told(bench.trial(make_lab())) == []
+    bench.browser.close()
+    bench.browser.close()
+    assert told(bench.trial(make_lab())) == []
+
+
+def test_stopped_from_another_thread(bench: Bench) -> None:
+    timer = threading.Timer(0.5, bench.browser.stop)
+    mjb = bench.native.save("models/x.xml", BALL)
+    bench.browser.mistakes([])
+    timer.start()
+    began = time.monotonic()
+    with pytest.raises(asyncio.CancelledError):
+        bench.browser.trial(request(make_lab(setup=LOOP)), mjb, 60.0)
+    assert time.monotonic() - began < 20
+    with pytest.raises(asyncio.CancelledError):
+        bench.browser.trial(request(make_lab()), mjb, 60.0)
+    bench.browser.close()
+
+
+def test_stopped_before_it_began(bench: Bench) -> None:
+    bench.browser.stop()
+    with pytest.raises(asyncio.CancelledError):
+        bench.browser.mistakes([])
+
+
+def test_an_interrupt_ends_a_trial_and_the_process() -> None:
+    code = (
+        "import sys; sys.path.insert(0, 'tests/labs')\n"
+        "from pathlib import Path\n"
+        "from labkit import *\n"
+        "bench = Bench(Path('.'))\n"
+        "with bench.native, bench.browser:\n"
+        "    bench.browser.mistakes([])\n"
+        "    print('ready', flush=True)\n"
+        "    try: bench.trial(make_lab(setup='for (;;) ;'), wall=60.0)\n"
+        "    except KeyboardInterrupt: print('interrupted')\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-W", "always", "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=Path(lab_engine.__file__).parents[2],
+    )
+    with process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(0.7)
+        os.kill(process.pid, signal.SIGINT)
+        said, errors = process.communicate(timeout=30)
+    assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
+
+
+def test_nothing_of_one_trial_is_left_for_the_next(bench: Bench) -> None:
+    bench.trial(make_lab(setup="ctx.left = 1; model.opt.timestep = 0.01; data.qpos[0] = 9"))
+    lab = make_lab(
+        readouts=[{"label": "r", "expr": "`${ctx.left} ${model.opt.timestep} ${data.qpos[0]}`"}]
+    )
+    reply = bench.trial(lab)
+    assert reply["main"]["pictures"][0]["readouts"] == ["undefined 0.002 0"]
+
+
+def test_memory_does_not_grow_from_trial_to_trial(bench: Bench) -> None:
+    """Both WebAssembly's own and the process's."""
+
+    def resident() -> int:
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+    lab = make_lab(verify={"seconds": 0.02})
+    for _ in range(10):
+        bench.trial(lab)
+    before = resident()
+    for _ in range(60):
+        bench.trial(lab)
+    assert resident() - before < 60 << 20
+
+
+def test_the_digest_is_of_what_a_trial_runs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = tmp_path / "assets"
+    for name in ("mujoco/mujoco.wasm", "js/lab-trial.js"):
+        (folder / name).parent.mkdir(parents=True)
+        (folder / name).write_bytes(b"1")
+    monkeypatch.setattr(lab_engine, "assets_dir", lambda: folder)
+    found = []
+    for name in ("", "mujoco/mujoco.wasm", "js/lab-trial.js"):
+        if name:
+            (folder / name).write_bytes(b"2")
+        engine_digest.cache_clear()
+        found.append(engine_digest())
+    engine_digest.cache_clear()
+    assert len(set(found)) == 3
