@@ -207,6 +207,11 @@ class LabResult:
     """Its model."""
     static: StaticForm | None
     cached: bool = False
+    export: tuple[str, str] | None = None
+    """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the
+    value of control N."""
+    unexported: str = ""
+    """Why there is no script, in words."""
 
 
 @dataclass(frozen=True, slots=True)

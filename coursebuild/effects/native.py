@@ -54,6 +54,19 @@ class NativeEngine(JsonChild):
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
         return self._told({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
 
+    def script(self, request: dict[str, Any]) -> dict[str, Any]:
+        """What running an exported script natively gives, or its `failure` in words.
+
+        `request` has its `path` in the course (nothing need be there), its `text`, its `buttons`,
+        `others` (the text with other values), and `near`, the step whose state is told.
+
+        Raises:
+            NativeError: the child died.
+            EffectError: MuJoCo cannot be loaded.
+        """
+        library = str(Path(__file__).resolve().parents[2])
+        return self._told({"task": "script", "library": library, **request})
+
     def _told(self, request: dict[str, Any]) -> dict[str, Any]:
         reply: dict[str, Any] | None = self.ask({**request, "limit": _TIMEOUT})
         if reply is None:

@@ -7,16 +7,19 @@ answers each request with one line. A request that takes longer than its limit e
 SIGALRM.
 
 - `save`: compile a text (as if it stood at a path) and give the model as an MJB file.
+- `script`: run an exported script as its user would, and observe it.
 - `parity`: load an MJB file, set the state, step, and compare with the states that were recorded.
 """
 
 from __future__ import annotations
 
 import base64
+import importlib.util
 import json
 import os
 import signal
 import sys
+import types
 import zlib
 from pathlib import Path
 from typing import Any
@@ -33,7 +36,7 @@ def main() -> None:
     import numpy
 
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    tasks = {"save": _save, "parity": _parity}
+    tasks = {"save": _save, "parity": _parity, "script": _script}
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         request = json.loads(line)
@@ -107,6 +110,72 @@ def _apart(numpy: Any, mine: Any, theirs: Any) -> float:
         return 0.0
     largest = max(float(numpy.abs(mine).max()), 1.0)
     return float(numpy.abs(mine / largest - theirs / largest).max())
+
+
+def _script(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+    """Run a script's `main`, then its buttons, then it with other values of the controls."""
+    if importlib.util.find_spec("mjcourse") is None:
+        sys.path.append(request["library"])
+    try:
+        path = request["path"]
+        told = _observed(_loaded(path, request["text"]), request["near"])
+        for text, button in [
+            *((request["text"], name) for name in request["buttons"]),
+            *((text, None) for text in request["others"]),
+        ]:
+            _tried(_loaded(path, text), button)
+    except (Exception, SystemExit) as error:  # whatever it does, it is the script that does it
+        return {"failure": f"{type(error).__name__}: {error}"}
+    return {"failure": "", **told}
+
+
+def _loaded(path: str, text: str) -> Any:
+    module = types.ModuleType("lab_script")
+    module.__file__ = path
+    sys.modules[module.__name__] = module  # dataclasses look for it there
+    exec(compile(text, path, "exec"), module.__dict__)
+    return module
+
+
+def _observed(module: Any, near: int) -> dict[str, Any]:
+    """What a script's `main` computes: its steps, its state, its readouts."""
+    told: dict[str, Any] = {"steps": 0, "state": []}
+    step, simulate = module.step, module.simulate
+
+    def counted(model: Any, data: Any, *rest: Any) -> None:
+        step(model, data, *rest)
+        told["steps"] += 1
+        if told["steps"] == near:
+            told["state"] = [*data.qpos.tolist(), *data.qvel.tolist(), *data.act.tolist()]
+
+    def watched(model: Any, data: Any, *rest: Any) -> None:
+        told["start"] = _shown(module, model, data, *rest)
+        simulate(model, data, *rest)
+        told["end"] = _shown(module, model, data, *rest)
+        checksum = 0
+        for part in (data.qpos, data.qvel, data.act):
+            checksum = zlib.crc32(part.tobytes(), checksum)
+        told["last"] = checksum
+
+    module.step, module.simulate = counted, watched
+    module.main()
+    return told
+
+
+def _shown(module: Any, *state: Any) -> list[list[Any]]:
+    found = module.readouts(*state)
+    return [[label, v if isinstance(v, str) else float(v)] for label, v, _ in found]
+
+
+def _tried(module: Any, button: str | None) -> None:
+    """A few steps, after a button or with other values."""
+    state = [*module.load(), *([module.Ctx()] if hasattr(module, "Ctx") else [])]
+    module.start(*state)
+    if button is not None:
+        getattr(module, button)(*state)
+    for _ in range(10):
+        module.step(*state)
+    module.report(*state)
 
 
 class _Writes:

@@ -7,6 +7,7 @@ Entry point: `try_labs(course, models, options, engines)`.
    can do with it, in the engine that the browser has.
 3. The main run is repeated natively and compared; for a build, what it recorded becomes the static
    form.
+4. The script that the page offers is run natively and compared with it too.
 
 Saved models, trials and pictures are kept, each by the hash of all that it depends on, so that
 where nothing has changed neither engine is started.
@@ -30,6 +31,7 @@ from coursebuild.effects.lab_engine import LabEngine, engine_digest
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
 from coursebuild.effects.store import keep, kept, load
 from coursebuild.effects.versions import engine_version
+from coursebuild.labs import export_check
 from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
 from coursebuild.labs.reply import Trial, read_trial
 from coursebuild.labs.verdict import (
@@ -41,6 +43,7 @@ from coursebuild.labs.verdict import (
 )
 from coursebuild.model import Course, Lab, document_blocks
 from coursebuild.pipeline.custom_labs import custom_lab
+from coursebuild.pipeline.lab_export import Offer, exported
 from coursebuild.pipeline.options import Options
 from coursebuild.results import CompileResult, LabResult, StaticForm
 from coursebuild.scripts.extract import owners
@@ -126,9 +129,8 @@ def try_labs(
             source = _source(course, models, lab)
             if source is None:
                 continue
-            result, diagnostics = _Attempt(options.root, engines, owner, name, lab, source).run(
-                static
-            )
+            attempt = _Attempt(options.root, engines, course, owner, name, lab, source)
+            result, diagnostics = attempt.run(static)
             found += diagnostics
             results.append(result)
     return tuple(results), tuple(found)
@@ -163,6 +165,7 @@ class _Attempt:
 
     root: Path
     engines: Engines
+    course: Course
     owner: str
     name: str
     lab: Lab
@@ -191,6 +194,7 @@ class _Attempt:
         if parity is not None:
             found += parity_diagnostics(lab, parity)
         form = self._static(key, trial) if static and not found else None
+        offer = Offer(None) if found else self._export(trial, parity)
         result = LabResult(
             span=lab.span,
             name=module.name,
@@ -206,6 +210,8 @@ class _Attempt:
             mjb=mjb,
             static=form,
             cached=cached,
+            export=offer.script,
+            unexported=offer.reason,
         )
         return result, found
 
@@ -269,6 +275,7 @@ class _Attempt:
         reply = self.engines.browser.trial(request, mjb, _WALL)
         main = reply["main"]
         if main is not None and main["parity"] is not None:
+            main["recorded"] = export_check.recorded(main["parity"], self._horizon(main))
             main["parity"] = self._compared(main, mjb)
         if all(failure["kind"] not in _PASSING for failure in reply["failures"]):
             keep(self.root, "labs", key, zlib.compress(json.dumps(reply).encode()))
@@ -279,10 +286,22 @@ class _Attempt:
         run = main["parity"]
         if run["steps"] == 0 or not run["complete"] or run["modelChanged"]:
             return None
-        horizon = run["steps"]
-        if self.lab.verify_rtol is None:
-            horizon = min(horizon, max(1, round(_PARITY_SECONDS / main["timestep"])))
-        return {**self.engines.native.parity(mjb, run, horizon), "steps": run["steps"]}
+        compared = self.engines.native.parity(mjb, run, self._horizon(main))
+        return {**compared, "steps": run["steps"]}
+
+    def _horizon(self, main: dict[str, Any]) -> int:
+        """The step up to which the size of a difference counts."""
+        steps = int(main["parity"]["steps"])
+        if self.lab.verify_rtol is not None:
+            return steps
+        return min(steps, max(1, round(_PARITY_SECONDS / main["timestep"])))
+
+    def _export(self, trial: Trial, parity: Parity | None) -> Offer:
+        """The script that does what the lab does."""
+        if trial.main is None:
+            return Offer(None)
+        lab = self.owner, self.name, self.lab
+        return exported(self.root, self.engines.native, self.course, lab, trial.main, parity)
 
     def _version(self, trial: Trial) -> Iterator[Diagnostic]:
         if trial.version != engine_version():

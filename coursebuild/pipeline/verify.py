@@ -232,6 +232,7 @@ def lab_lines(labs: Sequence[LabResult]) -> tuple[LabLine, ...]:
             len(lab.tried),
             lab.parity,
             lab.cached,
+            lab.unexported,
         )
         for lab in labs
     )

@@ -54,14 +54,19 @@ def lab_files(labs: tuple[LabResult, ...], assets: Assets) -> PublishedLabs:
     wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
     found = {}
     for lab in labs:
+        data = json.loads(lab.config)
+        # Labs of the same model share its file.
         parts = {
             "module": publish(f"{lab.name}.js", lab.module.encode()),
-            "mjb": publish(f"{lab.name}.mjb", lab.mjb),
+            "mjb": publish(f"{data['model'] or lab.name}.mjb", lab.mjb),
             "worker": worker,
             "wasm": wasm,
         }
         addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
-        config = {**json.loads(lab.config), **addresses}
+        config = {**data, **addresses}
+        if lab.export is not None:
+            name, text = lab.export
+            config["exportPython"] = {"name": name, "text": text}
         text = json.dumps(config, ensure_ascii=False, separators=(",", ":"))
         static = lab.static
         picture = publish(f"{lab.name}.png", static.picture) if static is not None else None

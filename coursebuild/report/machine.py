@@ -64,6 +64,7 @@ def to_json(report: Report) -> str:
             "tried": lab.tried,
             "parity": lab.parity,
             "cached": lab.cached,
+            "no_python_export": lab.unexported,
         }
         for lab in report.labs
     ]

@@ -68,6 +68,7 @@ def lab_line(line: LabLine, style: Style) -> str:
     if line.status == "ok" and line.tried == 0:
         return f"{verdict} {line.name}  {style.paint('not tried: a kind of its own', _FAINT)}"
     parts += [f"{line.tried} things tried"] + ([line.parity] if line.parity else [])
+    parts += [f"no Python export: {line.unexported}"] if line.unexported else []
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), _FAINT)}"
 

@@ -42,6 +42,8 @@ class LabLine:
     parity: str
     """How it compares with native MuJoCo, in words."""
     cached: bool
+    unexported: str = ""
+    """Why its page offers no Python script, in words."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,7 +70,7 @@ def outputs(root: Path) -> dict[str, str]:
         name = path.relative_to(root).as_posix()
         if name.startswith((".coursebuild/", "content/", "models/")):
             continue
-        names.append(steady(name))
+        names.append(copied(steady(name)))
         if name.endswith(".zip"):
             members = zipfile.ZipFile(path).namelist()
             names += {
@@ -81,6 +81,12 @@ def outputs(root: Path) -> dict[str, str]:
         elif name.endswith(READ) and not name.startswith("public/assets/"):
             texts[name] = main_part(name, steady(path.read_text("utf-8")))
     return {"files.txt": "".join(f"{name}\n" for name in sorted(names)), **texts}
+
+
+def copied(name: str) -> str:
+    """Compressed copies stand beside the file itself: `index.html`, `index.html + br`."""
+    stem, dot, kind = name.rpartition(".")
+    return f"{stem} + {kind}" if dot and kind in ("br", "gz") else name
 
 
 def _files(root: Path) -> Iterator[Path]:
