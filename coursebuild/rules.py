@@ -140,7 +140,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "recording-caption",
         "warning",
-        "A `text` block has a caption like that of a recorded output, and is compared with nothing.",
+        "A `text` block looks like a recorded output, and is compared with nothing.",
     ),
     ("recording-orphan", "error", "A recorded output has no script above it."),
     (

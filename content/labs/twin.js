@@ -18,10 +18,7 @@ const NUMBERS = 16 // of the state that are compared: the first of qpos, then of
 // --- in the worker, for each of the twins
 
 /** Both are kept in `ctx` and take effect with the reset that follows. */
-export const controls = [
-  { set: ({ ctx }, value) => (ctx.place = value) },
-  { set: ({ ctx }, value) => (ctx.nudge = value) },
-]
+export const controls = [{ set: ({ ctx }, value) => (ctx.place = value) }, { set: ({ ctx }, value) => (ctx.nudge = value) }]
 
 /** After every reset: the nudge. */
 export const setup = ({ data, ctx }) => {
@@ -32,7 +29,14 @@ export const setup = ({ data, ctx }) => {
 export const readouts = []
 
 /** The state, number by number: sampled on the same grid of steps in both, so that equal places hold equal times. */
-export const plots = [Array.from({ length: NUMBERS }, (_, i) => ({ data }) => data.qpos[i] ?? data.qvel[i - data.qpos.length] ?? 0)]
+export const plots = [
+  Array.from(
+    { length: NUMBERS },
+    (_, i) =>
+      ({ data }) =>
+        data.qpos[i] ?? data.qvel[i - data.qpos.length] ?? 0,
+  ),
+]
 
 // --- in the page
 
@@ -72,11 +76,17 @@ export function mount(element, config, api) {
     twins.push(twin)
   })
   const settings = api.createControls(
-    [{ type: 'select', label: 'nudge', options: nudge.sizes.map((size) => [String(size), size]) }],
+    [{ type: 'select', label: 'nudge', options: nudge.sizes.map((size) => [api.formatLabel(size), size]) }],
     { set: (_, value) => twins.forEach((twin, which) => twin.set(1, which === 0 ? 0 : value)) }, // which resets both
   )
   settings.show([nudge.sizes[0]])
-  const plot = api.createPlot({ ylabel: 'distance', xlabel: 'time (s)', window: seconds, log: true, traces: [{ label: '|A − B|' }] })
+  const plot = api.createPlot({
+    ylabel: 'distance',
+    xlabel: 'time (s)',
+    window: seconds,
+    log: true,
+    traces: [{ label: '|A − B|' }],
+  })
 
   element.append(
     api.h('div', { class: 'lab-pair' }, ...twins.map((twin) => twin.element)),

@@ -138,8 +138,8 @@ def rounded(x: float) -> float:
     """The nearest whole number, and of two the larger."""
     if not math.isfinite(x) or x == 0:
         return x
-    down = math.floor(x)
-    return math.copysign(float(down + (x - down >= 0.5)), x)
+    down = float(np.floor(x))
+    return math.copysign(down + (x - down >= 0.5), x)
 '''
 
 _POWER = '''
@@ -203,7 +203,7 @@ LIBRARY: dict[str, Helper] = {
     "maximum": Helper(_MAXIMUM, ("import math",)),
     "minimum": Helper(_MINIMUM, ("import math",)),
     "sign": Helper(_SIGN, ("import math",)),
-    "rounded": Helper(_ROUNDED, ("import math",)),
+    "rounded": Helper(_ROUNDED, ("import math", "import numpy as np")),
     "power": Helper(_POWER, ("import math", "import numpy as np")),
     "Random": Helper(_RANDOM, ("import struct",)),
 }

@@ -294,7 +294,7 @@ class _Attempt:
         steps = int(main["parity"]["steps"])
         if self.lab.verify_rtol is not None:
             return steps
-        return min(steps, max(1, round(_PARITY_SECONDS / main["timestep"])))
+        return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
     def _export(self, trial: Trial, parity: Parity | None) -> Offer:
         """The script that does what the lab does."""

@@ -58,7 +58,7 @@ def lab_files(labs: tuple[LabResult, ...], assets: Assets) -> PublishedLabs:
         # Labs of the same model share its file.
         parts = {
             "module": publish(f"{lab.name}.js", lab.module.encode()),
-            "mjb": publish(f"{data['model'] or lab.name}.mjb", lab.mjb),
+            "mjb": publish(f"{data.get('model') or lab.name}.mjb", lab.mjb),
             "worker": worker,
             "wasm": wasm,
         }

@@ -1,7 +1,8 @@
 """Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
 
-Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body), `no_body` and
-`nothing_recorded` (what follows is none), `stray_keys` (on a fence that records nothing).
+Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body),
+`no_body` and `nothing_recorded` (what follows is none), `stray_keys` (on a fence that records
+nothing).
 """
 
 from __future__ import annotations

@@ -29,7 +29,10 @@ test('the axes are orthonormal and right-handed everywhere, at the poles too', (
     for (const elevation of [-90, -89.999, -20, 0, 61, 90]) {
       const { right, up, forward } = camera({ azimuth, elevation }).axes()
       close([dot(right, right), dot(up, up), dot(forward, forward)], [1, 1, 1])
-      close(cross(right, up), forward.map((x) => -x))
+      close(
+        cross(right, up),
+        forward.map((x) => -x),
+      )
     }
   }
 })

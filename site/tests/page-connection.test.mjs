@@ -7,7 +7,12 @@ import { Connection } from '../js/lab/page/connection.js'
 function setUp() {
   const workers = []
   const start = () => {
-    const worker = { sent: [], ended: false, postMessage: (message) => worker.sent.push(message), terminate: () => (worker.ended = true) }
+    const worker = {
+      sent: [],
+      ended: false,
+      postMessage: (message) => worker.sent.push(message),
+      terminate: () => (worker.ended = true),
+    }
     workers.push(worker)
     return worker
   }
@@ -45,8 +50,14 @@ test('when the engine ends every lab is told once, and the next one gets a new w
   const a = connection.open('a', (message) => got.a.push(message))
   connection.open('b', (message) => got.b.push(message))
   workers[0].onmessage({ data: { type: 'error', lab: 'a', message: 'out of memory', entry: [], kind: 'engine', fatal: true } })
-  assert.deepEqual(got.a.map(({ message }) => message), ['out of memory'])
-  assert.deepEqual(got.b.map(({ kind, fatal }) => [kind, fatal]), [['worker', true]])
+  assert.deepEqual(
+    got.a.map(({ message }) => message),
+    ['out of memory'],
+  )
+  assert.deepEqual(
+    got.b.map(({ kind, fatal }) => [kind, fatal]),
+    [['worker', true]],
+  )
   assert.ok(workers[0].ended)
   a.close()
   connection.open('a', () => {})
@@ -58,5 +69,8 @@ test('a worker that does not start is told as an error', () => {
   const got = []
   connection.open('a', (message) => got.push(message))
   workers[0].onerror({ message: undefined })
-  assert.deepEqual(got.map(({ type, fatal }) => [type, fatal]), [['error', true]])
+  assert.deepEqual(
+    got.map(({ type, fatal }) => [type, fatal]),
+    [['error', true]],
+  )
 })

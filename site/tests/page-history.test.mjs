@@ -11,7 +11,14 @@ const filled = (history, count, dt = 0.01) => {
 
 test('samples come out in order, each trace from its place', () => {
   const [times, a, b] = filled(new History(2, null), 3, 1).data()
-  assert.deepEqual([[...times], [...a], [...b]], [[0, 1, 2], [0, 1, 2], [-0, -1, -2]])
+  assert.deepEqual(
+    [[...times], [...a], [...b]],
+    [
+      [0, 1, 2],
+      [0, 1, 2],
+      [-0, -1, -2],
+    ],
+  )
 })
 
 test('a window keeps one sample before it, however long the run', () => {
@@ -34,7 +41,10 @@ test('a plot of everything thins out and still spans the whole run', () => {
     assert.equal(b[i], -a[i])
   })
   const gaps = times.slice(1).map((time, i) => Math.round((time - times[i]) * 100))
-  assert.ok(gaps.every((gap) => gap === gaps[0]), 'evenly')
+  assert.ok(
+    gaps.every((gap) => gap === gaps[0]),
+    'evenly',
+  )
 })
 
 test('cleared, it begins anew', () => {

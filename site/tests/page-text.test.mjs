@@ -4,7 +4,15 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { fillScript, pythonLiteral } from '../js/lab/page/export.js'
 import { placeOf } from '../js/lab/page/notices.js'
-import { digitsOfStep, formatLabel, formatNumber, formatRatio, formatReadout, formatTime, superscript } from '../js/lab/page/numbers.js'
+import {
+  digitsOfStep,
+  formatLabel,
+  formatNumber,
+  formatRatio,
+  formatReadout,
+  formatTime,
+  superscript,
+} from '../js/lab/page/numbers.js'
 import { readLink, writeLink } from '../js/lab/page/share.js'
 import { spread } from '../js/lab/page/spread.js'
 import { fill } from '../js/lab/page/words.js'
@@ -36,7 +44,8 @@ test('what is no number is said', () => {
 test('labels, times, ratios', () => {
   assert.equal(formatLabel(-0.30000000000000004), '−0.3')
   assert.equal(formatLabel(0), '0')
-  assert.equal(formatLabel(2e8), '2.000·10⁸')
+  assert.equal(formatLabel(2.5e8), '2.5·10⁸')
+  assert.equal(formatLabel(-1e-9), '−10⁻⁹')
   assert.equal(formatTime(3.14159), '3.14')
   assert.equal(formatTime(-1), '−1.00')
   assert.equal(formatRatio(0.412), '0.4')
@@ -45,18 +54,41 @@ test('labels, times, ratios', () => {
 })
 
 test('a slider shows as many digits as its steps need', () => {
-  for (const [step, digits] of [[1, 0], [0.5, 1], [0.25, 2], [0.1, 1], [0.3, 1], [0.001, 3], [10, 0], [null, 2], [1 / 3, 6]]) {
+  for (const [step, digits] of [
+    [1, 0],
+    [0.5, 1],
+    [0.25, 2],
+    [0.1, 1],
+    [0.3, 1],
+    [0.001, 3],
+    [10, 0],
+    [null, 2],
+    [1 / 3, 6],
+  ]) {
     assert.equal(digitsOfStep(step), digits, String(step))
   }
 })
 
 test('values become Python literals', () => {
-  const cases = [[1, '1'], [0.1, '0.1'], [-0, '-0.0'], [1e300, '1e+300'], [NaN, 'float("nan")'], [-Infinity, 'float("-inf")'], [true, 'True'], [null, 'None'], ['a "b"\n', '"a \\"b\\"\\n"']]
+  const cases = [
+    [1, '1'],
+    [0.1, '0.1'],
+    [-0, '-0.0'],
+    [1e300, '1e+300'],
+    [NaN, 'float("nan")'],
+    [-Infinity, 'float("-inf")'],
+    [true, 'True'],
+    [null, 'None'],
+    ['a "b"\n', '"a \\"b\\"\\n"'],
+  ]
   for (const [value, text] of cases) assert.equal(pythonLiteral(value), text)
 })
 
 test('a script takes the values of the controls, and dollars stay dollars', () => {
-  assert.equal(fillScript('m = {{control:1}}  # $& {{control}}\nn = {{control:0}}', [3, "it's $1"]), 'm = "it\'s $1"  # $& {{control}}\nn = 3')
+  assert.equal(
+    fillScript('m = {{control:1}}  # $& {{control}}\nn = {{control:0}}', [3, "it's $1"]),
+    'm = "it\'s $1"  # $& {{control}}\nn = 3',
+  )
 })
 
 test('texts take values by name', () => {
@@ -82,7 +114,8 @@ test('a state too long for a link keeps its controls', () => {
 test('links that are not of a lab, or broken, give no state', () => {
   assert.equal(readLink(''), null)
   assert.equal(readLink('#section-2'), null)
-  for (const text of ['%', 'AAAA', 'e30', 'bnVsbA', btoa('{"v":3}')]) assert.deepEqual(readLink(`#lab=x&s=${text}`), { id: 'x', state: null })
+  for (const text of ['%', 'AAAA', 'e30', 'bnVsbA', btoa('{"v":3}')])
+    assert.deepEqual(readLink(`#lab=x&s=${text}`), { id: 'x', state: null })
   assert.deepEqual(readLink('#lab=x'), { id: 'x', state: null })
 })
 

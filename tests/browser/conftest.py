@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
 
 from coursekit import Folder
-from labcourse import LESSON, PENDULUM, ZOO
+from labcourse import LESSON, PENDULUM, TWIN, ZOO
 
 ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
@@ -29,6 +29,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     folder.fill([LESSON], stores)
     folder.write("models/pendulum.xml", PENDULUM)
     folder.write("models/zoo.xml", ZOO)
+    folder.write("content/labs/twin.js", TWIN.read_bytes())
     done = folder.main("build")
     assert done.status == 0, done.out + done.err
     return folder

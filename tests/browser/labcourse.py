@@ -1,8 +1,12 @@
-"""The course of the browser's tests: two models, and a lesson with three labs."""
+"""The course of the browser's tests: two models, and a lesson with four labs."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
+
+TWIN = Path(__file__).parents[2] / "content/labs/twin.js"
+"""A kind of lab of the course in this repository."""
 
 PENDULUM = """<mujoco>
   <option timestep="0.002" integrator="RK4"/>
@@ -107,11 +111,20 @@ ALL = {
 }
 
 
-def _lab(lab: object) -> str:
-    return f"```lab simlab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n"
+TWINS = {
+    "title": "Twins",
+    "model": "pendulum",
+    "key": "up",
+    "nudge": {"entry": "qvel", "index": 0, "sizes": [1e-6, 1e-3]},
+    "seconds": 5,
+}
+
+
+def _lab(lab: object, kind: str = "simlab") -> str:
+    return f"```lab {kind}\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n"
 
 
 FAR = "Some text in a paragraph of its own, so that labs are not near at first.\n\n" * 60
 
-LESSON = f"## First\n\n{FAR}{_lab(SWING)}{FAR}{_lab(AUTO)}{FAR}{_lab(ALL)}Text.\n"
+LESSON = f"## First\n\n{FAR}{_lab(SWING)}{FAR}{_lab(AUTO)}{FAR}{_lab(ALL)}{FAR}{_lab(TWINS, 'twin')}Text.\n"
 PAGE = "lessons/1.1-one.html"

@@ -18,7 +18,7 @@ from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route
 pytestmark = pytest.mark.browser
 
 AXE = Path(__file__).parents[2] / "site" / "node_modules" / "axe-core" / "axe.min.js"
-SWING, AUTO, ALL = 0, 1, 2
+SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
 
 
 def watched(context: BrowserContext) -> tuple[Page, list[str]]:
@@ -292,6 +292,41 @@ def test_every_kind_of_geom_and_overlay_is_drawn(context: BrowserContext, base: 
     pictures.append(found.locator(".lab-view").screenshot())
     assert pictures[0] != pictures[1]
     assert said == []
+
+
+def test_a_kind_of_the_course_runs_two_simulations(context: BrowserContext, base: str) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    twins = lab(page, TWINS, None)
+    twins.locator(".lab-play").wait_for()
+    page.wait_for_timeout(500)
+    shots = {"at first": [view.screenshot() for view in twins.locator(".lab-view").all()]}
+    twins.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(2000)
+    twins.get_by_role("button", name="Pause").click()
+    shots["later"] = [view.screenshot() for view in twins.locator(".lab-view").all()]
+    assert all(a != b for a, b in zip(shots["at first"], shots["later"], strict=True))
+    assert time_of(twins) > 1
+    assert twins.locator(".lab-plot canvas").screenshot()
+    assert twins.locator(".lab-message:visible").count() == 0
+    assert said == []
+
+
+def test_the_exported_script_has_the_values_of_the_controls(
+    context: BrowserContext, base: str
+) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    swing.get_by_label("gravity").fill("3.7")
+    swing.get_by_label("start").select_option("low")
+    page.wait_for_timeout(300)
+    with page.expect_download() as download:
+        swing.get_by_role("button", name="Export as Python").click()
+    text = Path(download.value.path()).read_text(encoding="utf-8")
+    compile(text, download.value.suggested_filename, "exec")
+    assert "{{control" not in text
+    assert "3.7" in text
 
 
 def test_no_long_task_while_a_lab_runs(context: BrowserContext, base: str) -> None:

@@ -19,9 +19,12 @@ export function loadLabs(document, words) {
       () => tell(lab, words('lab.live.no_script')),
     )
   }
-  const near = new IntersectionObserver((entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => start(target)), {
-    rootMargin: NEAR,
-  })
+  const near = new IntersectionObserver(
+    (entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => start(target)),
+    {
+      rootMargin: NEAR,
+    },
+  )
   labs.forEach((lab) => near.observe(lab))
   const linked = new URLSearchParams(document.location.hash.slice(1)).get('lab')
   labs.find((lab) => lab.dataset.lab === linked)?.scrollIntoView()

@@ -5,7 +5,7 @@
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { Notices } from './notices.js'
-import { formatReadout, formatTime } from './numbers.js'
+import { formatLabel, formatReadout, formatTime } from './numbers.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { watchSight } from './sight.js'
@@ -15,12 +15,33 @@ import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
 const HEIGHT = 240 // CSS pixels
-const PLAIN_PLOT = { xlabel: '', ylabel: '', window: null, ymin: null, ymax: null, height: null, refLines: [], traces: [], log: false }
+const PLAIN_PLOT = {
+  xlabel: '',
+  ylabel: '',
+  window: null,
+  ymin: null,
+  ymax: null,
+  height: null,
+  refLines: [],
+  traces: [],
+  log: false,
+}
 const PLAIN_LAB = {
   key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, trail: null, seed: null,
   controls: [], readouts: [], plots: [], expect: [],
 } // prettier-ignore
-const PLAIN_CONTROL = { type: 'slider', unit: '', min: 0, max: 1, step: null, value: null, digits: null, options: [], init: false, reset: false }
+const PLAIN_CONTROL = {
+  type: 'slider',
+  unit: '',
+  min: 0,
+  max: 1,
+  step: null,
+  value: null,
+  digits: null,
+  options: [],
+  init: false,
+  reset: false,
+}
 
 /**
  * Mount a lab with the course's own code.
@@ -76,11 +97,20 @@ class Kit {
       h,
       words,
       formatNumber: formatReadout,
+      formatLabel,
       formatTime,
       createSimulation: (options) => this.simulation(options),
       createPlot: (config) => this.plot(config),
-      createControls: (controls, actions) => buildControls(controls.map((control) => ({ ...PLAIN_CONTROL, ...control })), actions),
-      createReadouts: (readouts) => buildReadouts(readouts.map((readout) => ({ digits: null, ...readout })), formatReadout),
+      createControls: (controls, actions) =>
+        buildControls(
+          controls.map((control) => ({ ...PLAIN_CONTROL, ...control })),
+          actions,
+        ),
+      createReadouts: (readouts) =>
+        buildReadouts(
+          readouts.map((readout) => ({ digits: null, ...readout })),
+          formatReadout,
+        ),
       createTransport: (actions) => buildTransport(words, { full: null, ...actions }),
       announce: (text) => notices.say(text),
       notice: (text, kind = 'note') => (text === null ? notices.clear() : notices.show(text, kind)),
@@ -120,7 +150,11 @@ class Kit {
       },
     })
     if (view !== null) {
-      const keys = { ' ': () => (simulation.state === 'playing' ? simulation.pause() : simulation.play()), '.': () => simulation.step(), r: () => simulation.reset() }
+      const keys = {
+        ' ': () => (simulation.state === 'playing' ? simulation.pause() : simulation.play()),
+        '.': () => simulation.step(),
+        r: () => simulation.reset(),
+      }
       const hands = new Hands(view, { pull: (request) => simulation.pull(request), keys })
       this.disposals.push(() => hands.dispose())
     }

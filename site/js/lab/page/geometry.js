@@ -8,7 +8,16 @@
  * and from top to bottom of round shapes, with the first row of the texture on top. `direction` is what a cube texture is looked up by.
  */
 
-import { BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, EdgesGeometry, PlaneGeometry, SphereGeometry } from 'three'
+import {
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  EdgesGeometry,
+  PlaneGeometry,
+  SphereGeometry,
+} from 'three'
 
 /** mjtGeom */
 export const GEOM = Object.freeze({
@@ -61,7 +70,8 @@ const bowl = () => unit('bowl', () => sphere(Math.PI / 2, Math.PI / 2, QUARTER),
 const plane = () => unit('plane', () => new PlaneGeometry(2, 2), fromAbove)
 const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND), 0).translate(0, 0, 0.5))
 const edges = () => unit('edges', () => new EdgesGeometry(new BoxGeometry(2, 2, 2)))
-const line = () => unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
+const line = () =>
+  unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
 
 /** A part: its geometry, and how `place(size, out)` fills out = [scale x, y, z, shift along z]. */
 const part = (geometry, place, lines = false) => ({ geometry, place, lines })

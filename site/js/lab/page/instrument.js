@@ -124,7 +124,8 @@ export class Instrument {
       warning: ({ time, message }) => notices.show(words('lab.live.warning', { t: formatTime(time), message }), 'warning'),
       error: (error) => notices.failure(error, config),
       saved: (state) => this.share(state),
-      noPicture: () => this.view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
+      noPicture: () =>
+        this.view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
     }
   }
 

@@ -35,7 +35,10 @@ export class Lights {
 
   studio() {
     const above = new DirectionalLight(0xffffff, FULL * FROM_ABOVE)
-    above.position.set(...ABOVE).multiplyScalar(4 * this.extent).add({ x: this.center[0], y: this.center[1], z: this.center[2] })
+    above.position
+      .set(...ABOVE)
+      .multiplyScalar(4 * this.extent)
+      .add({ x: this.center[0], y: this.center[1], z: this.center[2] })
     above.target.position.set(...this.center)
     this.add(above)
     above.target.updateMatrixWorld()

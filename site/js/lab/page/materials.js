@@ -163,7 +163,10 @@ function wrapCube(material, texture, uniform) {
     shader.uniforms.labCube = { value: texture }
     shader.uniforms.labSize = size
     shader.vertexShader = shader.vertexShader
-      .replace('#include <common>', '#include <common>\nattribute vec3 direction;\nvarying vec3 vLabDirection;\nuniform vec3 labSize;')
+      .replace(
+        '#include <common>',
+        '#include <common>\nattribute vec3 direction;\nvarying vec3 vLabDirection;\nuniform vec3 labSize;',
+      )
       .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = direction * labSize;')
     shader.fragmentShader = shader.fragmentShader
       .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform samplerCube labCube;')

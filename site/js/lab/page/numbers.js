@@ -21,7 +21,8 @@ export function formatNumber(value, digits) {
   if (!Number.isFinite(value)) return value > 0 ? '∞' : `${MINUS}∞`
   const size = Math.abs(value)
   let text
-  if (digits === null || digits === undefined) text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
+  if (digits === null || digits === undefined)
+    text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
   else text = size < 1e9 ? size.toFixed(digits) : scientific(size, Math.max(2, digits))
   // What is rounded to zero has no sign.
   const sign = value < 0 && /[1-9]/.test(text) ? MINUS : FIGURE_SPACE
@@ -58,7 +59,10 @@ function plain(size) {
 }
 
 function trimmed(size) {
-  return size !== 0 && (size < 1e-4 || size >= 1e7) ? scientific(size, 3) : String(Number(size.toPrecision(10)))
+  if (size === 0 || (size >= 1e-4 && size < 1e7)) return String(Number(size.toPrecision(10)))
+  const [mantissa, exponent] = size.toExponential(3).split('e')
+  const power = `10${superscript(Number(exponent))}`
+  return Number(mantissa) === 1 ? power : `${Number(mantissa)}·${power}`
 }
 
 function scientific(size, digits) {

@@ -91,7 +91,10 @@ export class Plot {
       cursor: { show: false },
       scales: {
         x: { time: false, range: () => this.spanX() },
-        y: { distr: config.log ? LOGARITHMIC : LINEAR, range: (_, min, max) => (config.log ? decades(config, min, max) : this.spanY(min, max)) },
+        y: {
+          distr: config.log ? LOGARITHMIC : LINEAR,
+          range: (_, min, max) => (config.log ? decades(config, min, max) : this.spanY(min, max)),
+        },
       },
       axes: [
         { ...axis(config.xlabel || ''), size: FONT + 10, space: 45 },
@@ -134,7 +137,9 @@ export class Plot {
   /** Width of the labels at the ends of the lines. */
   room(font) {
     const { traces } = this.config
-    return traces.length === 0 ? GAP : Math.min(140, Math.ceil(Math.max(...traces.map(({ label }) => widthOf(label, font))) + 2 * GAP))
+    return traces.length === 0
+      ? GAP
+      : Math.min(140, Math.ceil(Math.max(...traces.map(({ label }) => widthOf(label, font))) + 2 * GAP))
   }
 
   references({ ctx, bbox, valToPos }) {
@@ -167,7 +172,9 @@ export class Plot {
     const data = chart.data
     const end = data[0].length - 1
     const ratio = uPlot.pxRatio
-    const ends = traces.map((_, i) => (end < 0 || !Number.isFinite(data[i + 1][end]) ? null : valToPos(data[i + 1][end], 'y', true)))
+    const ends = traces.map((_, i) =>
+      end < 0 || !Number.isFinite(data[i + 1][end]) ? null : valToPos(data[i + 1][end], 'y', true),
+    )
     const places = spread(ends, (FONT + 2) * ratio, bbox.top, bbox.top + bbox.height)
     const x = Math.min(bbox.left + bbox.width, end < 0 ? bbox.left : valToPos(data[0][end], 'x', true))
     ctx.save()

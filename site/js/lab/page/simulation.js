@@ -32,6 +32,7 @@ export class Simulation {
     Object.assign(this, { config, view, on })
     this.address = (path) => new URL(path, base).href
     this.visible = false
+    this.chosen = new Map() // what outlives the engine: speed and overlays
     this.tick = (now) => this.refresh(now)
     this.request = 0
     this.connect()
@@ -83,7 +84,12 @@ export class Simulation {
 
   /** Simulated seconds for each real one. */
   speed(factor) {
-    this.send({ type: 'speed', factor })
+    this.choose('speed', { type: 'speed', factor })
+  }
+
+  choose(key, message) {
+    this.chosen.set(key, message)
+    this.send(message)
   }
 
   /** Set a control to a value. */
@@ -97,7 +103,7 @@ export class Simulation {
   }
 
   overlay(name, on) {
-    this.send({ type: 'overlay', name, on })
+    this.choose(name, { type: 'overlay', name, on })
   }
 
   /** Pull a body: `{body, point, target}`, then `{body, target}`; null lets go. */
@@ -126,6 +132,7 @@ export class Simulation {
   again() {
     this.line.close()
     this.connect()
+    for (const message of this.chosen.values()) this.send(message)
   }
 
   dispose() {

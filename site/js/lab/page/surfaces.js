@@ -27,6 +27,7 @@ export class Skin {
     materials.paint(material, ...colourOf(info, materials))
     this.mesh = new Mesh(this.geometry, material)
     this.mesh.visible = info.group < SHOWN_GROUPS
+    this.mesh.castShadow = this.mesh.receiveShadow = true
     parent.add(this.mesh)
   }
 
@@ -67,6 +68,7 @@ export class Flex {
       this.mesh = new Mesh(this.geometry, material)
     }
     this.mesh.visible = info.group < SHOWN_GROUPS
+    this.mesh.castShadow = this.mesh.receiveShadow = true
     parent.add(this.mesh)
   }
 

@@ -11,7 +11,8 @@ const ON_TIME = 0.95
  * @param {{play: () => void, step: () => void, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
  */
 export function buildTransport(words, actions) {
-  const act = (name, text, run) => h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick: run }, icon(name))
+  const act = (name, text, run) =>
+    h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick: run }, icon(name))
   const label = h('span', {}, words('lab.live.play'))
   const sign = h('span', { class: 'lab-sign' }, icon('play'))
   const play = h('button', { type: 'button', class: 'lab-play', onclick: actions.play }, sign, label)
@@ -24,7 +25,15 @@ export function buildTransport(words, actions) {
   const time = h('output', { class: 'lab-time' })
   const late = h('span', { class: 'lab-late' })
   const clock = h('span', { class: 'lab-clock' }, time, late)
-  const element = h('div', { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') }, play, step, reset, speed, clock)
+  const element = h(
+    'div',
+    { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') },
+    play,
+    step,
+    reset,
+    speed,
+    clock,
+  )
   let playing = null
   return {
     element,

@@ -117,7 +117,10 @@ export class World {
     this.geoms.forEach((solid, i) => {
       const { body } = this.description.geoms[i]
       if (solid === null) return
-      for (const hit of this.raycaster.intersectObjects(solid.meshes.filter((mesh) => mesh.visible), false)) {
+      for (const hit of this.raycaster.intersectObjects(
+        solid.meshes.filter((mesh) => mesh.visible),
+        false,
+      )) {
         if (best === null || hit.distance < best.distance) best = { body, distance: hit.distance, point: hit.point.toArray() }
       }
     })
