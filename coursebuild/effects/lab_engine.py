@@ -19,6 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from coursebuild.effects.errors import EffectError
 from coursebuild.effects.resources import assets_dir
 from coursebuild.effects.v8 import Isolate, LimitError, ScriptError
 
@@ -109,8 +110,13 @@ class LabEngine:
         pieces = Path(__file__).with_name("lab_pieces.js").read_text(encoding="utf-8")
         self._isolate = isolate = Isolate(script, pieces, memory=_MEMORY)
         isolate.fill("wasm", (folder / "mujoco" / "mujoco.wasm").read_bytes())
-        isolate.call("boot", "", _START_SECONDS)
-        self.version = isolate.call("booted", "", _START_SECONDS)
+        try:
+            isolate.call("boot", "", _START_SECONDS)
+            self.version = isolate.call("booted", "", _START_SECONDS)
+        except (LimitError, ScriptError) as error:
+            self.close()
+            why = str(error).splitlines()[0]
+            raise EffectError(f"the browser's engine does not start: {why}") from None
         return isolate
 
 

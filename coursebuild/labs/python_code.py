@@ -196,11 +196,13 @@ class _Statements(Calls):
 
     def stored(self, value: Expression, takes: str) -> str:
         """A value for a place."""
-        if takes == "whole":
-            return self.integer(value)
         if takes == "float":
             return floating(self.number(value)).text
         code = self.value(value, single=takes != "vector")
+        if takes == "whole" and code.type != "bool":
+            return self.integer(value)
+        if takes == "whole":
+            return code.text
         if takes == "number" and code.type in (*NUMBERS, "bool"):
             return code.text
         if code.type != takes or (takes == "vector" and code.element != "f64"):
@@ -221,6 +223,8 @@ class _Statements(Calls):
                     raise refuse("an assignment to an element of a copy")
                 flat = ".flat" if array.type == "rows" else ""
                 text = f"{array.text}{flat}[{self.index(index)}]"
+                if array.element == "int":
+                    return _Place(text, "whole", False)
                 return _Place(text, "number", array.element == "f64")
             case Member():
                 way = self.way(target)
@@ -273,12 +277,16 @@ class _Statements(Calls):
 
     def fill(self, array: Code, arguments: tuple[Expression, ...]) -> str:
         """`array.fill(number)`, or from and to an index."""
-        if len(arguments) == 1:
-            return f"{array.text}.fill({self.number(arguments[0]).text})"
-        if len(arguments) != 3:
+        if len(arguments) not in (1, 3):
             raise refuse("`.fill()` other than with one number or three")
-        part = self.part(array, "subarray", arguments[1:])
-        return f"{part.text} = {self.number(arguments[0]).text}"
+        number = self.item(array, arguments[0])
+        if len(arguments) == 1:
+            return f"{array.text}.fill({number})"
+        return f"{self.part(array, 'subarray', arguments[1:]).text} = {number}"
+
+    def item(self, array: Code, number: Expression) -> str:
+        """A number for an array; what is no whole one is cut off as JavaScript does it."""
+        return self.integer(number) if array.element == "int" else self.number(number).text
 
     def set(self, array: Code, arguments: tuple[Expression, ...]) -> str:
         """`array.set(numbers, offset)`."""
@@ -286,7 +294,8 @@ class _Statements(Calls):
             raise refuse("`.set()` other than of numbers and an offset")
         numbers = arguments[0]
         if isinstance(numbers, Array):
-            count, text = str(len(numbers.items)), f"[{self.items(numbers.items)}]"
+            items = ", ".join(self.item(array, number) for number in numbers.items)
+            count, text = str(len(numbers.items)), f"[{items}]"
         else:
             source = self.array(numbers)
             if "(" in source.text:

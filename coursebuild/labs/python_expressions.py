@@ -201,6 +201,8 @@ class Expressions(ABC):
                 return Code(_CONSTANTS[name], "num")
             case ("mj", enumeration, name, "value") if enumeration.startswith("mjt"):
                 return Code(f"mujoco.{enumeration}.{name}.value", "int")
+        if member.name == "length":
+            return Code(f"{self.array(member.whole).text}.size", "nat")
         if way in SCALARS:
             types: dict[str, Type] = {"float": "num", "int": "int", "size": "nat"}
             return Code(text, types[SCALARS[way]])

@@ -78,12 +78,8 @@ def _unit(vectors: Array) -> Array:
 
 def _plane(size: tuple[float, ...]) -> Surface:
     x, y = (half if half > 0 else _FAR for half in size[:2])
-    # In pieces, so that a part of it behind the camera can be left out.
-    steps = np.linspace(-1.0, 1.0, 25)
-    grid = np.stack(np.meshgrid(steps * x, steps * y, indexing="ij"), axis=-1).reshape(-1, 2)
-    vertices = np.column_stack((grid, np.zeros(len(grid))))
-    normals = np.tile((0.0, 0.0, 1.0), (len(grid), 1))
-    return Surface(vertices, normals, _grid_faces(25, 25))
+    corners = np.array([(-x, -y, 0.0), (-x, y, 0.0), (x, -y, 0.0), (x, y, 0.0)])
+    return Surface(corners, np.tile((0.0, 0.0, 1.0), (4, 1)), _grid_faces(2, 2))
 
 
 def _grid_faces(rows: int, columns: int) -> NDArray[np.int64]:

@@ -75,9 +75,9 @@ def _adopt(
         extraction = by_path.get(example.path)
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
-        if example.diverged:  # taking one would lose the other; how to go on is told with it
-            continue
         data = read_bytes(options.root, example.path)
+        if example.diverged and block_text(data) != extraction.text:
+            continue  # taking one would lose the other; how to go on is told with it
         made = adopted(extraction.script, data)
         if isinstance(made, Edit):
             edits.setdefault(made.span.source, []).append(made)

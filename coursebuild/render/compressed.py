@@ -22,9 +22,6 @@ _SMALLEST = 1024
 """Bytes: below, headers outweigh what is saved."""
 _LARGE = 2 << 20
 """Bytes: from here on the last tenth would cost a quarter of a minute."""
-_WORTH_KEEPING = 1 << 16
-"""Bytes: smaller ones are made faster than they are looked up."""
-
 Keep = Callable[[str, Callable[[], bytes]], bytes]
 """Gives what was made under a key before, or makes it."""
 
@@ -39,11 +36,8 @@ def _copies(file: OutputFile, keep: Keep) -> Iterator[OutputFile]:
     if not compressible or len(file.data) < _SMALLEST:
         return
     for suffix, make in (("br", _brotli), ("gz", _gzip)):
-        if len(file.data) < _WORTH_KEEPING:
-            data = make(file.data)
-        else:
-            key = hashlib.sha256(f"{suffix}/{_quality(file.data)}\0".encode() + file.data)
-            data = keep(key.hexdigest(), lambda make=make: make(file.data))  # type: ignore[misc]
+        key = hashlib.sha256(f"{suffix}/{_quality(file.data)}\0".encode() + file.data)
+        data = keep(key.hexdigest(), lambda make=make: make(file.data))  # type: ignore[misc]
         if len(data) < len(file.data):
             yield OutputFile(f"{file.path}.{suffix}", data)
 

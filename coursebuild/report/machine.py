@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.report.text import Style, diagnostic_text
-from coursebuild.report.values import Report, ScriptLine
+from coursebuild.report.values import LabLine, Report, ScriptLine
 from coursebuild.rules import RULES
 from coursebuild.source import Span
 
@@ -96,11 +96,12 @@ def _xml_text(text: str) -> str:
 
 
 def to_junit(report: Report) -> str:
-    """One test case a script and one a file with diagnostics; errors are failures."""
+    """One test case a script, a lab, and a file with diagnostics; errors are failures."""
     by_path: dict[str, list[Diagnostic]] = {}
     for d in report.diagnostics:
         by_path.setdefault(d.span.path, []).append(d)
     cases = [_script_case(s) for s in report.scripts]
+    cases += [_lab_case(lab) for lab in report.labs]
     cases += [_file_case(path, found) for path, found in by_path.items()]
     failures = sum(1 for case in cases if "<failure" in case)
     skipped = sum(1 for case in cases if "<skipped" in case)
@@ -125,6 +126,17 @@ def _script_case(line: ScriptLine) -> str:
         status = quoteattr(line.status)
         return f"{head}><failure type={status} message={status}/></testcase>"
     return f"{head}/>"
+
+
+def _lab_case(line: LabLine) -> str:
+    head = (
+        f'<testcase classname="lesson {escape(line.lesson)}" name={quoteattr(line.name)} '
+        f'time="{line.seconds:.3f}"'
+    )
+    if line.status == "ok":
+        return f"{head}/>"
+    status = quoteattr(line.status)
+    return f"{head}><failure type={status} message={status}/></testcase>"
 
 
 def _file_case(path: str, found: Iterable[Diagnostic]) -> str:

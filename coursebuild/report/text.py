@@ -14,7 +14,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.report.values import LabLine, Report, ScriptLine, summary_line
+from coursebuild.report.values import LabLine, Report, ScriptLine, plural, summary_line
 from coursebuild.source import Span
 
 _TAB = 4
@@ -67,7 +67,7 @@ def lab_line(line: LabLine, style: Style) -> str:
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
     if line.status == "ok" and line.tried == 0:
         return f"{verdict} {line.name}  {style.paint('not tried: a kind of its own', _FAINT)}"
-    parts += [f"{line.tried} things tried"] + ([line.parity] if line.parity else [])
+    parts += [plural(line.tried, "thing") + " tried"] + ([line.parity] if line.parity else [])
     parts += [f"no Python export: {line.unexported}"] if line.unexported else []
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), _FAINT)}"

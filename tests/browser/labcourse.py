@@ -126,5 +126,6 @@ def _lab(lab: object, kind: str = "simlab") -> str:
 
 FAR = "Some text in a paragraph of its own, so that labs are not near at first.\n\n" * 60
 
-LESSON = f"## First\n\n{FAR}{_lab(SWING)}{FAR}{_lab(AUTO)}{FAR}{_lab(ALL)}{FAR}{_lab(TWINS, 'twin')}Text.\n"
+_ALL_LABS = (_lab(SWING), _lab(AUTO), _lab(ALL), _lab(TWINS, "twin"))
+LESSON = f"## First\n\n{FAR.join(('', *_ALL_LABS))}Text.\n"
 PAGE = "lessons/1.1-one.html"

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "labs"))
 from labkit import BALL, Bench, make_lab, request
 
 from coursebuild.effects import lab_engine
+from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import engine_digest
 from coursebuild.effects.versions import engine_version
 
@@ -227,6 +228,22 @@ def test_memory_does_not_grow_from_trial_to_trial(bench: Bench) -> None:
     for _ in range(60):
         bench.trial(lab)
     assert resident() - before < 60 << 20
+
+
+def test_an_engine_that_is_damaged(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = tmp_path / "assets"
+    for name in ("mujoco/mujoco.wasm", "js/lab-trial.js"):
+        (folder / name).parent.mkdir(parents=True)
+        (folder / name).write_bytes((lab_engine.assets_dir() / name).read_bytes())
+    wasm = folder / "mujoco/mujoco.wasm"
+    wasm.write_bytes(wasm.read_bytes()[:100_000])
+    with monkeypatch.context() as damaged:
+        damaged.setattr(lab_engine, "assets_dir", lambda: folder)
+        with pytest.raises(EffectError, match=r"the browser.s engine does not start: .*Compile"):
+            bench.trial(make_lab())
+    assert told(bench.trial(make_lab())) == []
 
 
 def test_the_digest_is_of_what_a_trial_runs(

@@ -11,17 +11,22 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from labkit import make_lab
+from labkit import BALL, make_lab
 
 from coursebuild.effects import native
 from coursebuild.effects.mjcf import compile_all
 from coursebuild.effects.native import NativeEngine
+from coursebuild.effects.v8 import Isolate
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
 from coursebuild.labs.export_text import About
 from coursebuild.pipeline import lab_export
 from coursebuild.pipeline.labs import Engines, try_labs
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.verify import lab_lines
+from coursebuild.render.assets import Assets
+from coursebuild.render.lab_files import lab_files
+from coursebuild.report.text import Style, lab_line
 from coursebuild.results import LabResult
 
 ROOT = Path(__file__).parents[2]
@@ -258,12 +263,15 @@ def test_a_script_that_differs_is_withheld(
     assert result.status == "ok"
 
 
-def test_without_contacts_the_last_bit_counts(
+def test_where_the_engines_agree_the_last_bit_counts(
     course: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lab = {"xml": PENDULUM, "setup": "data.qvel[0] = 1 / 3", "verify": {"seconds": 0.1}}
+    lab = {"xml": BALL, "setup": "data.qvel[0] = 1 / 3", "verify": {"seconds": 0.1}}
     (result,) = tried(course, lab)
-    assert result.parity.startswith("bit-identical") and result.unexported == ""
+    assert (result.parity, result.unexported) == (
+        "bit-identical to native MuJoCo over 50 steps",
+        "",
+    )
     wrong(monkeypatch, "1 / 3", "1 / 3 + 1e-16")
     (result,) = tried(course, lab)
     assert result.unexported == "its state at the end is not that of the lab"
@@ -321,3 +329,32 @@ def test_a_failed_lab_offers_nothing(course: Path) -> None:
     options = Options(root=course, jobs=1, quiet=True)
     (result,), found = try_labs(loaded.course, {}, options, Engines(course))
     assert len(found) == 1 and result.export is None and result.unexported == ""
+
+
+def test_the_page_gets_the_script_and_the_report_the_reason(course: Path) -> None:
+    fine = {"xml": BALL, "verify": {"seconds": 0.1}}
+    results = tried(course, fine, {**fine, "setup": "data.qvel[0] = Math.random()"})
+    bundle = [(f"js/{name}", b"") for name in ("lab.js", "lab-worker.js")]
+    published = lab_files(tuple(results), Assets((), (*bundle, ("mujoco/mujoco.wasm", b""))))
+    configs = [json.loads(f.data) for f in published.files if f.path.endswith(".json")]
+    scripts = [config.get("exportPython") for config in configs]
+    assert results[0].export is not None
+    assert scripts == [dict(zip(("name", "text"), results[0].export, strict=True)), None]
+    lines = [lab_line(line, Style()) for line in lab_lines(results)]
+    assert "no Python export" not in lines[0]
+    assert "no Python export: `Math.random` with 0 arguments has no counterpart" in lines[1]
+
+
+def test_the_page_fills_a_script_as_the_build_does() -> None:
+    source = (ROOT / "site" / "js" / "lab" / "page" / "export.js").read_text()
+    isolate = Isolate(
+        source.replace("export function", "function")
+        + "globalThis.fill = (json) => fillScript(...JSON.parse(json))"
+    )
+    values: dict[int, float | str] = {0: 1.0, 1: -0.25, 2: 1e-7, 3: 1e21, 4: 'a "b" \\', 5: 1.5e300}
+    text = "\n".join(f"{{{{control:{i}}}}}" for i in values)
+    theirs = isolate.call("fill", json.dumps([text, list(values.values())]), 10.0).splitlines()
+    isolate.close()
+    ours = filled(Export("x.py", text, (), True), values).splitlines()
+    assert [eval(line) for line in theirs] == [eval(line) for line in ours] == [*values.values()]
+    assert theirs[0] == ours[0] == "1"

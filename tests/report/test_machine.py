@@ -6,7 +6,7 @@ import json
 import xml.etree.ElementTree as ElementTree
 
 from coursebuild.diagnostics import Note, diagnose
-from coursebuild.report import Report, ScriptLine, Style, Summary, render_report
+from coursebuild.report import LabLine, Report, ScriptLine, Style, Summary, render_report
 from coursebuild.source import Source
 
 SOURCE = Source("content/lessons/1.1-a,b.md", "first\nwr\x00ng <&> here\n")
@@ -24,12 +24,16 @@ SCRIPTS = (
     ScriptLine("examples/b.py", "1.1", "timeout", 60.0, False),
     ScriptLine("examples/c.py", "1.1", "skipped", 0.0, False, ("torch",)),
 )
-REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 3, 2, 1, 1, 1, 0, 60.25))
+LABS = (
+    LabLine("1.1-lab-1", "A & B", "1.1", "ok", 1.23456, 64206, 13, "bit-identical", True),
+    LabLine("1.1-lab-2", "", "1.1", "failed", 0.5, None, 0, "", False),
+)
+REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 3, 2, 1, 1, 1, 0, 60.25), labs=LABS)
 
 
 def test_json() -> None:
     value = json.loads(render_report(REPORT, "json", Style()))
-    assert list(value) == ["diagnostics", "scripts", "summary"]
+    assert list(value) == ["diagnostics", "scripts", "labs", "summary"]
     assert value["diagnostics"][1] == {
         "rule": "math-syntax",
         "severity": "error",
@@ -67,6 +71,18 @@ def test_json() -> None:
         "seconds": 60.0,
         "cached": False,
     }
+    assert value["labs"][0] == {
+        "name": "1.1-lab-1",
+        "title": "A & B",
+        "lesson": "1.1",
+        "status": "ok",
+        "seconds": 1.235,
+        "steps_per_second": 64206,
+        "tried": 13,
+        "parity": "bit-identical",
+        "cached": True,
+        "no_python_export": "",
+    }
     assert value["summary"]["ok"] is False
     assert value["summary"]["errors"] == 1
 
@@ -77,10 +93,12 @@ def test_junit_is_xml_and_counts() -> None:
     )
     assert suite is not None
     assert {key: suite.get(key) for key in ("tests", "failures", "skipped")} == {
-        "tests": "4",
-        "failures": "2",
+        "tests": "6",
+        "failures": "3",
         "skipped": "1",
     }
+    assert suite.find("./testcase[@name='1.1-lab-2']/failure") is not None
+    assert suite.find("./testcase[@name='1.1-lab-1']/failure") is None
     failure = suite.find("./testcase[@name='content/lessons/1.1-a,b.md']/failure")
     assert failure is not None
     assert failure.get("message") == "content/lessons/1.1-a,b.md:2:1: it is 100% wrong"

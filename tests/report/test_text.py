@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, sort_diagnostics
-from coursebuild.report import Report, ScriptLine, Style, Summary, diagnostic_text, render_report
+from coursebuild.report import (
+    LabLine,
+    Report,
+    ScriptLine,
+    Style,
+    Summary,
+    diagnostic_text,
+    render_report,
+)
 from coursebuild.source import Source
 
 
@@ -114,3 +122,21 @@ def test_colour_is_only_colour() -> None:
     coloured = diagnostic_text(diagnostic, Style(colour=True))
     assert coloured != shown(diagnostic)
     assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == shown(diagnostic)
+
+
+def test_labs_are_listed_like_scripts() -> None:
+    labs = (
+        LabLine("1.1-lab-1", "A", "1.1", "ok", 1.239, 64206, 13, "bit-identical", False),
+        LabLine("1.1-lab-2", "", "1.1", "ok", 0.1, 1000, 1, "", True, "a `switch`"),
+        LabLine("1.1-lab-3", "", "1.1", "failed", 0.5, None, 0, "", False),
+        LabLine("1.1-lab-4", "", "1.1", "ok", 0.0, None, 0, "", False),
+    )
+    report = Report((), (), Summary(1, 0, 0, 0, 0, 0, 0, 2.0), labs=labs)
+    assert render_report(report, "text", Style()) == (
+        "ok       1.1-lab-1  64,206 steps/s, 13 things tried, bit-identical, 1.24 s\n"
+        "ok       1.1-lab-2  1,000 steps/s, 1 thing tried, no Python export: a `switch`, cached\n"
+        "failed   1.1-lab-3  0 things tried, 0.50 s\n"
+        "ok       1.1-lab-4  not tried: a kind of its own\n"
+        "\n"
+        "1 lesson, 0 scripts run, 4 labs tried: everything holds\n"
+    )

@@ -27,8 +27,8 @@ export const GEOM = Object.freeze({
 
 const ROUND = 40 // segments around
 const QUARTER = 10 // segments from a pole to the equator
-const HEAD_WIDTH = 2.2 // of an arrow, in widths of its shaft
-const HEAD_LENGTH = 5
+const HEAD_WIDTH = 1.75 // of an arrow, in widths of its shaft
+const HEAD_LENGTH = 3 // in radii of its shaft
 
 const cache = new Map()
 
@@ -40,6 +40,7 @@ function unit(name, make, wrap = null, lift = 0) {
 
 function textured(geometry, wrap, lift) {
   const { position, normal, uv } = geometry.attributes
+  if (uv === undefined) return geometry // lines
   const direction = new Float32Array(3 * position.count)
   for (let i = 0; i < position.count; i++) {
     const at = [position.getX(i), position.getY(i), position.getZ(i)]
@@ -94,17 +95,17 @@ const round = (pieces, at) => pieces.map(([geometry, kind]) =>
   }),
 ) // prettier-ignore
 
-const arrow = (both) => {
-  const head = (s) => Math.min(HEAD_LENGTH * s[0], 0.5 * s[2])
-  const parts = [
-    part(cylinder(), (s, out) => {
-      const length = s[2] - head(s) * (both ? 2 : 1)
-      set(out, s[0], s[1], length / 2, length / 2 + (both ? head(s) : 0))
-    }),
-    part(cone(), (s, out) => set(out, HEAD_WIDTH * s[0], HEAD_WIDTH * s[1], head(s), s[2] - head(s))),
-  ]
-  if (both) parts.push(part(cone(), (s, out) => set(out, HEAD_WIDTH * s[0], -HEAD_WIDTH * s[1], -head(s), head(s))))
-  return parts
+/** From its place an arrow reaches half of its third size; a double one does so on both sides. */
+const arrow = (width, both) => {
+  const reach = (s) => s[2] / 2
+  const head = (s) => Math.min(HEAD_LENGTH * s[0], reach(s) / 2)
+  const shaft = part(cylinder(), (s, out) => {
+    const length = reach(s) - head(s)
+    set(out, s[0], s[1], both ? length : length / 2, both ? 0 : length / 2)
+  })
+  const tip = (sign) =>
+    part(cone(), (s, out) => set(out, width * s[0], sign * width * s[1], sign * head(s), sign * (reach(s) - head(s))))
+  return both ? [shaft, tip(1), tip(-1)] : [shaft, tip(1)]
 }
 
 /**
@@ -134,10 +135,11 @@ export function shape(type, model, given = null) {
     case GEOM.HFIELD:
       return given === null ? [] : [part(given, (_, out) => set(out, 1, 1, 1))]
     case GEOM.ARROW:
+      return arrow(HEAD_WIDTH, false)
     case GEOM.ARROW1:
-      return arrow(false)
+      return arrow(1, false)
     case GEOM.ARROW2:
-      return arrow(true)
+      return arrow(HEAD_WIDTH, true)
     case GEOM.LINE:
       return [part(line(), (s, out) => set(out, 1, 1, s[2]), true)]
     case GEOM.LINEBOX:

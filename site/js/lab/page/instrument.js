@@ -22,6 +22,7 @@ import { View } from './view.js'
 
 const TEXT_EVERY = 90 // ms: faster than this no eye reads a number
 const PLOT_EVERY = 30
+const SETTLED = 400 // ms after which a paused lab's last picture is there
 const HEIGHT = 300 // CSS pixels
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
@@ -30,7 +31,7 @@ export class Instrument {
     Object.assign(this, { element, config, words })
     this.values = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
-    this.rest = null // what to say of a pause, with the time of its picture
+    this.rest = 0 // timer of what is to be said of a pause
     this.pressed = false
     this.wanted = null
     this.build()
@@ -149,7 +150,13 @@ export class Instrument {
       this.notices.clear()
       this.notices.say(this.words('lab.live.said_playing'))
     }
-    this.rest = { user: 'said_paused', code: 'said_paused', stopAt: 'said_stopped' }[reason] ?? null
+    clearTimeout(this.rest)
+    const key = { user: 'said_paused', code: 'said_paused', stopAt: 'said_stopped' }[reason]
+    if (key) this.rest = setTimeout(() => this.sayTime(key), SETTLED)
+  }
+
+  sayTime(key) {
+    this.notices.say(this.words(`lab.live.${key}`, { t: formatTime(this.simulation.latest?.time ?? 0) }))
   }
 
   collect({ times, values }, fresh) {
@@ -165,8 +172,6 @@ export class Instrument {
   /** Numbers and plots follow the picture, though not as often. */
   refresh({ time, readouts, realtime }, now) {
     const resting = this.state !== 'playing'
-    if (this.rest !== null) this.notices.say(this.words(`lab.live.${this.rest}`, { t: formatTime(time) }))
-    this.rest = null
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
@@ -199,7 +204,7 @@ export class Instrument {
 
   reset() {
     this.simulation.reset()
-    this.rest = null
+    clearTimeout(this.rest)
     this.notices.say(this.words('lab.live.said_reset'))
   }
 
@@ -230,6 +235,7 @@ export class Instrument {
 
   dispose() {
     this.unwatch()
+    clearTimeout(this.rest)
     this.hands.dispose()
     this.plots.forEach((plot) => plot.dispose())
     this.simulation.dispose()

@@ -1,0 +1,335 @@
+"""Lab code as Python: exact translations, refusals, and values beside V8's."""
+
+from __future__ import annotations
+
+import math
+import sys
+import warnings
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.effects.v8 import Isolate
+from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
+from coursebuild.labs.export_text import helpers
+from coursebuild.labs.javascript_tokens import UntranslatableError
+from coursebuild.labs.python_code import expression, statements
+from coursebuild.labs.python_library import LIBRARY
+from coursebuild.labs.python_values import Code, Names, Used
+
+NAMES = Names({"n": "num", "on": "bool", "v": "vector", "k": "nat"}, Code("GAIN", "num"))
+
+
+def translated(code: str, *, button: bool = False) -> str:
+    return "\n".join(statements(code, NAMES, Used(), button=button).lines)
+
+
+@pytest.mark.parametrize(
+    "code, python",
+    [
+        ("data.qvel[3] = 6; data.qvel[4] = .001", "data.qvel[3] = 6\ndata.qvel[4] = 0.001"),
+        ("mj.mj_resetData(model, data)", "mujoco.mj_resetData(model, data)"),
+        ("data.qvel[0] = -0", "data.qvel[0] = -0.0"),
+        ("data.qvel[0] = data.qvel[1] = 0", "data.qvel[0] = data.qvel[1] = 0"),
+        ("data.qvel[0] -= value * data.qvel[0]", "data.qvel[0] -= GAIN * data.qvel[0]"),
+        ("ctx.n = 0; ctx.n++\n--ctx.n", "ctx.n = 0.0\nctx.n += 1\nctx.n -= 1"),
+        ("ctx.n %= 3", "ctx.n = np.fmod(ctx.n, 3.0)"),
+        ("model.opt.integrator = value", "model.opt.integrator = int(GAIN)"),
+        ("model.opt.disableflags |= 8", "model.opt.disableflags = model.opt.disableflags | 8"),
+        ("model.opt.gravity[2] = -9.81", "model.opt.gravity[2] = -9.81"),
+        (
+            "model.geom_rgba[3] *= 0.1",
+            "model.geom_rgba.flat[3] = float(model.geom_rgba.flat[3]) * 0.1",
+        ),
+        (
+            "data.mocap_quat.set([1, 0, 0, value], 4)",
+            "data.mocap_quat.reshape(-1)[4:8] = [1, 0, 0, GAIN]",
+        ),
+        ("data.qvel.set(ctx.v, 3)", "data.qvel[3:3 + ctx.v.size] = ctx.v"),
+        ("data.qvel.fill(0)", "data.qvel.fill(0)"),
+        ("data.eq_active[0] = ctx.n", "data.eq_active[0] = int(ctx.n)"),
+        ("data.eq_active[0] = !ctx.on", "data.eq_active[0] = not ctx.on"),
+        ("model.geom_group.fill(ctx.n)", "model.geom_group.fill(int(ctx.n))"),
+        ("model.geom_group.set([1, ctx.n])", "model.geom_group[:2] = [1, int(ctx.n)]"),
+        ("ctx.on = !ctx.on && sim.time >= 1", "ctx.on = not ctx.on and data.time >= 1"),
+        ("if (ctx.n) ctx.n = 1", "if abs(ctx.n) > 0:\n    ctx.n = 1.0"),
+        ("if (ctx.on) { } else ctx.n = 1", "if ctx.on:\n    pass\nelse:\n    ctx.n = 1.0"),
+        (
+            "for (let i = 0; i < 3; i++) data.ctrl[i] = i",
+            "for i in range(3):\n    data.ctrl[i] = i",
+        ),
+        (
+            "for (let i = model.nv - 1; i >= 0; i -= 2) data.qvel[i] *= 2",
+            "for i in range(model.nv - 1, -1, -2):\n    data.qvel[i] *= 2",
+        ),
+        (
+            "for (let i = 1; i <= data.qpos.length; i++) { if (ctx.on) continue; break }",
+            "for i in range(1, data.qpos.size + 1):\n    if ctx.on:\n        continue\n    break",
+        ),
+        (
+            "const a = 1, N = 2; { const a = 3; ctx.n = a } ctx.n = a + N",
+            "a = 1\nN_ = 2\na_ = 3\nctx.n = float(a_)\nctx.n = float(a + N_)",
+        ),
+        ("const data_ = 1, lambda = 2", "data_ = 1\nlambda_ = 2"),
+        ("let s = 0\nwhile (s < 3) s += 1", "s = 0.0\nwhile s < 3:\n    s += 1"),
+        ("ctx.n = ctx.k - (1 - ctx.k)", "ctx.n = float(ctx.k - (1 - ctx.k))"),
+        ("ctx.n = 2 * 3 * ctx.n", "ctx.n = 2 * 3 * ctx.n"),
+        ("ctx.n = -ctx.k * -3", "ctx.n = -float(ctx.k) * -3"),
+        ("ctx.n = 1 / 3 - .5e1", "ctx.n = 1 / 3 - 0.5e1"),
+        ("ctx.n = ctx.on ? 1 : 2.5", "ctx.n = 1.0 if ctx.on else 2.5"),
+        ("ctx.n = a\n/* b */ // c\n".replace("a", "0x10"), "ctx.n = float(0x10)"),
+        ("data.qpos[ctx.n] = 1", "data.qpos[index(ctx.n)] = 1"),
+        ("data.qpos[-1] = 1", "data.qpos[index(-1)] = 1"),
+        ("data.qpos[7 * ctx.k + 1] = 1", "data.qpos[7 * ctx.k + 1] = 1"),
+        ("ctx.v = data.qpos.slice(3, 7)", "ctx.v = data.qpos[3:7].copy()"),
+        ("ctx.n = Math.max(ctx.n, 0)", "ctx.n = maximum(ctx.n, 0.0)"),
+        ("ctx.n = Math.sin(Math.PI * ctx.n)", "ctx.n = np.sin(math.pi * ctx.n)"),
+        ("ctx.n = ctx.n ** 2 + 2 ** ctx.n", "ctx.n = ctx.n**2 + power(2, ctx.n)"),
+        ("data.xfrc_applied[6 * lib.bodyId('b')] = 1", None),
+    ],
+)
+def test_statements(code: str, python: str | None) -> None:
+    if python is None:
+        python = 'data.xfrc_applied.flat[6 * model.body("b").id] = 1'
+    assert translated(code) == python
+
+
+def test_what_only_concerns_the_page_is_left_out_of_buttons() -> None:
+    assert translated("sim.reset(); sim.play()", button=True) == "reset(model, data, ctx)"
+
+
+@pytest.mark.parametrize(
+    "code",
+    """\
+data.qvel[0] = Math.random()
+data.qvel[0] = ctx.other
+data.qvel = [1, 2]
+data.nothing[0] = 1
+data.qpos[0] = data.qpos[1] || 1
+data.qpos[0] = ctx.on + 1
+data.qpos[0] = data.qpos ? 1 : 2
+data.qpos[0] = 'a' + 1
+data.qpos[0] = 1 < 2 < 3
+data.qpos[0] = ctx.on == true
+data.qpos[0] ??= 1
+data.qpos[0] = 5 & ctx.n
+data.qpos[0] = 1 << 2
+data.qpos[0] = ctx.n = 1, f()
+data.qpos[0] = (ctx.n = 1)
+data.qpos[0] = 10n
+data.qpos[0] = NaN
+data.qpos[0] = parseFloat('1')
+data.qpos[0] = 'ab'.length
+data?.qpos
+ctx.v = [...data.qpos]
+ctx.v.push(1)
+ctx.k.x = 1
+ctx.on = 1
+const s = `text`
+const o = {a: 1}
+const model = 1
+const c = 1; c = 2
+let u
+var w = 1
+function f() { }
+for (const x of data.qpos) ctx.n += x
+for (let i = 0; i < ctx.n; i++) ctx.n += 1
+for (let i = 0; i < data.ncon; i++) ctx.n += 1
+for (let i = 0; i < 3; i++) i += 1
+for (;;) break
+do { ctx.n++ } while (ctx.on)
+switch (ctx.n) { }
+return 1
+try { ctx.n = 1 } catch { }
+delete ctx.n
+ctx.on && (ctx.n = 1)
+sim.step(3)
+sim.play()
+lib.bodyPos('a')[0] = 1
+lib.qpos('b', 1)
+model.opt = 1
+mj.mj_forward(model, model)
+mj.mj_loadXML('x')
+'use strict'
+é = 1
+ctx['n'] = 1
+a\\u0062 = 1
+ctx.n = 010
+ctx.n = /x/.test('a')
+new Float64Array(3)
+this.x = 1
+ctx.n = typeof ctx.n
+async () => 1
+label: ctx.n = 1""".splitlines(),
+)
+def test_refusals(code: str) -> None:
+    with pytest.raises(UntranslatableError):
+        statements(code, NAMES, Used())
+
+
+@pytest.mark.parametrize(
+    "code, python",
+    [
+        ("lib.energy().kinetic", "energy(model, data).kinetic"),
+        ("lib.norm(lib.angmom())", "norm(angular_momentum(model, data))"),
+        ("lib.norm([data.qvel[0], 1])", "norm([data.qvel[0], 1])"),
+        ("lib.qpos('hinge') * 2", 'data.joint("hinge").qpos.item() * 2'),
+        ("lib.qpos('ball')[2]", 'data.joint("ball").qpos.copy()[2]'),
+        ("data.ncon > 0 ? 'a' : \"b\\n\"", '"a" if data.ncon > 0 else "b\\n"'),
+        ("Math.hypot(...data.qvel.slice(3, 6))", "math.hypot(*data.qvel[3:6].copy())"),
+        ("data.xpos[3 * 2 + 1]", "data.xpos.flat[3 * 2 + 1]"),
+        ("model.body_parentid[1]", "int(model.body_parentid[1])"),
+        (
+            "mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY.value, 'b')",
+            'mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, "b")',
+        ),
+    ],
+)
+def test_expressions(code: str, python: str) -> None:
+    assert expression(code, NAMES, Used()).text == python
+
+
+@pytest.mark.parametrize("code", ["ctx.on", "data.qpos", "lib.energy()", "1;", "a => 1"])
+def test_an_expression_gives_a_number_or_a_text(code: str) -> None:
+    with pytest.raises(UntranslatableError):
+        expression(code, NAMES, Used())
+
+
+def test_the_names_of_the_engine_are_those_of_the_bindings() -> None:
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    owners = {"model": model, "data": mujoco.MjData(model)}
+    kinds = {"float64": "f64", "float32": "f32", "int32": "int", "bool": "int"}
+    for way, field in ARRAYS.items():
+        array = owners[way[0]]
+        for name in way[1:]:
+            array = getattr(array, name)
+        assert (kinds[str(array.dtype)], array.ndim == 2) == (field.element, field.rows), way
+        assert array.flags.c_contiguous
+    for way, kind in SCALARS.items():
+        value = owners[way[0]]
+        for name in way[1:]:
+            value = getattr(value, name)
+        assert isinstance(value, float if kind == "float" else int), way
+    assert all(isinstance(getattr(model, name), int) for name in SIZES)
+    assert all(callable(getattr(mujoco, name)) for name in CALLS)
+
+
+# --- values beside V8's
+
+VALUES = "const x = -0, y = -7.25, z = 0.1, i = 5, data = {qpos: new Float64Array([2.5, -0])}"
+ATOMS = "x y z 0 1 2 3 0.5 1.5 2.5 1e3 1e-3 0x10 4294967296 1e300 data.qpos[0] data.qpos[1]".split()
+FUNCTIONS = "abs floor ceil trunc round sign sqrt".split()
+INEXACT = "sin cos tan exp log1p atan tanh cbrt log2 expm1 asinh".split()
+
+
+@pytest.fixture(scope="module")
+def v8() -> Iterator[Isolate]:
+    isolate = Isolate(
+        f"{VALUES}; globalThis.run = (code) => {{ const v = eval(code); "
+        "return Object.is(v, -0) ? '-0' : String(v) }"
+    )
+    yield isolate
+    isolate.close()
+
+
+def formulas(functions: list[str]) -> st.SearchStrategy[str]:
+    def larger(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
+        tests = st.builds(
+            "({} {} {})".format, inner, st.sampled_from("< > <= >= === !==".split()), inner
+        )
+        conditions = tests | inner | st.builds("!({})".format, inner)
+        conditions |= st.builds(
+            "(({}) {} ({}))".format, conditions, st.sampled_from(["&&", "||"]), conditions
+        )
+        return st.one_of(
+            st.builds("{} {} {}".format, inner, st.sampled_from("+-*/%"), inner),
+            st.builds("({} {} {})".format, inner, st.sampled_from("+-*/%"), inner),
+            st.builds("-({})".format, inner),
+            st.builds("({} ? {} : {})".format, conditions, inner, inner),
+            st.builds("Math.{}({})".format, st.sampled_from(functions), inner),
+            st.builds("Math.{}({}, {})".format, st.sampled_from(["min", "max"]), inner, inner),
+        )
+
+    return st.recursive(st.sampled_from(ATOMS), larger, max_leaves=12)
+
+
+def python_value(code: str) -> float | None:
+    """The value of an expression in Python; `None` where Python raises for a division by zero."""
+    used = Used()
+    declared = "const x = -0, y = -7.25, z = 0.1, i = 5\n"
+    lines = statements(f"{declared}ctx.n = {code}", NAMES, used).lines
+    scope = {
+        "np": np,
+        "math": math,
+        "data": SimpleNamespace(qpos=np.array([2.5, -0.0])),
+        "ctx": SimpleNamespace(n=None),
+    }
+    for name in helpers(used.helpers):
+        exec(LIBRARY[name].source, scope)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            exec("\n".join(lines), scope)
+        except (ZeroDivisionError, OverflowError):
+            return None
+    value = scope["ctx"].n
+    assert isinstance(value, float)
+    return float(value)
+
+
+def same(mine: float, theirs: float) -> bool:
+    if math.isnan(mine) or math.isnan(theirs):
+        return math.isnan(mine) and math.isnan(theirs)
+    return mine == theirs and math.copysign(1, mine) == math.copysign(1, theirs)
+
+
+@given(code=formulas(FUNCTIONS))
+def test_numbers_are_those_of_v8(v8: Isolate, code: str) -> None:
+    mine = python_value(code)
+    if mine is not None:
+        assert same(mine, float(v8.call("run", code, 10.0).replace("Infinity", "inf")))
+
+
+@pytest.mark.parametrize("name", INEXACT)
+@pytest.mark.parametrize("x", ["-0", "0.3", "-2.7", "1e300", "1e-300"])
+def test_functions_are_those_of_v8_but_for_the_last_bits(v8: Isolate, name: str, x: str) -> None:
+    mine = python_value(f"Math.{name}({x})")
+    theirs = float(v8.call("run", f"Math.{name}({x})", 10.0).replace("Infinity", "inf"))
+    assert mine is not None
+    assert same(mine, theirs) or math.isclose(mine, theirs, rel_tol=4 * sys.float_info.epsilon)
+
+
+@pytest.mark.parametrize("base", ["-8", "0.5", "1", "-1", "0"])
+@pytest.mark.parametrize("exponent", ["0.5", "2", "-3", "(0 * 1e300 * 1e300 * 1e300 - 0)", "1e300"])
+def test_powers_are_those_of_v8(v8: Isolate, base: str, exponent: str) -> None:
+    code = f"({base}) ** {exponent}"
+    mine, theirs = python_value(code), float(v8.call("run", code, 9.0).replace("Infinity", "inf"))
+    assert mine is not None and (same(mine, theirs) or math.isclose(mine, theirs, rel_tol=1e-15))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        '"it\'s"',
+        "'say \"a\\n\"'",
+        "'\\u00e9\\x41\\u{1F600} é 😀'",
+        "'\\\\ \\' \\0 \\q'",
+    ],
+)
+def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:
+    made = expression(code, NAMES, Used()).text
+    assert eval(made) == v8.call("run", code, 10.0)
+
+
+def test_random_numbers_are_those_of_the_lab() -> None:
+    scope: dict[str, object] = {}
+    exec("import struct\n" + LIBRARY["Random"].source, scope)
+    random = scope["Random"](7)  # type: ignore[operator]
+    first = [random() for _ in range(5)]
+    random.restart()
+    assert first == [random() for _ in range(5)] and all(0 <= x < 1 for x in first)
