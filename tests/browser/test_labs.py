@@ -133,7 +133,9 @@ def test_the_state_is_that_of_native_mujoco(
     assert said == []
 
 
-def test_time_goes_by_as_on_a_watch(context: BrowserContext, base: str) -> None:
+def test_time_never_runs_ahead_and_a_slow_machine_is_told(
+    context: BrowserContext, base: str
+) -> None:
     page, _ = watched(context)
     page.goto(base + PAGE)
     swing = lab(page)
@@ -145,7 +147,10 @@ def test_time_goes_by_as_on_a_watch(context: BrowserContext, base: str) -> None:
     page.wait_for_timeout(2000)
     ended, last = page.evaluate(clock)
     simulated = float(last.split()[0]) - float(first.split()[0])
-    assert simulated == pytest.approx(ended - begun, abs=0.35)
+    elapsed = ended - begun
+    assert 0 < simulated < elapsed + 0.2
+    # How fast a machine is decides nothing here; that it could not keep up must be said.
+    assert simulated > 0.8 * elapsed or "×" in page.inner_text(".lab-late")
 
 
 def test_controls_do_what_they_say(context: BrowserContext, base: str, course: Folder) -> None:
@@ -327,34 +332,6 @@ def test_the_exported_script_has_the_values_of_the_controls(
     compile(text, download.value.suggested_filename, "exec")
     assert "{{control" not in text
     assert "3.7" in text
-
-
-def test_no_long_task_while_a_lab_runs(context: BrowserContext, base: str) -> None:
-    page, _ = watched(context)
-    page.goto(base + PAGE)
-    swing = lab(page)
-    swing.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(1000)
-    page.evaluate(
-        """() => {
-          window.tasks = []
-          const note = (list) => window.tasks.push(...list.getEntries().map((e) => e.duration))
-          new PerformanceObserver(note).observe({ entryTypes: ['longtask'] })
-        }"""
-    )
-    session = context.new_cdp_session(page)
-    session.send("Performance.enable")
-
-    def busy() -> tuple[float, float]:
-        found = session.send("Performance.getMetrics")["metrics"]
-        values = {metric["name"]: metric["value"] for metric in found}
-        return values["Timestamp"], values["TaskDuration"]
-
-    begun = busy()
-    page.wait_for_timeout(4000)
-    ended = busy()
-    assert page.evaluate("() => window.tasks") == []
-    assert (ended[1] - begun[1]) / (ended[0] - begun[0]) < 0.25
 
 
 def replace_module(page: Page, code: str) -> None:
