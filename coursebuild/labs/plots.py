@@ -259,11 +259,17 @@ def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
             pen = False
             continue
         if not pen:
-            at = t0 + begin * (t1 - t0), v0 + begin * (v1 - v0)
-            yield f"M{frame.x(at[0]):.1f} {frame.y(at[1]):.1f}"
-        at = (t1, v1) if end == 1 else (t0 + end * (t1 - t0), v0 + end * (v1 - v0))
-        yield f"L{frame.x(at[0]):.1f} {frame.y(at[1]):.1f}"
+            yield f"M{_between(frame, (t0, v0), (t1, v1), begin)}"
+        yield f"L{_between(frame, (t0, v0), (t1, v1), end)}"
         pen = end == 1
+
+
+def _between(
+    frame: _Frame, first: tuple[float, float], second: tuple[float, float], part: float
+) -> str:
+    """A point of a segment, which is inside the frame but for rounding."""
+    t, v = (a + part * (b - a) if part < 1 else b for a, b in zip(first, second, strict=True))
+    return f"{frame.x(t):.1f} {frame.y(min(max(v, frame.low), frame.high)):.1f}"
 
 
 def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:

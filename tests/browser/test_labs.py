@@ -133,9 +133,7 @@ def test_the_state_is_that_of_native_mujoco(
     assert said == []
 
 
-def test_time_never_runs_ahead_and_a_slow_machine_is_told(
-    context: BrowserContext, base: str
-) -> None:
+def test_time_never_runs_ahead_and_lateness_is_told(context: BrowserContext, base: str) -> None:
     page, _ = watched(context)
     page.goto(base + PAGE)
     swing = lab(page)

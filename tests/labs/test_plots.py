@@ -10,7 +10,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from labkit import make_lab
 
@@ -130,6 +130,7 @@ def test_any_values(values: list[float | None], narrow: bool) -> None:
 
 
 @settings(max_examples=80, deadline=None)
+@example([9007199254740994.0, 0.0], None, 1.0, None, "a large number next to a small one")
 @given(
     st.lists(st.one_of(st.none(), st.floats(width=64)), min_size=1, max_size=12),
     st.one_of(st.none(), st.floats(-1e6, 0)),
