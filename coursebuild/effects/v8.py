@@ -11,15 +11,16 @@ Entry points: `MathEngine.typeset`; `Isolate`, for other scripts.
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
 import contextlib
 import json
 import re
 import threading
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypedDict
+from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar
 
 from coursebuild.effects.resources import assets_dir
 from coursebuild.results import Formula, MathError
@@ -34,6 +35,9 @@ _BATCH = 100
 _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
+
+
+T = TypeVar("T")
 
 
 class LimitError(Exception):
@@ -51,6 +55,53 @@ class ScriptError(Exception):
     """A script threw; the text is its message."""
 
 
+class _Loop:
+    """An event loop in a thread of its own, so that whoever calls may have one running itself."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._cancel_next = False
+        self._thread = threading.Thread(target=self._loop.run_forever, name="v8", daemon=True)
+        self._thread.start()
+
+    def run(self, work: Coroutine[Any, Any, T], *, always: bool = False) -> T:
+        """The result of a coroutine; `always`: even after `cancel`."""
+
+        async def guarded() -> T:
+            if self._cancel_next and not always:
+                self._cancel_next = False
+                work.close()
+                raise asyncio.CancelledError
+            return await work
+
+        future = asyncio.run_coroutine_threadsafe(guarded(), self._loop)
+        try:
+            return future.result()
+        except concurrent.futures.CancelledError:
+            raise asyncio.CancelledError from None
+        except BaseException:
+            future.cancel()  # Ctrl-C while waiting
+            raise
+
+    def cancel(self) -> None:
+        """End what runs, or else what runs next."""
+
+        def cancel() -> None:
+            tasks = asyncio.all_tasks()
+            self._cancel_next = not tasks
+            for task in tasks:
+                task.cancel()
+
+        with contextlib.suppress(RuntimeError):  # it is closed already
+            self._loop.call_soon_threadsafe(cancel)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+
 class Isolate:
     """A JavaScript context of its own, with some scripts loaded.
 
@@ -59,9 +110,9 @@ class Isolate:
 
     def __init__(self, *scripts: str, memory: int = _MEMORY) -> None:
         self._memory = memory
-        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
-        self._context = self._runner.run(_make_context())
-        self.close = weakref.finalize(self, _close, self._runner, self._context)
+        self._loop = _Loop()
+        self._context = self._loop.run(_make_context())
+        self.close = weakref.finalize(self, _close, self._loop, self._context)
         self._context.set_hard_memory_limit(memory)
         for script in scripts:
             self._evaluate(script, _BATCH_SECONDS)
@@ -83,13 +134,7 @@ class Isolate:
 
         Where nothing runs at this moment, it ends what runs next.
         """
-
-        def cancel() -> None:
-            for task in asyncio.all_tasks():
-                task.cancel()
-
-        with contextlib.suppress(RuntimeError):  # it is closed already
-            self._runner.get_loop().call_soon_threadsafe(cancel)
+        self._loop.cancel()
 
     def fill(self, name: str, data: bytes) -> None:
         """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
@@ -105,7 +150,7 @@ class Isolate:
             return await asyncio.wait_for(self._context.eval_cancelable(code), seconds)
 
         try:
-            return self._runner.run(evaluate())
+            return self._loop.run(evaluate())
         except TimeoutError:
             raise LimitError(f"ran for more than {seconds:g} s", resumable=True) from None
         except JSOOMException:
@@ -121,9 +166,12 @@ async def _make_context() -> MiniRacer:
     return MiniRacer()
 
 
-def _close(runner: asyncio.Runner, context: MiniRacer) -> None:
-    context.close()
-    runner.close()
+def _close(loop: _Loop, context: MiniRacer) -> None:
+    async def close() -> None:
+        context.close()
+
+    loop.run(close(), always=True)
+    loop.close()
 
 
 class _Failure(TypedDict):

@@ -60,7 +60,7 @@ def launch(playwright: object, *arguments: str) -> Browser:
     return browser
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browsers() -> Iterator[dict[str, Browser]]:
     """Browsers: one with WebGL, one without."""
     with sync_playwright() as playwright:
