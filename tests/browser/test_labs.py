@@ -431,14 +431,21 @@ def test_mounting_and_disposing_leaves_nothing(context: BrowserContext, base: st
     }"""
 
     def listeners() -> tuple[int, int]:
-        session.send("HeapProfiler.collectGarbage")
-        found = session.send("Performance.getMetrics")["metrics"]
-        values = {metric["name"]: metric["value"] for metric in found}
-        return int(values["JSEventListeners"]), int(values["Nodes"])
+        """Listeners and nodes that stay: what a browser frees late is given time."""
+        counts = []
+        for _ in range(8):
+            session.send("HeapProfiler.collectGarbage")
+            page.wait_for_timeout(150)
+            found = session.send("Performance.getMetrics")["metrics"]
+            values = {metric["name"]: metric["value"] for metric in found}
+            counts.append((int(values["JSEventListeners"]), int(values["Nodes"])))
+        return min(counts)
 
     page.evaluate(again, 10)
     before = listeners()
-    page.evaluate(again, 40)
+    page.evaluate(again, 190)
     after = listeners()
-    assert after[0] <= before[0] + 5, (before, after)
-    assert after[1] <= before[1] + 50, (before, after)
+    # A lab has dozens of listeners and hundreds of nodes: one of either left behind by each mount
+    # would be 190 more.
+    assert after[0] <= before[0] + 40, (before, after)
+    assert after[1] <= before[1] + 180, (before, after)
