@@ -98,7 +98,25 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
         "relative": relative,
         "at": at,
         "timestep": float(model.opt.timestep),
+        "exact": _is_exact(mujoco, model),
     }
+
+
+def _is_exact(mujoco: Any, model: Any) -> bool:
+    """Whether surely no function of the C library but the square root is evaluated in a step.
+
+    Turning joints take sines and cosines, wrapped tendons their inverses, muscles and motors powers
+    and exponentials; everything else is arithmetic, which is the same to the bit on every machine.
+    """
+    plain = (int(mujoco.mjtDyn.mjDYN_NONE), int(mujoco.mjtDyn.mjDYN_INTEGRATOR))
+    return bool(
+        (model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)).all()
+        and model.ntendon == 0
+        and model.nflex == 0
+        and all(kind in plain for kind in model.actuator_dyntype)
+        and (model.actuator_gaintype <= int(mujoco.mjtGain.mjGAIN_AFFINE)).all()
+        and (model.actuator_biastype <= int(mujoco.mjtBias.mjBIAS_AFFINE)).all()
+    )
 
 
 def _apart(numpy: Any, mine: Any, theirs: Any) -> float:

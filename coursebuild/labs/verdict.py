@@ -41,10 +41,18 @@ class Parity:
     """The first step after which the states differ; `None`: bit-identical."""
     relative: float
     """Largest difference relative to the largest number of the state, where it counts."""
+    exact: bool = False
+    """Whether nothing in the model can differ between two machines, not even in the last bit."""
+
+    def allowed(self, rtol: float | None) -> float:
+        """The relative difference that is allowed: the lab's own, or what its model may have."""
+        if rtol is not None:
+            return rtol
+        return 0.0 if self.exact else PARITY_RTOL
 
     def within(self, rtol: float | None) -> bool:
-        """Whether the difference is allowed; an `rtol` of 0 allows none of any size."""
-        allowed = PARITY_RTOL if rtol is None else rtol
+        """Whether the difference is allowed; one of 0 allows none of any size."""
+        allowed = self.allowed(rtol)
         return self.first is None or (allowed > 0 and self.relative <= allowed)
 
     def describe(self) -> str:
@@ -162,7 +170,7 @@ def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
     if parity.within(lab.verify_rtol):
         return
     time = (parity.first or 0) * parity.timestep
-    allowed = PARITY_RTOL if lab.verify_rtol is None else lab.verify_rtol
+    allowed = parity.allowed(lab.verify_rtol)
     yield diagnose(
         "lab-parity",
         entry_span(lab, ("verify", "rtol")),

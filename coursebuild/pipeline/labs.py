@@ -360,4 +360,4 @@ def _parity(reply: dict[str, Any]) -> Parity | None:
     told = main["parity"] if main is not None else None
     if told is None:
         return None
-    return Parity(told["steps"], told["timestep"], told["first"], told["relative"])
+    return Parity(told["steps"], told["timestep"], told["first"], told["relative"], told["exact"])

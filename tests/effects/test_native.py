@@ -73,6 +73,21 @@ class TestParity:
         assert found["run"]["steps"] == 1000
         assert found["relative"] <= 1e-9
 
+    def test_what_only_slides_has_no_right_to_differ(self, bench: Bench) -> None:
+        sliding = (
+            '<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .3">'
+            '<joint type="slide" axis="0 0 1"/><geom size=".1"/></body></worldbody>{}</mujoco>'
+        )
+        drive = '<actuator><general joint="j" {}/></actuator>'
+        exact = bench.parity(make_lab(xml=sliding.format(""), verify={"seconds": 0.5}))
+        assert (exact["exact"], exact["first"]) == (True, None)
+        named = sliding.replace('type="slide"', 'name="j" type="slide"')
+        for actuator, expected in (("", True), ('dyntype="filterexact" dynprm="1"', False)):
+            lab = make_lab(xml=named.format(drive.format(actuator)), verify={"seconds": 0.1})
+            assert bench.parity(lab)["exact"] is expected
+        turning = make_lab(xml=PENDULUM.format("Euler"), verify={"seconds": 0.1})
+        assert bench.parity(turning)["exact"] is False
+
     def test_what_the_lab_changed_in_the_model_is_changed_natively_too(self, bench: Bench) -> None:
         lab = make_lab(
             xml=HEAP.format("RK4"),

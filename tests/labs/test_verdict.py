@@ -242,6 +242,11 @@ class TestParity:
         assert Parity(10, 0.01, 3, relative).within(rtol) is fine
         assert Parity(10, 0.01, None, 0.0).within(rtol)
 
+    def test_without_the_c_library_not_a_bit_may_differ(self) -> None:
+        assert not Parity(10, 0.01, 3, 1e-16, exact=True).within(None)
+        assert Parity(10, 0.01, None, 0.0, exact=True).within(None)
+        assert Parity(10, 0.01, 3, 1e-16, exact=True).within(1e-12)
+
     def test_too_much_is_told_with_step_time_and_size(self) -> None:
         (told,) = parity_diagnostics(make_lab(LINES), Parity(1000, 0.002, 251, 0.125))
         assert told.message == (
