@@ -95,6 +95,17 @@ class _Loop:
         with contextlib.suppress(RuntimeError):  # it is closed already
             self._loop.call_soon_threadsafe(cancel)
 
+    def drain(self) -> None:
+        """End what still runs, such as what Ctrl-C left behind, and wait until it has ended."""
+
+        async def drained() -> None:
+            tasks = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+        asyncio.run_coroutine_threadsafe(drained(), self._loop).result()
+
     def close(self) -> None:
         """End the thread."""
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -170,6 +181,7 @@ def _close(loop: _Loop, context: MiniRacer) -> None:
     async def close() -> None:
         context.close()
 
+    loop.drain()
     loop.run(close(), always=True)
     loop.close()
 
