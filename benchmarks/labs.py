@@ -1,12 +1,19 @@
 """Labs: steps a second natively, headless and in the browser; what a page with a lab costs.
 
-Run: python benchmarks/labs.py [--seconds S]
+Run: python benchmarks/labs.py [--rounds N] [--only speed|pages]
 
-1. A course with one lab for each of five models is built in a scratch folder.
-2. Steps a second: native MuJoCo in batches, V8 in the build (as the trial measured it), and the
-   worker of a page in headless Chromium, all in this run.
+1. A course with one lab for each of five models is built in a scratch folder; what its trials say
+   of their speed, with all that is compiled on the way, is in `coursebuild check`.
+2. Steps a second, for each model in rounds: native MuJoCo, V8 in the build, the worker of a page in
+   headless Chromium asked for the steps at once, and the same worker playing as fast as it can.
+   Each makes the same steps from the same start, once untimed to be warm, and the four take turns
+   in an order that moves on: what else the machine does, meets all of them. Medians are printed, of
+   the speeds and of the ratios within a round.
 3. A page without and with a lab: requests and bytes as sent, time from Play to the first moving
    frame on a warm cache, frame times, long tasks, and how busy the page's thread is while it runs.
+
+All but native MuJoCo also do what a lab does besides stepping: look for divergence after each step,
+and bring the derived quantities of each eighth step up to date for a plot.
 """
 
 from __future__ import annotations
@@ -24,13 +31,15 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(HERE))
 
 PENDULUM = """<mujoco><option timestep="0.002" integrator="RK4"/><worldbody>
 <body pos="0 0 1"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".02"/>
@@ -73,19 +82,28 @@ MODELS = {
     "six_boxes": boxes(6),
     "twenty_boxes": boxes(20),
 }
+STEPS = {
+    "tumbling_box": 40_000,
+    "double_pendulum": 40_000,
+    "chain": 20_000,
+    "six_boxes": 10_000,
+    "twenty_boxes": 3_000,
+}
+"""In a turn: at least a third of a second."""
 LESSON = """## {model}
 
 ```lab simlab
-{{"title": "{model}", "model": "{model}", "verify": {{"seconds": {seconds}, "rtol": 1}},
+{{"title": "{model}", "model": "{model}", "verify": {{"rtol": 1}},
   "readouts": [{{"label": "time", "expr": "data.time", "digits": 2}}],
   "plots": [{{"ylabel": "height (m)", "xlabel": "time (s)", "window": 10,
              "traces": [{{"label": "z", "expr": "lib.bodyPos(1)[2]"}}]}}]}}
 ```
 """
+PAGES = {"without a lab": "1.0-plain", "with a lab": "1.1-tumbling-box"}
 SCRIPT = "## None\n\n```python file=examples/one.py\nprint(1)\n```\n\nOutput:\n\n```text\n1\n```\n"
 
 
-def make_course(folder: Path, seconds: float) -> None:
+def make_course(folder: Path) -> None:
     """One lesson for each model, and one without a lab."""
     (folder / "content" / "lessons").mkdir(parents=True)
     (folder / "models").mkdir()
@@ -99,7 +117,7 @@ def make_course(folder: Path, seconds: float) -> None:
     (folder / "content" / "course.toml").write_text(head + entries)
     for i, name in enumerate(names):
         path = folder / "content" / "lessons" / f"1.{i}-{name.replace('_', '-')}.md"
-        path.write_text(SCRIPT if i == 0 else LESSON.format(model=name, seconds=seconds))
+        path.write_text(SCRIPT if i == 0 else LESSON.format(model=name))
     for name, text in MODELS.items():
         (folder / "models" / f"{name}.xml").write_text(text)
 
@@ -114,23 +132,68 @@ def run(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def native(text: str, seconds: float) -> float:
-    """Steps a second of native MuJoCo, stepped in batches."""
+@dataclass
+class Runner:
+    """Something that steps a model, and the speeds it has shown."""
+
+    name: str
+    run: Callable[[], float]
+    """Makes the steps from the start; steps a second."""
+    speeds: list[float] = field(default_factory=list)
+
+
+def compete(runners: list[Runner], rounds: int) -> None:
+    """Let all run, in rounds, beginning with another one each time."""
+    for runner in runners:
+        runner.run()
+    for i in range(rounds):
+        first = i % len(runners)
+        for runner in runners[first:] + runners[:first]:
+            runner.speeds.append(runner.run())
+
+
+def native(text: str, steps: int) -> Callable[[], float]:
+    """Native MuJoCo, which makes the steps in one call."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    steps = round(seconds / model.opt.timestep)
-    best = 0.0
-    for _ in range(3):
-        fresh = mujoco.MjData(model)
-        mujoco.mj_copyData(fresh, model, data)
+
+    def run() -> float:
+        if model.nkey:
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+        else:
+            mujoco.mj_resetData(model, data)
+        mujoco.mj_forward(model, data)
         began = time.perf_counter()
-        mujoco.mj_step(model, fresh, nstep=steps)
-        best = max(best, steps / (time.perf_counter() - began))
-    return best
+        mujoco.mj_step(model, data, nstep=steps)
+        return steps / (time.perf_counter() - began)
+
+    return run
+
+
+def headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], float]:
+    """The main run of a trial, in the V8 of this process, without what is recorded for parity."""
+    from coursebuild.labs.compile import compile_lab
+
+    module = compile_lab(lab, "lab")
+    config = json.loads(module.config)
+    request = {"config": config, "code": module.literal, "parity": False}
+
+    def run() -> float:
+        reply = engine.trial({**request, "seconds": 0.002 * steps}, mjb, 60.0)
+        if reply["failures"]:
+            sys.exit(str(reply["failures"]))
+        if reply["main"]["steps"] != steps:
+            sys.exit(f"{reply['main']['steps']} steps were made, not {steps}")
+        return float(reply["stepsPerSecond"])
+
+    return run
+
+
+def in_worker(page: Any, mode: str, steps: int) -> Callable[[], float]:
+    """The worker of a page that has been made ready by `WORKER`."""
+    return lambda: float(page.evaluate("([mode, n]) => window.pass(mode, n)", [mode, steps]))
 
 
 @contextmanager
@@ -152,37 +215,39 @@ def served(folder: Path) -> Iterator[str]:
         server.shutdown()
 
 
-IN_WORKER = """async ([config, steps]) => {
+WORKER = """async (config) => {
   const base = new URL(config, document.baseURI)
   const lab = await (await fetch(base)).json()
   const at = (name) => new URL(lab[name], base).href
   const worker = new Worker(at('worker'), { type: 'module' })
-  const hear = (receive) => worker.addEventListener('message', receive)
-  const wait = (type) => new Promise((done, fail) => hear(({ data }) => {
-    if (data.type === type) done(data)
-    if (data.type === 'error') fail(new Error(data.message))
-  }))
   const send = (message) => worker.postMessage({ ...message, lab: lab.id })
-  const ready = wait('ready')
-  send({ type: 'load', config: lab, module: at('module'), mjb: at('mjb'), wasm: at('wasm') })
-  const { scene } = await ready
-  send({ type: 'visible', on: true })
-  const until = (time) => new Promise((done) => hear(({ data }) => {
-    if (data.type !== 'frame') return
-    send({ type: 'frame', buffer: null })
-    if (data.time >= time - scene.timestep / 2) done()
+  let hear = () => {}
+  const next = (test) => new Promise((done, fail) => (hear = (data) => {
+    if (data.type === 'error') fail(new Error(data.message))
+    if (test(data)) done(data)
   }))
-  const pass = async (from, n) => {
-    const reached = until((from + n) * scene.timestep)
-    const began = performance.now()
-    send({ type: 'step', n })
-    await reached
-    return n / (performance.now() - began) * 1000
+  worker.onmessage = ({ data }) => {
+    hear(data)
+    // As a page does: the buffer goes back when the frame has been drawn.
+    if (data.type === 'frame') requestAnimationFrame(() => send({ type: 'frame', buffer: data.buffer }))
   }
-  await pass(0, steps)
-  const speed = await pass(steps, steps)
-  worker.terminate()
-  return speed
+  const ready = next(({ type }) => type === 'ready')
+  send({ type: 'load', config: lab, module: at('module'), mjb: at('mjb'), wasm: at('wasm') })
+  const { scene: { timestep } } = await ready
+  send({ type: 'visible', on: true })
+  send({ type: 'speed', factor: 1e6 })
+  const frame = (test) => next((data) => data.type === 'frame' && test(Math.round(data.time / timestep)))
+  window.pass = async (mode, n) => {
+    const back = frame((made) => made === 0)
+    send({ type: 'pause' })
+    send({ type: 'reset' })
+    await back
+    const there = frame((made) => made >= n)
+    const began = performance.now()
+    send({ type: mode, n })
+    const made = Math.round((await there).time / timestep)
+    return made / (performance.now() - began) * 1000
+  }
 }"""
 
 WATCH = """() => {
@@ -199,26 +264,63 @@ WATCH = """() => {
 }"""
 
 
-def in_browser(url: str, steps: int) -> tuple[dict[str, float], list[str]]:
-    """Speeds of the worker by model, and lines about the pages."""
+@contextmanager
+def browsing() -> Iterator[Any]:
+    """Headless Chromium, drawing without a GPU."""
     from playwright.sync_api import sync_playwright
 
-    speeds: dict[str, float] = {}
-    lines: list[str] = []
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=flags)
-        for i, name in enumerate(MODELS, 1):
+        yield browser
+        browser.close()
+
+
+def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
+    """A line for each model."""
+    from coursebuild.effects.lab_engine import LabEngine
+    from coursebuild.effects.native import NativeEngine
+    from coursebuild.model import Lab
+    from coursebuild.source import Source
+    from coursebuild.syntax.document import parse_document
+
+    with LabEngine() as engine, NativeEngine(folder) as saver:
+        for i, (name, text) in enumerate(MODELS.items(), 1):
+            steps = STEPS[name]
+            source = Source(f"content/lessons/1.{i}-x.md", LESSON.format(model=name))
+            document = parse_document(source, frozenset({name}), lesson=True).value
+            (lab,) = (block for block in document.blocks if isinstance(block, Lab))
+            mjb = saver.save(f"models/{name}.xml", text)
             page = browser.new_page()
             page.goto(f"{url}/lessons/1.{i}-{name.replace('_', '-')}.html")
-            config = page.get_attribute(".lab", "data-config")
-            speeds[name] = page.evaluate(IN_WORKER, [config, steps])
+            config = page.evaluate(
+                "new URL(document.querySelector('.lab').dataset.config, location).href"
+            )
+            page.goto(f"{url}/lessons/1.0-plain.html")  # where nothing runs besides
+            page.evaluate(WORKER, config)
+            runners = [
+                Runner("native", native(text, steps)),
+                Runner("headless", headless(engine, lab, mjb, steps)),
+                Runner("worker", in_worker(page, "step", steps)),
+                Runner("playing", in_worker(page, "play", steps)),
+            ]
+            compete(runners, rounds)
             page.close()
-        for name, address in (("without a lab", "1.0-plain"), ("with a lab", "1.1-tumbling-box")):
-            lines.append(page_cost(browser, f"{url}/lessons/{address}.html", name))
-        browser.close()
-    return speeds, lines
+            yield row(name, *(runner.speeds for runner in runners))
+
+
+def row(name: str, own: list[float], v8: list[float], *workers: list[float]) -> str:
+    """Speeds, and what they are of others in the same round."""
+
+    def ratio(these: list[float], those: list[float]) -> float:
+        return statistics.median(a / b for a, b in zip(these, those, strict=True))
+
+    line = f"  {name:<16}{statistics.median(own):10,.0f}"
+    line += f"{statistics.median(v8):11,.0f} (x {ratio(v8, own):.2f})"
+    for worker in workers:
+        line += f"{statistics.median(worker):11,.0f} (x {ratio(worker, own):.2f}, {ratio(worker, v8):.2f})"
+    return line
 
 
 def page_cost(browser: Any, url: str, name: str) -> str:
@@ -276,29 +378,32 @@ def page_cost(browser: Any, url: str, name: str) -> str:
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=20.0, help="simulated, for each speed")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--rounds", type=int, default=9, help="of each model")
+    parser.add_argument("--only", choices=("speed", "pages"))
+    arguments = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     print(f"{platform.platform()}, {cores} cores; Python {platform.python_version()}", end="")
     print("".join(f", {name} {version(name)}" for name in ("mujoco", "mini-racer", "playwright")))
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        make_course(folder, seconds)
+        make_course(folder)
         report = json.loads(run(folder, "check", "--quiet", "--format", "json"))
-        headless = {lab["title"]: lab["steps_per_second"] for lab in report["labs"]}
         run(folder, "build", "--quiet")
-        with served(folder / "public") as url:
-            speeds, lines = in_browser(url, round(seconds / 0.002))
-        print("\nsteps a second            native     V8 headless      browser worker")
-        for name, text in MODELS.items():
-            own = native(text, seconds)
-            v8, worker = headless[name], speeds[name]
-            print(
-                f"  {name:<18} {own:12,.0f}  {v8:12,.0f} (x {v8 / own:.2f})"
-                f"  {worker:12,.0f} (x {worker / own:.2f}, {worker / v8:.2f} of headless)"
-            )
-        print("\npages")
-        print("\n".join(lines))
+        with served(folder / "public") as url, browsing() as browser:
+            print(f"Chromium {browser.version}")
+            if arguments.only != "pages":
+                print("\nsteps a second, as `coursebuild check` tells them")
+                for lab in report["labs"]:
+                    print(f"  {lab['title']:<16}{lab['steps_per_second']:10,}")
+                print("\nsteps a second      native      V8 headless", end="")
+                print("        worker, in one go         worker, playing")
+                print(f"{'':<31}(x: of native)       (x: of native, of headless)")
+                for line in race(folder, browser, url, arguments.rounds):
+                    print(line, flush=True)
+            if arguments.only != "speed":
+                print("\npages")
+                for name, address in PAGES.items():
+                    print(page_cost(browser, f"{url}/lessons/{address}.html", name))
 
 
 if __name__ == "__main__":

@@ -46,6 +46,28 @@ class ScriptJob:
 
 
 @dataclass(frozen=True, slots=True)
+class Trace:
+    """What a script looked at while it ran: with its text and options, all that its result depends on.
+
+    Project paths are POSIX and relative to the root. Each tuple is sorted, without repeats.
+    """
+
+    files: tuple[str, ...]
+    """Files of the project that it read, or tried to read and that were not there. Its own file and
+    files that it wrote itself before are not among them."""
+    folders: tuple[str, ...]
+    """Folders of the project that it listed."""
+    outside: tuple[str, ...]
+    """Absolute paths of files read that belong neither to the project nor to an installed package
+    nor to Python."""
+    modules: tuple[str, ...]
+    """Top-level names of installed packages' modules that it imported; none of Python's own."""
+    opaque: str
+    """Why there may be more, as words that end a sentence ("it starts other programs"); empty where
+    this is everything."""
+
+
+@dataclass(frozen=True, slots=True)
 class ScriptRun:
     """What a script did."""
 
@@ -61,6 +83,8 @@ class ScriptRun:
     missing: tuple[str, ...] = ()
     """Modules that it requires and that are not there."""
     cached: bool = False
+    trace: Trace | None = None
+    """What it looked at; `None` where nobody watched."""
 
 
 class DriftKind(enum.Enum):

@@ -28,7 +28,7 @@ export async function mountLab(element, texts) {
     const config = await response.json()
     const make = config.kind && config.kind !== 'simlab' ? mountCustom : (...rest) => new Instrument(...rest)
     const instrument = await make(element, config, base, words)
-    const link = readLink(window.location.hash)
+    const link = await readLink(window.location.hash)
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
     return instrument
   } catch (error) {

@@ -220,12 +220,14 @@ export class Instrument {
   }
 
   async share(state) {
+    const { link, whole } = await writeLink(this.config.id, state)
     const address = new URL(window.location.href)
-    address.hash = writeLink(this.config.id, state)
+    address.hash = link
     window.history.replaceState(null, '', address)
     let key = 'lab.live.link_copied'
     await navigator.clipboard.writeText(address.href).catch(() => (key = 'lab.live.link_shown'))
-    this.notices.show(this.words(key), 'note')
+    if (whole) this.notices.show(this.words(key), 'note')
+    else this.notices.show(`${this.words(key)} ${this.words('lab.live.link_controls')}`, 'warning')
   }
 
   export() {

@@ -3,12 +3,17 @@
  *
  * Mouse as in MuJoCo's viewer: left turns, right moves, the wheel zooms, Ctrl or Shift and the left button on a body pulls it with
  * a spring. In a page the wheel belongs to the page until the view has the focus, and one finger that goes up or down scrolls.
+ *
+ * One finger turns, two move and zoom, and a finger that has rested on a body pulls it. Only a tap gives the view the focus: a
+ * finger that scrolled past would else have locked the page behind it.
  */
 
 const TURN = 6 / 180 // of a half turn, for a press of an arrow key
 const CLOSER = 0.85
 const WHEEL = 0.0015 // of zoom for a pixel of the wheel
 const LINE = 16 // pixels
+const HOLD = 350 // ms that a finger rests on a body before it pulls it
+const SLOP = 10 // pixels that a resting finger may move
 
 export class Hands {
   /**
@@ -22,6 +27,7 @@ export class Hands {
     this.actions = actions
     this.pointers = new Map()
     this.pulled = null
+    this.resting = null // a finger that has not moved yet: {pointer, timer}
     this.abort = new AbortController()
     const { element } = view
     const on = (type, handler, options = {}) => element.addEventListener(type, handler, { signal: this.abort.signal, ...options })
@@ -29,6 +35,8 @@ export class Hands {
     on('pointermove', (event) => this.move(event))
     on('pointerup', (event) => this.up(event))
     on('pointercancel', (event) => this.up(event))
+    // What `touch-action` leaves to the page: no scrolling by a finger that pulls, nor by two.
+    on('touchmove', (event) => this.keepTouch(event), { passive: false })
     on('lostpointercapture', (event) => this.up(event))
     on('contextmenu', (event) => event.preventDefault())
     on('wheel', (event) => this.wheel(event), { passive: false })
@@ -44,15 +52,44 @@ export class Hands {
   down(event) {
     const { view } = this
     if (view.camera === null || event.button > 2) return
-    view.element.focus({ preventScroll: true })
+    const touch = event.pointerType === 'touch'
+    if (!touch) view.element.focus({ preventScroll: true })
     view.element.setPointerCapture(event.pointerId)
     this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY })
-    const pulling = event.button === 0 && (event.ctrlKey || event.shiftKey || event.metaKey)
-    if (!pulling || this.pointers.size > 1) return this.release()
-    const hit = view.pick(event.clientX, event.clientY)
+    this.rouse()
+    this.release()
+    if (this.pointers.size > 1) return
+    if (touch) this.rest(event)
+    else if (event.button === 0 && (event.ctrlKey || event.shiftKey || event.metaKey)) this.grab(event.pointerId)
+  }
+
+  /** Wait whether a finger stays where it is. */
+  rest({ pointerId }) {
+    const timer = setTimeout(() => {
+      this.resting = null
+      this.grab(pointerId)
+    }, HOLD)
+    this.resting = { pointer: pointerId, timer }
+  }
+
+  /** It does not. */
+  rouse() {
+    if (this.resting === null) return
+    clearTimeout(this.resting.timer)
+    this.resting = null
+  }
+
+  /** Take hold of the body under a pointer. */
+  grab(pointer) {
+    const place = this.pointers.get(pointer)
+    const hit = place === undefined ? null : this.view.pick(place.x, place.y)
     if (hit === null) return
-    this.pulled = { body: hit.body, point: hit.point, pointer: event.pointerId }
+    this.pulled = { body: hit.body, point: hit.point, pointer }
     this.actions.pull({ body: hit.body, point: hit.point, target: hit.point })
+  }
+
+  keepTouch(event) {
+    if (event.cancelable && (this.pulled !== null || event.touches.length > 1)) event.preventDefault()
   }
 
   move(event) {
@@ -60,11 +97,15 @@ export class Hands {
     if (last === undefined || this.view.camera === null) return
     const dx = event.clientX - last.x
     const dy = event.clientY - last.y
+    if (this.resting?.pointer === event.pointerId) {
+      if (Math.hypot(dx, dy) < SLOP) return
+      this.rouse()
+    }
     if (this.pulled?.pointer === event.pointerId) {
       const target = this.view.atDepth(event.clientX, event.clientY, this.pulled.point)
       this.actions.pull({ body: this.pulled.body, target })
     } else if (this.pointers.size === 2) this.pinch(event, last)
-    else this.orbit(dx, dy, (event.buttons & 2) !== 0 || (event.buttons & 4) !== 0)
+    else if (this.pointers.size === 1) this.orbit(dx, dy, (event.buttons & 2) !== 0 || (event.buttons & 4) !== 0)
     last.x = event.clientX
     last.y = event.clientY
     this.view.invalidate()
@@ -87,6 +128,10 @@ export class Hands {
   }
 
   up(event) {
+    if (this.resting?.pointer === event.pointerId) {
+      this.rouse()
+      if (event.type === 'pointerup') this.view.element.focus({ preventScroll: true })
+    }
     this.pointers.delete(event.pointerId)
     if (this.pulled?.pointer === event.pointerId) this.release()
   }
@@ -141,6 +186,7 @@ export class Hands {
   }
 
   dispose() {
+    this.rouse()
     this.abort.abort()
   }
 }

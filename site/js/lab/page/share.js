@@ -1,49 +1,87 @@
 /**
- * A state of a lab in the fragment of a link: `#lab=ID&s=TEXT`.
+ * A state of a lab in the fragment of a link: `#lab=ID&z=TEXT`.
  *
- * TEXT is base64url of JSON: `v` the values of the controls, `n` the steps since the reset, `t` the time (s), and `p` the whole
- * physics as base64 of 64-bit floats, where that is short enough for a link. Without `p` a link holds the controls only.
+ * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
+ * time in s), and after the line's end the whole physics as 64-bit floats, to the last bit. Where all this is too long for a link,
+ * the physics is left out, and it holds the controls only. A browser that cannot deflate writes `s=TEXT`, the content as it is; in
+ * older links that has the physics in the JSON, as base64 (`p`).
  */
 
-const LONGEST = 240 // numbers: a link of about 2.5 kB
+/** Letters of a link's text: what all browsers keep in an address, and most programs that pass it on. */
+export const LONGEST = 16_000
 
-/** @param {string} id @param {{values: unknown[], steps: number, time: number, physics: Float64Array}} state */
-export function writeLink(id, { values, steps, time, physics }) {
-  const content = { v: values, n: steps, t: time }
-  if (physics.length <= LONGEST) content.p = toBase64(new Uint8Array(physics.slice().buffer))
-  const text = toBase64(new TextEncoder().encode(JSON.stringify(content)))
-  return `#lab=${encodeURIComponent(id)}&s=${text.replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '')}`
+const LARGEST = 8 << 20 // bytes that a link may unfold to
+const LINE_END = 10
+
+/**
+ * @param {string} id
+ * @param {{values: unknown[], steps: number, time: number, physics: Float64Array}} state
+ * @returns {Promise<{link: string, whole: boolean}>} `whole`: the physics is in it
+ */
+export async function writeLink(id, { values, steps, time, physics }) {
+  const head = new TextEncoder().encode(`${JSON.stringify({ v: values, n: steps, t: time })}\n`)
+  const floats = new Uint8Array(physics.slice().buffer)
+  const all = new Uint8Array(head.length + floats.length)
+  all.set(head)
+  all.set(floats, head.length)
+  const whole = await field(all)
+  const fits = whole.length <= LONGEST
+  return { link: `#lab=${encodeURIComponent(id)}&${fits ? whole : await field(head)}`, whole: fits }
+}
+
+async function field(bytes) {
+  return typeof CompressionStream === 'function'
+    ? `z=${toBase64(await through(bytes, new CompressionStream('deflate-raw')))}`
+    : `s=${toBase64(bytes)}`
 }
 
 /**
- * Read a fragment; null if it is not of a lab or cannot be read.
+ * Read a fragment; null if it is not of a lab; without `state` if that cannot be read.
  *
  * @param {string} fragment
- * @returns {{id: string, state: {values: unknown[], steps: number, time: number, physics: Float64Array | null} | null} | null}
+ * @returns {Promise<{id: string, state: {values: unknown[], steps: number, time: number, physics: Float64Array | null} | null} | null>}
  */
-export function readLink(fragment) {
+export async function readLink(fragment) {
   if (!fragment.startsWith('#lab=')) return null
   const fields = new URLSearchParams(fragment.slice(1))
   const id = fields.get('lab')
-  const text = fields.get('s')
-  if (!text) return { id, state: null }
   try {
-    const bytes = fromBase64(text.replaceAll('-', '+').replaceAll('_', '/'))
-    const { v, n, t, p } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes))
-    if (!Array.isArray(v)) return { id, state: null }
-    const physics = typeof p === 'string' ? new Float64Array(fromBase64(p).buffer) : null
-    return { id, state: { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics } }
+    const [deflated, plain] = [fields.get('z'), fields.get('s')]
+    if (deflated) return { id, state: parse(await through(fromBase64(deflated), new DecompressionStream('deflate-raw'))) }
+    return { id, state: plain ? parse(fromBase64(plain)) : null }
   } catch {
     return { id, state: null }
   }
 }
 
+function parse(bytes) {
+  const end = bytes.includes(LINE_END) ? bytes.indexOf(LINE_END) : bytes.length
+  const { v, n, t, p } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
+  if (!Array.isArray(v)) return null
+  const floats = typeof p === 'string' ? fromBase64(p) : bytes.slice(end + 1)
+  const physics = floats.length > 0 ? new Float64Array(floats.buffer) : null
+  return { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
+}
+
+/** Bytes through a stream that deflates or inflates them. */
+async function through(bytes, stream) {
+  const chunks = []
+  let size = 0
+  const reader = new Blob([bytes]).stream().pipeThrough(stream).getReader()
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    chunks.push(part.value)
+    size += part.value.length
+    if (size > LARGEST) throw new RangeError('the link unfolds to too much')
+  }
+  return new Uint8Array(await new Blob(chunks).arrayBuffer())
+}
+
 function toBase64(bytes) {
   let text = ''
   for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096))
-  return btoa(text)
+  return btoa(text).replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '')
 }
 
 function fromBase64(text) {
-  return Uint8Array.from(atob(text), (character) => character.charCodeAt(0))
+  return Uint8Array.from(atob(text.replaceAll('-', '+').replaceAll('_', '/')), (character) => character.charCodeAt(0))
 }
