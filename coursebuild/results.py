@@ -7,8 +7,9 @@ and those that read them don't import each other.
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from coursebuild.model import Comparison, Recording
 from coursebuild.source import Span
@@ -244,6 +245,21 @@ class OutputFile:
 
     path: str
     data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class KeptFile:
+    """A file of the site that need not be made where it was published under the same key before."""
+
+    path: str
+    """Its path in the site (POSIX, relative)."""
+    key: str
+    """A hash of all that its bytes depend on."""
+    make: Callable[[], bytes]
+    """Gives its bytes; called at most once, and not at all where the published file is whole."""
+
+
+SiteFile: TypeAlias = OutputFile | KeptFile
 
 
 @dataclass(frozen=True, slots=True)

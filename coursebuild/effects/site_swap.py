@@ -6,7 +6,9 @@ for those who serve.
 1. The place is checked: never the project or what its author wrote, never a folder with files that
    we did not put there.
 2. What killed builds left beside it is removed; what a running build has there is not.
-3. Every file is written into a fresh folder beside the place, on the same file system.
+3. Every file is written into a fresh folder beside the place, on the same file system. One that was
+   published before under the same key, and is whole, is linked from the old site instead; where all
+   are, the old site stays.
 4. The two folders are exchanged in one step. Where the system cannot, the old one is renamed away
    and the new one renamed in; a build that was killed between the two is mended by `recover`.
 5. The old site is removed.
@@ -19,19 +21,21 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import os
 import secrets
 import shutil
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 from coursebuild.effects.exchange import exchange
 from coursebuild.effects.locks import is_abandoned, try_lock
-from coursebuild.results import OutputFile
+from coursebuild.effects.published import Entry, Published, write_published
+from coursebuild.results import OutputFile, SiteFile
 
 MARKER = ".coursebuild-site"
 """A file in every site: a line that says what it is, then the path of every file of the site."""
@@ -80,13 +84,16 @@ def check_out(root: Path, out: Path) -> Path:
     return place
 
 
-def publish(root: Path, out: Path, files: Iterable[OutputFile]) -> None:
+def publish(root: Path, out: Path, files: Iterable[SiteFile]) -> tuple[str, ...]:
     """Replace the site at `out` by these files.
 
     Args:
         root: the course folder.
         out: where the site goes; a link to a folder stays one.
         files: each path once; POSIX, relative, without `..`.
+
+    Returns:
+        The paths of the files that were written, sorted: the others are as they were.
 
     Raises:
         PublishRefusedError: a site must not go there.
@@ -95,12 +102,17 @@ def publish(root: Path, out: Path, files: Iterable[OutputFile]) -> None:
     """
     recover(out)
     place = check_out(root, out)
+    root = Path(os.path.realpath(root))
+    site = _Site(Published.read(root, place), tuple((file, _key(file)) for file in files))
+    if site.is_there():
+        return ()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         _clean(place)
         staging = _Staging.make(place)
         try:
-            _write_site(staging.path, files, _mode(place))
+            entries, made = site.write(staging.path)
+            staging.path.chmod(_mode(place))
             _swap(staging.path, place)
         finally:
             os.close(staging.fd)
@@ -109,6 +121,8 @@ def publish(root: Path, out: Path, files: Iterable[OutputFile]) -> None:
         _clean(place)
     except OSError as error:
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
+    write_published(root, place, entries)
+    return tuple(sorted(made))
 
 
 def recover(out: Path) -> None:
@@ -145,21 +159,76 @@ class _Staging:
             os.close(fd)
 
 
-def _write_site(folder: Path, files: Iterable[OutputFile], mode: int) -> None:
-    made = {""}
-    written: set[str] = set()
-    for file in files:
-        _check_path(file.path, written)
-        written.add(file.path)
-        parent = file.path.rpartition("/")[0]
-        if parent not in made:
-            _make_folders(folder, parent, made)
-        _write_file(folder / file.path, file.data)
-    _write_file(folder / MARKER, "\n".join([_HEADER, *sorted(written), ""]).encode())
-    folder.chmod(mode)
+def _key(file: SiteFile) -> str:
+    """What a file's bytes depend on; those that are there already, on nothing but themselves."""
+    if isinstance(file, OutputFile):
+        return "=" + hashlib.sha256(file.data).hexdigest()
+    return file.key
 
 
-def _check_path(path: str, written: set[str]) -> None:
+@dataclass(frozen=True, slots=True)
+class _Site:
+    """The site that is to be, and the one that is there."""
+
+    old: Published
+    files: tuple[tuple[SiteFile, str], ...]
+    """Each with its key."""
+
+    def is_there(self) -> bool:
+        """Whether it is there already, whole and with nothing beside it."""
+        paths = {file.path for file, _ in self.files}
+        if len(paths) != len(self.files) or paths != self.old.entries.keys():
+            return False
+        if not all(self.old.is_whole(file.path, key) for file, key in self.files):
+            return False
+        try:
+            found = [path for path in _files(self.old.place) if path != MARKER]
+            marker = (self.old.place / MARKER).read_bytes()
+        except OSError:
+            return False
+        return len(found) == len(paths) and paths.issuperset(found) and marker == _marker(paths)
+
+    def write(self, folder: Path) -> tuple[dict[str, Entry], list[str]]:
+        """Fill a folder; gives its record, and what is new in it."""
+        folders = {""}
+        entries: dict[str, Entry] = {}
+        made: list[str] = []
+        for file, key in self.files:
+            path = file.path
+            _check_path(path, entries)
+            parent = path.rpartition("/")[0]
+            if parent not in folders:
+                _make_folders(folder, parent, folders)
+            target = f"{folder}/{path}"
+            if not self._linked(path, key, target):
+                data = file.data if isinstance(file, OutputFile) else file.make()
+                _write_file(target, data)
+                made.append(path)
+            entries[path] = Entry.of(key, os.lstat(target))
+        _write_file(f"{folder}/{MARKER}", _marker(entries))
+        return entries, made
+
+    def _linked(self, path: str, key: str, target: str) -> bool:
+        """Link a file of the old site that is as it should be."""
+        if not self.old.is_whole(path, key):
+            return False
+        try:
+            os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
+        except (OSError, NotImplementedError):  # a file system without links, or too many of them
+            return False
+        # Somebody may have written to it since it was looked at, or may do so through a link of
+        # theirs: then it is made anew.
+        if self.old.is_whole(path, key):
+            return True
+        Path(target).unlink()
+        return False
+
+
+def _marker(paths: Iterable[str]) -> bytes:
+    return "\n".join([_HEADER, *sorted(paths), ""]).encode()
+
+
+def _check_path(path: str, written: Container[str]) -> None:
     parts = path.split("/")
     if (
         any(part in ("", ".", "..") for part in parts)
@@ -180,7 +249,7 @@ def _make_folders(folder: Path, path: str, made: set[str]) -> None:
     made.add(path)
 
 
-def _write_file(path: Path, data: bytes) -> None:
+def _write_file(path: str, data: bytes) -> None:
     fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
     try:
         rest = memoryview(data)

@@ -1,0 +1,231 @@
+"""Publishing again: what has the key it had, and is whole, is not made a second time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects.published import Published
+from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.results import KeptFile, OutputFile, SiteFile
+
+
+class Pages:
+    """Pages whose text is their key, and which were made."""
+
+    def __init__(self) -> None:
+        self.made: list[str] = []
+
+    def __call__(self, **keys: str) -> list[SiteFile]:
+        return [
+            KeptFile(f"{path}/index.html", key, self._make(path, key)) for path, key in keys.items()
+        ]
+
+    def _make(self, path: str, key: str) -> Callable[[], bytes]:
+        def make() -> bytes:
+            self.made.append(path)
+            return f"{path} {key}".encode()
+
+        return make
+
+
+def texts(folder: Path) -> dict[str, str]:
+    return {
+        p.relative_to(folder).as_posix(): p.read_text()
+        for p in folder.rglob("*")
+        if p.is_file() and p.name != MARKER
+    }
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "course").mkdir()
+    return tmp_path / "course"
+
+
+@pytest.fixture
+def pages() -> Pages:
+    return Pages()
+
+
+def test_only_what_has_another_key_is_made(root: Path, pages: Pages) -> None:
+    out = root / "public"
+    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html", "b/index.html")
+    assert publish(root, out, pages(a="1", b="2", c="1")) == ("b/index.html", "c/index.html")
+    assert pages.made == ["a", "b", "b", "c"]
+    assert texts(out) == {"a/index.html": "a 1", "b/index.html": "b 2", "c/index.html": "c 1"}
+    listed = (out / MARKER).read_text().split("\n")[1:-1]
+    assert listed == ["a/index.html", "b/index.html", "c/index.html"]
+
+
+def test_a_page_that_is_no_more_goes(root: Path, pages: Pages) -> None:
+    out = root / "public"
+    publish(root, out, pages(a="1", b="1"))
+    assert publish(root, out, pages(a="1")) == ()
+    assert texts(out) == {"a/index.html": "a 1"}
+    assert not (out / "b").exists()
+
+
+def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
+    out = root / "public"
+    both = [*pages(a="1"), OutputFile("x.css", b"x")]
+    publish(root, out, both)
+    before = out.stat().st_ino
+    assert publish(root, out, both) == ()
+    assert out.stat().st_ino == before
+    assert publish(root, out, [*pages(a="1"), OutputFile("x.css", b"y")]) == ("x.css",)
+    assert out.stat().st_ino != before
+    assert pages.made == ["a"]
+
+
+def edit(file: Path) -> None:
+    file.write_text("a 2")  # as long as it was
+
+
+def lengthen(file: Path) -> None:
+    with file.open("a") as opened:
+        opened.write("!")
+
+
+def remove(file: Path) -> None:
+    file.unlink()
+
+
+def replace(file: Path) -> None:
+    file.unlink()
+    file.write_text("a 1")
+
+
+def link(file: Path) -> None:
+    file.rename(file.parents[2] / "elsewhere")
+    file.symlink_to(file.parents[2] / "elsewhere")
+
+
+def folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+@pytest.mark.parametrize("change", [edit, lengthen, remove, replace, link, folder])
+def test_a_published_file_that_is_not_as_it_was_is_made_again(
+    root: Path, pages: Pages, change: Callable[[Path], None]
+) -> None:
+    out = root / "public"
+    publish(root, out, pages(a="1", b="1"))
+    file = out / "a/index.html"
+    before = file.stat()
+    change(file)
+    if file.exists() and change is not link:
+        os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns + 1))
+    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html",)
+    assert texts(out) == {"a/index.html": "a 1", "b/index.html": "b 1"}
+    assert not file.is_symlink()
+
+
+def test_a_file_somebody_put_there_by_our_marker_goes(root: Path, pages: Pages) -> None:
+    out = root / "public"
+    publish(root, out, pages(a="1"))
+    (out / "Thumbs.db").write_text("junk of a file manager")
+    assert publish(root, out, pages(a="1")) == ()
+    (out / MARKER).write_text((out / MARKER).read_text() + "b/index.html\n")
+    (out / "b").mkdir()
+    (out / "b/index.html").write_text("listed, so ours")
+    assert publish(root, out, pages(a="1")) == ()
+    assert texts(out) == {"a/index.html": "a 1"}
+
+
+@pytest.mark.parametrize("where", range(0, 200, 7))
+def test_a_damaged_record_is_not_believed(root: Path, pages: Pages, where: int) -> None:
+    out = root / "public"
+    publish(root, out, pages(a="1", b="1"))
+    [record] = (root / ".coursebuild/published").iterdir()
+    data = bytearray(record.read_bytes())
+    data[where % len(data)] ^= 1
+    record.write_bytes(data)
+    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html", "b/index.html")
+
+
+def test_a_cut_record_is_not_believed(root: Path, pages: Pages) -> None:
+    out = root / "public"
+    publish(root, out, pages(a="1"))
+    [record] = (root / ".coursebuild/published").iterdir()
+    whole = record.read_bytes()
+    for length in (0, 1, 64, 65, len(whole) - 1):
+        record.write_bytes(whole[:length])
+        assert Published.read(root, out).entries == {}
+    record.write_bytes(b"\xff" * 99)
+    assert Published.read(root, out).entries == {}
+
+
+def test_a_project_that_moves_with_its_site_keeps_it(tmp_path: Path, pages: Pages) -> None:
+    (tmp_path / "one").mkdir()
+    publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
+    (tmp_path / "one").rename(tmp_path / "two")
+    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ()
+    assert pages.made == ["a"]
+
+
+def test_a_site_that_was_copied_is_made_again(tmp_path: Path, pages: Pages) -> None:
+    """A copy's files are others, which nobody has looked at."""
+    (tmp_path / "one").mkdir()
+    publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
+    shutil.copytree(tmp_path / "one", tmp_path / "two")
+    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ("a/index.html",)
+
+
+def test_two_places_have_a_record_each(root: Path, tmp_path: Path, pages: Pages) -> None:
+    for out in (root / "public", root / "other", tmp_path / "outside"):
+        assert publish(root, out, pages(a="1")) == ("a/index.html",)
+    for out in (root / "public", root / "other", tmp_path / "outside"):
+        assert publish(root, out, pages(a="1")) == ()
+
+
+def test_a_file_system_without_links(
+    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish(root, root / "public", pages(a="1", b="1"))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "link", refuse)
+    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
+    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
+
+
+def test_a_file_changed_while_it_is_linked_is_made_again(
+    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish(root, root / "public", pages(a="1", b="1"))
+    really = os.link
+
+    def late(source: str, target: str, *, follow_symlinks: bool = True) -> None:
+        really(source, target, follow_symlinks=follow_symlinks)
+        Path(source).write_text("changed")
+
+    monkeypatch.setattr(os, "link", late)
+    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
+    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
+
+
+def test_a_failure_while_a_page_is_made_leaves_the_old_site(root: Path, pages: Pages) -> None:
+    publish(root, root / "public", pages(a="1", b="1"))
+
+    def broken() -> bytes:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        publish(root, root / "public", [*pages(a="1"), KeptFile("b/index.html", "2", broken)])
+    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 1"}
+    assert publish(root, root / "public", pages(a="1", b="1")) == ()
+
+
+def test_a_record_that_cannot_be_written_costs_only_time(root: Path, pages: Pages) -> None:
+    (root / ".coursebuild").write_text("in the way")
+    for _ in range(2):
+        assert publish(root, root / "public", pages(a="1")) == ("a/index.html",)
+    assert texts(root / "public") == {"a/index.html": "a 1"}
