@@ -13,8 +13,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
@@ -240,17 +238,58 @@ def available_cores() -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from coursebuild.pipeline.check import check
+    def work(options: Options) -> Report:
+        from coursebuild.pipeline.check import check
 
-    options = _options(arguments)
-    return _print(check(options, tuple(arguments.lessons)), arguments.format, options)
+        return check(options, tuple(arguments.lessons))
+
+    if arguments.format != "text":  # machines are told how long it took
+        options = _options(arguments)
+        return _print(work(options), arguments.format, options)
+    command = ("check", *arguments.lessons)
+    return _unless_unchanged(arguments, command, ("examples",), work)
 
 
 def _build(arguments: argparse.Namespace) -> int:
-    from coursebuild.pipeline.build import build
+    def work(options: Options) -> Report:
+        from pathlib import Path
 
+        from coursebuild.pipeline.build import build
+
+        return build(options, Path(arguments.out))
+
+    return _unless_unchanged(arguments, ("build", arguments.out), ("examples", arguments.out), work)
+
+
+def _unless_unchanged(
+    arguments: argparse.Namespace,
+    command: tuple[str, ...],
+    made: tuple[str, ...],
+    work: Callable[[Options], Report],
+) -> int:
+    """Do the work, unless all is as it was when it was last done and all was well.
+
+    `made` is what the command leaves behind. Nothing is imported before it is needed.
+    """
+    from coursebuild.effects.place import course_above
+    from coursebuild.effects.stamp import Watcher, unchanged
+
+    colour, columns = _look(sys.stdout)
+    command = (*command, str(arguments.quiet), str(colour), str(columns))
+    root = arguments.root or course_above(".")
+    said = unchanged(os.path.realpath(root), command) if root else None
+    if said is not None:
+        return _write(said, CLEAN)
     options = _options(arguments)
-    return _print(build(options, Path(arguments.out)), "text", options)
+    watcher = Watcher(str(options.root), command)
+    report = work(options)
+    status = _print(report, "text", options)
+    if report.ok and report.depends is not None:
+        from coursebuild.report import unchanged_report
+
+        remark = f"nothing has changed since the last {command[0]}"
+        watcher.keep(_text(unchanged_report(report, remark), options), report.depends, made)
+    return status
 
 
 def _update(arguments: argparse.Namespace) -> int:
@@ -286,21 +325,39 @@ def _print(report: Report, form: str, options: Options) -> int:
     from coursebuild.report import FORMATS, render_report
 
     status = CLEAN if report.ok else WRONG
-    if options.quiet and form == "text":
-        if not report.diagnostics:
-            return status
-        report = replace(report, scripts=(), remarks=())
+    if form == "text":
+        return _write(_text(report, options), status)
     chosen = next(known for known in FORMATS if known == form)
     return _write(render_report(report, chosen, _style(sys.stdout)), status)
 
 
-def _style(stream: TextIO | None) -> Style:
-    """Colour only on a terminal whose user does not ask for none (https://no-color.org)."""
+def _text(report: Report, options: Options) -> str:
+    """The report as it is printed: only what is wrong, where the user wants no more."""
+    from dataclasses import replace
+
+    from coursebuild.report import render_report
+
+    if options.quiet:
+        if not report.diagnostics:
+            return ""
+        report = replace(report, scripts=(), labs=(), remarks=())
+    return render_report(report, "text", _style(sys.stdout))
+
+
+def _look(stream: TextIO | None) -> tuple[bool, int]:
+    """Whether to colour, and how many columns there are.
+
+    Colour only on a terminal whose user does not ask for none (https://no-color.org).
+    """
+    if stream is None or not stream.isatty():
+        return False, 100
     import shutil
 
+    colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return colour, shutil.get_terminal_size((100, 24)).columns
+
+
+def _style(stream: TextIO | None) -> Style:
     from coursebuild.report import Style
 
-    if stream is None or not stream.isatty():
-        return Style()
-    colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    return Style(colour, shutil.get_terminal_size((100, 24)).columns)
+    return Style(*_look(stream))

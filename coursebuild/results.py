@@ -48,7 +48,7 @@ class ScriptJob:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What a script looked at while it ran: with its text and options, all that its result depends on.
+    """What a script looked at while it ran: all that its result depends on, beside its text.
 
     Project paths are POSIX and relative to the root. Each tuple is sorted, without repeats.
     """

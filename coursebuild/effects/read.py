@@ -21,10 +21,10 @@ from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
+from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
 from coursebuild.source import Source
 
-MAP = "content/course.toml"
 _OUTSIDE = "is reached through a link that leads out of the project"
 
 
@@ -58,10 +58,9 @@ def find_root(chosen: Path | None, start: Path) -> Path:
                 f"{chosen} is not a folder" if folder.exists() else f"there is no folder {chosen}"
             )
         return folder.resolve()
-    here = start.resolve()
-    for folder in (here, *here.parents):
-        if (folder / MAP).exists():
-            return folder
+    found = course_above(str(start))
+    if found is not None:
+        return Path(found)
     raise EffectError(
         f"there is no {MAP} in this folder or one above it",
         help="go to a course, or name one with `-C DIR`",

@@ -20,6 +20,7 @@ from coursebuild.effects.site_swap import check_out, publish
 from coursebuild.effects.store import kept
 from coursebuild.model import Course
 from coursebuild.pipeline.check import no_lessons
+from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.options import Options
@@ -79,6 +80,7 @@ def prepare(options: Options, progress: Progress) -> Prepared:
             files = _render(loaded.course, verified, options)
             found += _broken_links(files, loaded.course)
     report = _report(loaded, verified, found, time.monotonic() - began)
+    report = replace(report, depends=depends_on(loaded.course, verified.results))
     return Prepared(report, files if report.ok else ())
 
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.locks import project_lock
 from coursebuild.model import Course, Status
+from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
@@ -37,7 +39,7 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)
     found += _no_scripts(course, chosen, verified.scripts, found)
-    return judge(
+    report = judge(
         course,
         found,
         verified.scripts,
@@ -46,6 +48,7 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
         documents=chosen.documents,
         labs=verified.labs,
     )
+    return replace(report, depends=depends_on(course, verified.results))
 
 
 def no_lessons(course: Course) -> list[Diagnostic]:

@@ -16,6 +16,7 @@ from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
 from coursebuild.report.values import Summary as Summary
 from coursebuild.report.values import summary_line as summary_line
+from coursebuild.report.values import unchanged_report as unchanged_report
 
 Format: TypeAlias = Literal["text", "json", "junit", "sarif", "github"]
 FORMATS: tuple[Format, ...] = ("text", "json", "junit", "sarif", "github")

@@ -5,7 +5,7 @@ Entry point: `Report`; `summary_line(report)` is its last line as text.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from coursebuild.diagnostics import Diagnostic, Severity
 
@@ -70,11 +70,24 @@ class Report:
     remarks: tuple[str, ...] = ()
     """What was done, a line each, such as the files written."""
     labs: tuple[LabLine, ...] = ()
+    depends: tuple[str, ...] | None = None
+    """Files that all of this depends on beside those in the course's own folders, absolute or
+    relative to its root; `None` where they are not known."""
 
     @property
     def ok(self) -> bool:
         """Whether nothing is wrong (warnings do not count)."""
         return all(d.severity is not Severity.ERROR for d in self.diagnostics)
+
+
+def unchanged_report(report: Report, remark: str) -> Report:
+    """The same report, for a later run that found nothing changed and ran nothing."""
+    return replace(
+        report,
+        scripts=tuple(replace(line, cached=True) for line in report.scripts),
+        labs=tuple(replace(line, cached=True) for line in report.labs),
+        remarks=(remark,),
+    )
 
 
 def plural(count: int, noun: str) -> str:
