@@ -1,6 +1,6 @@
 """The versions of what runs the scripts, found without importing any of it.
 
-Entry points: `python_version`, `engine_version`.
+Entry points: `python_version`, `engine_version`, `package_version`.
 """
 
 from __future__ import annotations
@@ -28,3 +28,11 @@ def engine_version() -> str:
         raise EffectError(
             "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
         ) from None
+
+
+def package_version(name: str) -> str:
+    """Of an installed distribution; `none` where there is none."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "none"
