@@ -109,7 +109,9 @@ def root(tmp_path: Path) -> Path:
         "examples/long.py": "import time\ntime.sleep(60)\n",
         "examples/bytes.py": "import sys\nsys.stdout.buffer.write(b'\\xff')\n",
         "examples/kills.py": "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n",
-        "examples/mj.py": "import mujoco\nm = mujoco.MjModel\nprint(m.from_xml_path('models/m.xml').nq)\n",
+        "examples/mj.py": (
+            "import mujoco\nprint(mujoco.MjModel.from_xml_path('models/m.xml').nbody)\n"
+        ),
     }
     for path, text in texts.items():
         (root / path).parent.mkdir(parents=True, exist_ok=True)
