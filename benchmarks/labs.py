@@ -24,6 +24,7 @@ import http.server
 import json
 import os
 import platform
+import re
 import shutil
 import statistics
 import subprocess
@@ -46,6 +47,11 @@ PENDULUM = """<mujoco><option timestep="0.002" integrator="RK4"/><worldbody>
 <body pos="0 0 -.5"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".02"/>
 </body></body></worldbody>
 <keyframe><key qpos="2 0.5"/></keyframe></mujoco>"""
+
+
+def address(i: int, name: str) -> str:
+    """The name of a lesson's files."""
+    return f"1.{i}-{name.replace('_', '-')}"
 
 
 def chain(links: int) -> str:
@@ -116,7 +122,7 @@ def make_course(folder: Path) -> None:
     head = '[course]\ntitle = "Benchmark"\n[[level]]\nid = "1"\ntitle = "All"\n'
     (folder / "content" / "course.toml").write_text(head + entries)
     for i, name in enumerate(names):
-        path = folder / "content" / "lessons" / f"1.{i}-{name.replace('_', '-')}.md"
+        path = folder / "content" / "lessons" / f"{address(i, name)}.md"
         path.write_text(SCRIPT if i == 0 else LESSON.format(model=name))
     for name, text in MODELS.items():
         (folder / "models" / f"{name}.xml").write_text(text)
@@ -229,24 +235,31 @@ WORKER = """async (config) => {
   worker.onmessage = ({ data }) => {
     hear(data)
     // As a page does: the buffer goes back when the frame has been drawn.
-    if (data.type === 'frame') requestAnimationFrame(() => send({ type: 'frame', buffer: data.buffer }))
+    const back = () => send({ type: 'frame', buffer: data.buffer })
+    if (data.type === 'frame') requestAnimationFrame(back)
   }
   const ready = next(({ type }) => type === 'ready')
   send({ type: 'load', config: lab, module: at('module'), mjb: at('mjb'), wasm: at('wasm') })
   const { scene: { timestep } } = await ready
   send({ type: 'visible', on: true })
   send({ type: 'speed', factor: 1e6 })
-  const frame = (test) => next((data) => data.type === 'frame' && test(Math.round(data.time / timestep)))
+  const steps = ({ time }) => Math.round(time / timestep)
+  const frame = (test) => next((data) => data.type === 'frame' && test(steps(data)))
   window.pass = async (mode, n) => {
     const back = frame((made) => made === 0)
-    send({ type: 'pause' })
     send({ type: 'reset' })
     await back
     const there = frame((made) => made >= n)
     const began = performance.now()
     send({ type: mode, n })
-    const made = Math.round((await there).time / timestep)
-    return made / (performance.now() - began) * 1000
+    const made = steps(await there)
+    const speed = made / (performance.now() - began) * 1000
+    if (mode === 'play') {
+      const still = next(({ type }) => type === 'paused') // the others' turn
+      send({ type: 'pause' })
+      await still
+    }
+    return speed
   }
 }"""
 
@@ -293,12 +306,9 @@ def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
             (lab,) = (block for block in document.blocks if isinstance(block, Lab))
             mjb = saver.save(f"models/{name}.xml", text)
             page = browser.new_page()
-            page.goto(f"{url}/lessons/1.{i}-{name.replace('_', '-')}.html")
-            config = page.evaluate(
-                "new URL(document.querySelector('.lab').dataset.config, location).href"
-            )
             page.goto(f"{url}/lessons/1.0-plain.html")  # where nothing runs besides
-            page.evaluate(WORKER, config)
+            html = (folder / "public" / "lessons" / f"{address(i, name)}.html").read_text()
+            page.evaluate(WORKER, re.findall('data-config="([^"]+)"', html)[0])
             runners = [
                 Runner("native", native(text, steps)),
                 Runner("headless", headless(engine, lab, mjb, steps)),
@@ -319,7 +329,8 @@ def row(name: str, own: list[float], v8: list[float], *workers: list[float]) -> 
     line = f"  {name:<16}{statistics.median(own):10,.0f}"
     line += f"{statistics.median(v8):11,.0f} (x {ratio(v8, own):.2f})"
     for worker in workers:
-        line += f"{statistics.median(worker):11,.0f} (x {ratio(worker, own):.2f}, {ratio(worker, v8):.2f})"
+        line += f"{statistics.median(worker):11,.0f}"
+        line += f" (x {ratio(worker, own):.2f}, {ratio(worker, v8):.2f})"
     return line
 
 
@@ -402,8 +413,8 @@ def main() -> None:
                     print(line, flush=True)
             if arguments.only != "speed":
                 print("\npages")
-                for name, address in PAGES.items():
-                    print(page_cost(browser, f"{url}/lessons/{address}.html", name))
+                for name, page in PAGES.items():
+                    print(page_cost(browser, f"{url}/lessons/{page}.html", name))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -31,9 +32,13 @@ class _Terminated(KeyboardInterrupt):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the arguments name; gives the exit status."""
     before = _heed_sigterm()
+    collected = gc.get_threshold()
+    # What a command makes lives until its end, and hardly any of it is in cycles.
+    gc.set_threshold(200_000, 50, 50)
     try:
         return _main(arguments)
     finally:
+        gc.set_threshold(*collected)
         if before is not None:
             signal.signal(signal.SIGTERM, before)
 
@@ -139,6 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     check = _command(commands, "check", _check, "verify, publish nothing")
     _lessons(check)
     _format(check)
+    _parts(check)
     update = _command(commands, "update", _update, "bring recorded outputs up to date")
     _lessons(update)
     update.add_argument(
@@ -159,12 +165,46 @@ def _parser() -> argparse.ArgumentParser:
         default=8000,
         help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
     )
+    explain = commands.add_parser(
+        "explain",
+        help="say why something would run again, and what depends on it",
+        description="Say whether a script or lab would run again and why, and what depends on it.",
+        allow_abbrev=False,
+    )
+    explain.add_argument(
+        "path", metavar="PATH", help="a script, lesson, page, model, or any file of the project"
+    )
+    explain.add_argument(
+        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
+    )
+    explain.set_defaults(command=_explain, quiet=False)
     schema = commands.add_parser(
         "schema", help="print a JSON Schema for an editor", allow_abbrev=False
     )
     schema.add_argument("name", choices=("quiz", "lab", "course"))
     schema.set_defaults(command=_schema)
     return parser
+
+
+def _cache(parser: argparse.ArgumentParser) -> None:
+    """What is done with results that were made before."""
+    parser.add_argument(
+        "--cache",
+        metavar="PLACE",
+        default=None,
+        help="share results at a folder or an URL such as s3://… (default: $COURSEBUILD_CACHE)",
+    )
+    parser.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="run and make everything again, and keep the new results",
+    )
+    parser.add_argument(
+        "--cache-size",
+        default=None,
+        metavar="SIZE",
+        help="what .coursebuild may take, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)",
+    )
 
 
 def _command(
@@ -187,6 +227,7 @@ def _command(
             metavar="N",
             help="scripts at a time (default: one a core)",
         )
+        _cache(parser)
     return parser
 
 
@@ -208,6 +249,24 @@ def _format(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _parts(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--shard",
+        metavar="I/N",
+        help="run only the I-th of N parts of the scripts and labs, for several machines",
+    )
+    parser.add_argument(
+        "--timings",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="how long each takes, so that the parts take equally long; the same for each part",
+    )
+    parser.add_argument(
+        "--write-timings", metavar="FILE", help="write how long each takes into this file"
+    )
+
+
 def _jobs(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1024:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of jobs: a whole number from 1")
@@ -224,10 +283,15 @@ def _port(text: str) -> int:
 
 
 def _options(arguments: argparse.Namespace) -> Options:
-    from coursebuild.pipeline.options import Options, find_course
+    from coursebuild.pipeline.options import Options, find_course, open_store
 
     jobs = getattr(arguments, "jobs", None) or available_cores()
-    return Options(find_course(arguments.root), jobs, arguments.quiet)
+    root = find_course(arguments.root)
+    store = None
+    if hasattr(arguments, "cache"):
+        fresh = arguments.no_cache
+        store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
+    return Options(root, jobs, arguments.quiet, store)
 
 
 def available_cores() -> int:
@@ -240,10 +304,15 @@ def available_cores() -> int:
 def _check(arguments: argparse.Namespace) -> int:
     def work(options: Options) -> Report:
         from coursebuild.pipeline.check import check
+        from coursebuild.pipeline.shards import read_shard
 
-        return check(options, tuple(arguments.lessons))
+        part = read_shard(arguments.shard, arguments.timings)
+        lessons = tuple(arguments.lessons)
+        return check(options, lessons, shard=part, timings=arguments.write_timings)
 
-    if arguments.format != "text":  # machines are told how long it took
+    # Machines are told how long it took.
+    parts = arguments.shard or arguments.timings or arguments.write_timings
+    if arguments.format != "text" or parts:
         options = _options(arguments)
         return _print(work(options), arguments.format, options)
     command = ("check", *arguments.lessons)
@@ -277,7 +346,9 @@ def _unless_unchanged(
     colour, columns = _look(sys.stdout)
     command = (*command, str(arguments.quiet), str(colour), str(columns))
     root = arguments.root or course_above(".")
-    said = unchanged(os.path.realpath(root), command) if root else None
+    said = None
+    if root and not arguments.no_cache:
+        said = unchanged(os.path.realpath(root), command)
     if said is not None:
         return _write(said, CLEAN)
     options = _options(arguments)
@@ -311,8 +382,22 @@ def _extract(arguments: argparse.Namespace) -> int:
 def _serve(arguments: argparse.Namespace) -> int:
     from coursebuild.pipeline.serve import serve
 
-    serve(_options(arguments), arguments.port)
+    options = _options(arguments)
+    try:
+        serve(options, arguments.port)
+    finally:
+        options.store.close()
     return CLEAN
+
+
+def _explain(arguments: argparse.Namespace) -> int:
+    from coursebuild.pipeline.explain import explain
+    from coursebuild.report.explained import explained_json, explained_text
+
+    explanation = explain(_options(arguments), arguments.path)
+    if arguments.format == "json":
+        return _write(explained_json(explanation), CLEAN)
+    return _write(explained_text(explanation, _style(sys.stdout)), CLEAN)
 
 
 def _schema(arguments: argparse.Namespace) -> int:
@@ -325,6 +410,7 @@ def _print(report: Report, form: str, options: Options) -> int:
     from coursebuild.report import FORMATS, render_report
 
     status = CLEAN if report.ok else WRONG
+    options.store.close()
     if form == "text":
         return _write(_text(report, options), status)
     chosen = next(known for known in FORMATS if known == form)

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from coursebuild.rules import RULES
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -59,6 +59,8 @@ class Diagnostic:
     help: str = ""
     """How to mend it."""
     notes: tuple[Note, ...] = ()
+    edits: tuple[Edit, ...] = ()
+    """What would mend it, where that is certain enough to be offered."""
 
     @property
     def severity(self) -> Severity:
@@ -79,6 +81,7 @@ def diagnose(
     label: str = "",
     help: str = "",
     notes: Iterable[Note] = (),
+    edits: Iterable[Edit] = (),
 ) -> Diagnostic:
     """A diagnostic of a rule of the catalogue.
 
@@ -86,7 +89,7 @@ def diagnose(
     """
     if rule not in RULES:
         raise KeyError(f"no rule {rule!r} in the catalogue")
-    return Diagnostic(rule, span, message, label, help, tuple(notes))
+    return Diagnostic(rule, span, message, label, help, tuple(notes), tuple(edits))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from coursebuild.model import Comparison, Recording
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 
 class Outcome(enum.Enum):
@@ -183,7 +183,7 @@ class ModelFacts:
     sites: tuple[str, ...]
     body_names: tuple[str, ...]
     includes: tuple[str, ...] = ()
-    """Files that the model pulls in, relative to the project root."""
+    """Files that the model pulls in, relative to the project root; absolute if they lie outside."""
 
 
 @dataclass(frozen=True, slots=True)

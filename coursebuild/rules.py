@@ -6,8 +6,9 @@ Entry point: `RULES`, from name to `Rule`. `docs/rules.md` is written from it, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +160,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("script-killed", "error", "A script was ended by a signal."),
     ("script-output-limit", "error", "A script printed more than 1 MiB."),
     ("script-encoding", "error", "A script printed bytes that are not UTF-8."),
+    (
+        "script-unrepeatable",
+        "warning",
+        "A script run again does something else, with nothing changed that is known to count.",
+    ),
     ("script-silent", "error", "An output is recorded and the script printed nothing."),
     ("output-drift", "error", "A recorded output differs from what the script prints."),
     (
@@ -187,6 +193,12 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("lab-diverged", "error", "The simulation of a lab diverges."),
     ("lab-expect", "error", "A claim of a lab does not hold."),
     ("lab-parity", "error", "A lab runs otherwise in the browser's engine than natively."),
+    ("lab-reset", "warning", "A reset does not lead a lab back to where it started."),
+    (
+        "lab-shared",
+        "error",
+        "A lab changes what all labs of a page share: objects of JavaScript or of the engine.",
+    ),
     ("lab-timeout", "error", "A lab takes too long, or too much memory, to be tried."),
     (
         "lab-engine",

@@ -18,7 +18,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+
+from coursebuild.values import dataclass, field
 
 _NEWLINE = re.compile(r"\r\n|\r|\n")
 

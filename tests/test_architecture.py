@@ -15,6 +15,7 @@ PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
+    frozenset({"values"}),
     frozenset({"source"}),
     frozenset({"rules"}),
     frozenset({"diagnostics"}),

@@ -1,22 +1,41 @@
 """Checks of a whole course: values in, diagnostics out.
 
-Entry point: `check_course(course)`, everything that can be known before anything runs;
-`check_compiled` and `check_formulas` for what MuJoCo and the typesetter said.
+Entry points: `check_course(course)`, everything that can be known before anything runs, and
+`check_document`, the same for one document; `check_compiled` and `check_formulas` for what MuJoCo
+and the typesetter said.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from coursebuild.checks.compiled import check_compiled as check_compiled
 from coursebuild.checks.compiled import mjcf_texts as mjcf_texts
 from coursebuild.checks.formulas import check_formulas as check_formulas
 from coursebuild.checks.formulas import course_formulas as course_formulas
-from coursebuild.checks.labs import check_labs
-from coursebuild.checks.links import check_links
-from coursebuild.checks.quizzes import check_quizzes
+from coursebuild.checks.formulas import document_formulas as document_formulas
+from coursebuild.checks.formulas import formula_findings as formula_findings
+from coursebuild.checks.labs import check_labs, lab_findings
+from coursebuild.checks.links import Places as Places
+from coursebuild.checks.links import check_links, document_links
+from coursebuild.checks.links import places as places
+from coursebuild.checks.quizzes import check_quizzes, quiz_findings
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Course
+from coursebuild.model import Course, Document, Script, document_blocks
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
     """Links, mentions, quizzes and labs, checked against each other."""
     return (*check_links(course), *check_quizzes(course), *check_labs(course))
+
+
+def check_document(
+    course: Course, document: Document, known: Places, scripts: Mapping[str, Script]
+) -> tuple[Diagnostic, ...]:
+    """What `check_course` finds in one document, given what the rest of the course offers.
+
+    Only that another document has a quiz of the same id goes unseen.
+    """
+    blocks = tuple(document_blocks(document))
+    links = document_links(course, document, known)
+    return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course))

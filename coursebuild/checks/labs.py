@@ -1,15 +1,16 @@
 """Labs against the course: the kind exists, the model exists.
 
-Entry point: `check_labs(course)`. Names inside a model (keyframes, sites) are checked where the
-compiled model is known (`checks.compiled`).
+Entry points: `check_labs(course)`; `lab_findings`, for some blocks. Names inside a model
+(keyframes, sites) are checked where the compiled model is known (`checks.compiled`).
 """
 
 from __future__ import annotations
 
 import posixpath
+from collections.abc import Iterable
 
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.model import Course, Lab, document_blocks
+from coursebuild.model import Block, Course, Lab, document_blocks
 
 
 def lab_kinds(course: Course) -> frozenset[str]:
@@ -29,29 +30,32 @@ def lab_kinds(course: Course) -> frozenset[str]:
 
 def check_labs(course: Course) -> tuple[Diagnostic, ...]:
     """Unknown kinds and models."""
+    blocks = (block for document in course.documents for block in document_blocks(document))
+    return lab_findings(blocks, course)
+
+
+def lab_findings(blocks: Iterable[Block], course: Course) -> tuple[Diagnostic, ...]:
+    """The same for the labs among some blocks."""
     kinds = lab_kinds(course)
     models = {model.name for model in course.models}
     found: list[Diagnostic] = []
-    for document in course.documents:
-        for lab in document_blocks(document):
-            if not isinstance(lab, Lab):
-                continue
-            if lab.kind not in kinds:
-                found.append(
-                    diagnose(
-                        "lab-kind",
-                        lab.kind_span,
-                        f"no kind of lab is called `{lab.kind}`",
-                        help=did_you_mean(lab.kind, kinds),
-                    )
+    for lab in (block for block in blocks if isinstance(block, Lab)):
+        if lab.kind not in kinds:
+            found.append(
+                diagnose(
+                    "lab-kind",
+                    lab.kind_span,
+                    f"no kind of lab is called `{lab.kind}`",
+                    help=did_you_mean(lab.kind, kinds),
                 )
-            if lab.model is not None and lab.model not in models and lab.model_span is not None:
-                found.append(
-                    diagnose(
-                        "lab-model",
-                        lab.model_span,
-                        f"no model `{lab.model}` in models/",
-                        help=did_you_mean(lab.model, models),
-                    )
+            )
+        if lab.model is not None and lab.model not in models and lab.model_span is not None:
+            found.append(
+                diagnose(
+                    "lab-model",
+                    lab.model_span,
+                    f"no model `{lab.model}` in models/",
+                    help=did_you_mean(lab.model, models),
                 )
+            )
     return tuple(found)

@@ -1,6 +1,6 @@
 """Links and mentions of the sources: every one leads somewhere.
 
-Entry point: `check_links(course)`.
+Entry points: `check_links(course)`; `document_links`, for one document.
 
 1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
    each document.
@@ -12,7 +12,6 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
@@ -41,6 +40,7 @@ from coursebuild.model import (
     walk_inlines,
 )
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
 
@@ -100,22 +100,33 @@ def check_links(course: Course) -> tuple[Diagnostic, ...]:
     known_anchors: dict[str, frozenset[str]] = {}
 
     def anchors_of(document: Document) -> frozenset[str]:
-        return known_anchors.setdefault(document.source.path, anchors(document))
+        path = document.source.path
+        if path not in known_anchors:
+            known_anchors[path] = anchors(document)
+        return known_anchors[path]
 
-    found: list[Diagnostic] = []
-    for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, HtmlBlock):
-                found += _check_html(block.span, document, anchors_of)
-            for inline in walk_inlines(block_inlines(block)):
-                if isinstance(inline, Link):
-                    target = resolve(inline.target, course, document.source.path)
-                    found += _check_link(inline, target, document, known, anchors_of)
-                elif isinstance(inline, Image):
-                    found += _check_image(inline, document, known)
-                elif isinstance(inline, RawInline):
-                    found += _check_html(inline.span, document, anchors_of)
-    return tuple(found)
+    return tuple(
+        diagnostic
+        for document in course.documents
+        for diagnostic in document_links(course, document, known, anchors_of)
+    )
+
+
+def document_links(
+    course: Course, document: Document, known: Places, anchors_of: AnchorsOf = anchors
+) -> Iterator[Diagnostic]:
+    """The same for one document, by what the course offers."""
+    for block in document_blocks(document):
+        if isinstance(block, HtmlBlock):
+            yield from _check_html(block.span, document, anchors_of)
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Link):
+                target = resolve(inline.target, course, document.source.path)
+                yield from _check_link(inline, target, document, known, anchors_of)
+            elif isinstance(inline, Image):
+                yield from _check_image(inline, document, known)
+            elif isinstance(inline, RawInline):
+                yield from _check_html(inline.span, document, anchors_of)
 
 
 def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterator[Diagnostic]:

@@ -1,14 +1,14 @@
 """Quizzes across the course: ids are unique, `output` questions name a script of the course.
 
-Entry point: `check_quizzes(course)`.
+Entry points: `check_quizzes(course)`; `quiz_findings`, for some blocks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Course, OutputQuestion, Quiz, Script, document_blocks
+from coursebuild.model import Block, Course, OutputQuestion, Quiz, Script, document_blocks
 from coursebuild.results import Outcome, ScriptRun
 
 
@@ -16,6 +16,11 @@ def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
     """Repeated ids, and output questions about scripts that nothing runs."""
     blocks = [block for document in course.documents for block in document_blocks(document)]
     scripts = {block.path: block for block in blocks if isinstance(block, Script)}
+    return quiz_findings(blocks, scripts)
+
+
+def quiz_findings(blocks: Iterable[Block], scripts: Mapping[str, Script]) -> tuple[Diagnostic, ...]:
+    """The same for the quizzes among some blocks, by the scripts of the course."""
     seen: dict[str, Quiz] = {}
     found: list[Diagnostic] = []
     for quiz in (block for block in blocks if isinstance(block, Quiz)):
@@ -35,7 +40,7 @@ def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
     return tuple(found)
 
 
-def _output_questions(quiz: Quiz, scripts: dict[str, Script]) -> Iterator[Diagnostic]:
+def _output_questions(quiz: Quiz, scripts: Mapping[str, Script]) -> Iterator[Diagnostic]:
     for question in quiz.questions:
         if not isinstance(question, OutputQuestion):
             continue

@@ -15,17 +15,16 @@ A manifest that is lost or damaged only makes the tool more careful.
 from __future__ import annotations
 
 import contextlib
-import difflib
 import enum
 import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.effects.write import remove_leftovers, resolve_inside, write_atomic
+from coursebuild.values import dataclass
 
 FOLDER = "examples"
 MANIFEST = f"{FOLDER}/.extracted.json"
@@ -226,6 +225,8 @@ class _Update:
 
 def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:
     """The difference of two texts as `diff -u` writes it; empty if there is none."""
+    import difflib
+
     return "".join(
         line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
         for line in difflib.unified_diff(_lines(old), _lines(new), old_name, new_name)

@@ -90,8 +90,8 @@ class LabEngine:
             self.close()
             return self._ended("engine", [], f"the trial broke: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
-        if any(failure["kind"] == "engine" for failure in reply["failures"]):
-            self.close()  # what ended in the middle of something cannot be trusted with the rest
+        if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
+            self.close()  # what ended or was changed cannot be trusted with the rest
         return reply
 
     def _ended(self, kind: str, entry: list[str | int], message: str) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Compiling MJCF with MuJoCo itself, in a child process.
 
-Entry points: `compile_all`, `compile_models`, `compile_texts`; `readable_error`, for people.
+Entry points: `compile_all`, `compile_models`, `compile_texts`; `model_files`, what a model is made
+of; `readable_error`, for people.
 
 1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
@@ -12,18 +13,20 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from coursebuild.effects import mjcf_worker
 from coursebuild.effects.child import JsonChild
+from coursebuild.effects.mujoco_files import ModelFiles
 from coursebuild.model import MjcfModel
 from coursebuild.results import CompileResult, ModelFacts
 
 TIMEOUT = 60.0
 """Seconds that one model may take; large meshes take some."""
 _TEXT_NAME = ".coursebuild-text.xml"
-"""What a text would be called in `models/`; no file has this name."""
+TEXT_PATH = f"models/{_TEXT_NAME}"
+"""Where a text would stand; no file has this name."""
 
 
 def compile_all(
@@ -32,14 +35,14 @@ def compile_all(
     """Compile models of the course and texts as if they stood in `models/`, all in one child.
 
     Returns:
-        A result for each model, and one for each text; the facts of a text list no includes.
+        A result for each model, and one for each text.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
     """
     root = root.resolve()
-    jobs = [(root / model.source.path, model.source.text, True) for model in models]
-    jobs += [(root / "models" / _TEXT_NAME, text, False) for text in texts]
+    jobs = [(model.source.path, model.source.text) for model in models]
+    jobs += [(TEXT_PATH, text) for text in texts]
     if not jobs:
         return (), ()
     with _Compiler(root, timeout) as compiler:
@@ -69,19 +72,18 @@ class _Compiler(JsonChild):
         self.root = root
         self.timeout = timeout
 
-    def compile(self, path: Path, text: str, on_disk: bool) -> CompileResult:
+    def compile(self, path: str, text: str) -> CompileResult:
         request: mjcf_worker.Request = {
-            "path": str(path),
+            "path": str(self.root / path),
             "text": text,
             "limit": self.timeout,
-            "on_disk": on_disk,
         }
         reply: mjcf_worker.Reply | None = self.ask(request)
         if reply is None:
             return CompileResult(f"MuJoCo's compiler {self.death()}")
         facts = reply["facts"]
         if facts is not None:
-            return CompileResult("", facts=self._facts(facts))
+            return CompileResult("", facts=_facts(facts, parts(self.root, path, text)))
         message = self._without_paths(reply["error"].strip())
         return CompileResult(message, error_line(message, text))
 
@@ -90,27 +92,54 @@ class _Compiler(JsonChild):
         message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
         return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
 
-    def _facts(self, facts: mjcf_worker.Facts) -> ModelFacts:
-        root = os.path.realpath(self.root)
-        includes = sorted({Path(os.path.realpath(f)) for f in facts["files"]})
-        return ModelFacts(
-            bodies=facts["bodies"],
-            geoms=facts["geoms"],
-            joints=facts["joints"],
-            nq=facts["nq"],
-            nv=facts["nv"],
-            nu=facts["nu"],
-            timestep=facts["timestep"],
-            integrator=facts["integrator"],
-            total_mass=facts["total_mass"],
-            keyframes=tuple(facts["keyframes"]),
-            sites=tuple(facts["sites"]),
-            body_names=tuple(facts["body_names"]),
-            includes=tuple(
-                f.relative_to(root).as_posix() if f.is_relative_to(root) else f.as_posix()
-                for f in includes
-            ),
-        )
+
+def _facts(facts: mjcf_worker.Facts, parts: Iterable[str]) -> ModelFacts:
+    return ModelFacts(
+        bodies=facts["bodies"],
+        geoms=facts["geoms"],
+        joints=facts["joints"],
+        nq=facts["nq"],
+        nv=facts["nv"],
+        nu=facts["nu"],
+        timestep=facts["timestep"],
+        integrator=facts["integrator"],
+        total_mass=facts["total_mass"],
+        keyframes=tuple(facts["keyframes"]),
+        sites=tuple(facts["sites"]),
+        body_names=tuple(facts["body_names"]),
+        includes=tuple(parts),
+    )
+
+
+def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
+    """Every file that MuJoCo looks for when it compiles a text, besides that of the text itself.
+
+    Those that are not there are among them: it would compile something else if they were.
+
+    Args:
+        root: the course folder.
+        path: where the text stands, or would, relative to it.
+        text: the model.
+
+    Returns:
+        Paths relative to the root, or absolute where they lie outside, sorted.
+    """
+    found: set[str] = set()
+    ModelFiles(re, found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
+    inside = {_from_root(root, file) for file in found}
+    # MuJoCo puts absolute paths one behind the other; nothing is there, on any machine.
+    nowhere = f"{root}/".lstrip("/")
+    return tuple(sorted(file for file in inside if file != path and nowhere not in file[1:]))
+
+
+def parts(root: Path, path: str, text: str) -> tuple[str, ...]:
+    """Those of the `model_files` that are there."""
+    return tuple(file for file in model_files(root, path, text) if (root / file).is_file())
+
+
+def _from_root(root: Path, file: str) -> str:
+    full = Path(os.path.normpath(file))
+    return full.relative_to(root).as_posix() if full.is_relative_to(root) else full.as_posix()
 
 
 _LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)

@@ -9,7 +9,6 @@ by SIGALRM.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
@@ -30,8 +29,6 @@ class Request(TypedDict):
     text: str
     limit: float
     """Seconds."""
-    on_disk: bool
-    """Whether there is a file at the path, so that its dependencies can be listed."""
 
 
 class Facts(TypedDict):
@@ -49,8 +46,6 @@ class Facts(TypedDict):
     keyframes: list[str]
     sites: list[str]
     body_names: list[str]
-    files: list[str]
-    """Absolute paths of the other files that it consists of."""
 
 
 class Reply(TypedDict):
@@ -93,19 +88,14 @@ def _compile(mujoco: Any, request: Request) -> Reply:
         model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
     except (ValueError, mujoco.FatalError, MemoryError) as error:
         return {"error": str(error) or type(error).__name__, "facts": None}
-    return {"error": "", "facts": _facts(mujoco, model, path if request["on_disk"] else None)}
+    return {"error": "", "facts": _facts(mujoco, model)}
 
 
-def _facts(mujoco: Any, model: Any, path: str | None) -> Facts:
+def _facts(mujoco: Any, model: Any) -> Facts:
     def names(addresses: Any) -> list[str]:
         blob: bytes = model.names
         return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]
 
-    files: list[str] = []
-    if path is not None:
-        # It reads the file again, which somebody may have broken since.
-        with contextlib.suppress(ValueError, mujoco.FatalError):
-            files = [f for f in mujoco.mju_getXMLDependencies(path) if f != path]
     return {
         "bodies": model.nbody - 1,
         "geoms": model.ngeom,
@@ -119,7 +109,6 @@ def _facts(mujoco: Any, model: Any, path: str | None) -> Facts:
         "keyframes": names(model.name_keyadr),
         "sites": names(model.name_siteadr),
         "body_names": names(model.name_bodyadr[1:]),
-        "files": files,
     }
 
 

@@ -71,6 +71,9 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
     run = request["run"]
     Path(_MODEL).write_bytes(base64.b64decode(request["mjb"]))
     model = mujoco.MjModel.from_binary_path(_MODEL)
+    no_reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    flags = model.opt.disableflags
+    model.opt.disableflags = flags & ~no_reset if run["autoreset"] else flags | no_reset
     data = mujoco.MjData(model)
     signature = run["signature"]
     mujoco.mj_setState(model, data, _array(numpy, run["start"]), signature)

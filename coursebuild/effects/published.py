@@ -13,12 +13,11 @@ import contextlib
 import hashlib
 import os
 import stat
-import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from coursebuild.effects.locks import make_private_folder
+from coursebuild.values import dataclass, field
 
 _FOLDER = "published"
 
@@ -82,9 +81,9 @@ def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> No
         make_private_folder(root / ".coursebuild")
         path = _file(root, place)
         path.parent.mkdir(exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
+        name = f"{path.parent}/.new-{os.urandom(8).hex()}"
         try:
-            with os.fdopen(handle, "wb") as file:
+            with open(name, "xb") as file:  # noqa: PTH123
                 file.write(data)
             Path(name).replace(path)
         except BaseException:

@@ -16,7 +16,6 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
@@ -24,6 +23,7 @@ from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
 from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
 from coursebuild.source import Source
+from coursebuild.values import dataclass
 
 _OUTSIDE = "is reached through a link that leads out of the project"
 

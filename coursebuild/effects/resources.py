@@ -1,7 +1,7 @@
 """Where the files lie that come with the tool and are not Python.
 
 Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`,
-for the pages' templates; `bundled_files` and `template_texts` read them whole.
+for the pages' templates; `bundled_files` and `template_texts` read them whole, `Bundle` one by one.
 
 In an installed package both are inside it. In a source tree they are where they are made:
 `site/dist` and `templates`.
@@ -9,6 +9,7 @@ In an installed package both are inside it. In a source tree they are where they
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError
@@ -37,12 +38,35 @@ def templates_dir() -> Path:
 
 def bundled_files() -> tuple[tuple[str, bytes], ...]:
     """Every bundled file by path relative to `assets_dir()`, sorted."""
-    folder = assets_dir()
-    return tuple(
-        (path.relative_to(folder).as_posix(), path.read_bytes())
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != "stamp.json"
-    )
+    return tuple((name, path.read_bytes()) for name, path in _bundled(assets_dir()))
+
+
+class Bundle(Mapping[str, bytes]):
+    """The bundled files by path relative to `assets_dir()`, sorted; read when asked for."""
+
+    def __init__(self) -> None:
+        self._folder = assets_dir()
+        self._paths: dict[str, Path] | None = None
+
+    def __getitem__(self, path: str) -> bytes:
+        return self._found()[path].read_bytes()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found())
+
+    def __len__(self) -> int:
+        return len(self._found())
+
+    def _found(self) -> dict[str, Path]:
+        if self._paths is None:
+            self._paths = dict(_bundled(self._folder))
+        return self._paths
+
+
+def _bundled(folder: Path) -> Iterator[tuple[str, Path]]:
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.name != "stamp.json":
+            yield path.relative_to(folder).as_posix(), path
 
 
 def template_texts() -> tuple[tuple[str, str], ...]:

@@ -1,9 +1,12 @@
 """Running the lessons' scripts, each in a process, a session and an environment of its own.
 
-Entry point: `run_scripts`.
+Entry points: `run_scripts`; `ScriptServer`, which stays warm between runs.
 
-1. `parallel` supervisors are started (see `supervisor`), and given one script after another.
-2. What they report becomes a `ScriptRun` each: UTF-8 is decoded, CRLF becomes LF.
+1. A server imports, once, the packages that the scripts import (see `forkserver`), and forks
+   `parallel` supervisors, which fork the scripts. Where that cannot be, supervisors are started and
+   start an interpreter for each script (see `supervisor`); the results are the same.
+2. The supervisors are given one script after another; what they report becomes a `ScriptRun` each:
+   UTF-8 is decoded, CRLF becomes LF.
 3. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
    they run and exit.
 
@@ -18,59 +21,22 @@ import json
 import os
 import selectors
 import signal
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from types import TracebackType
+from typing import Self, TypeAlias
 
 from coursebuild.effects import supervisor
 from coursebuild.effects.errors import EffectError, reason
-from coursebuild.results import Outcome, ScriptJob, ScriptRun
-
-_PASSED_ON = (
-    "PATH",
-    "HOME",
-    "USER",
-    "LOGNAME",
-    "LD_LIBRARY_PATH",
-    "DYLD_LIBRARY_PATH",
-    "DYLD_FALLBACK_LIBRARY_PATH",
-    "VIRTUAL_ENV",
-    "CONDA_PREFIX",
-    "CUDA_HOME",
-    "CUDA_PATH",
-    "CUDA_VISIBLE_DEVICES",
-    "NVIDIA_VISIBLE_DEVICES",
-    "NVIDIA_DRIVER_CAPABILITIES",
-    "MUJOCO_GL",
-    "MUJOCO_EGL_DEVICE_ID",
-    "PYOPENGL_PLATFORM",
-    "SYSTEMROOT",
-    "SYSTEMDRIVE",
-)
-_FIXED = {
-    "LC_ALL": "C.UTF-8",
-    "LANG": "C.UTF-8",
-    "TZ": "UTC",
-    "PYTHONUTF8": "1",
-    "PYTHONIOENCODING": "utf-8",
-    "PYTHONHASHSEED": "0",
-    "PYTHONDONTWRITEBYTECODE": "1",
-    # A crash, and a script that is stopped after its time limit, say where they were.
-    "PYTHONFAULTHANDLER": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
-    "BLIS_NUM_THREADS": "1",
-    "NUMEXPR_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
-    "NO_COLOR": "1",
-    "TERM": "dumb",
-    "MPLBACKEND": "Agg",
-}
+from coursebuild.effects.notes import Notes
+from coursebuild.effects.surroundings import clean_environment as clean_environment
+from coursebuild.effects.surroundings import library_folder, wanted_packages
+from coursebuild.effects.watching import STDERR_KEPT
+from coursebuild.effects.workers import ForkServer, ServerLostError, Worker, spawn_worker
+from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +67,18 @@ def run_scripts(
     *,
     parallel: int,
     on_event: Callable[[RunEvent], None] | None = None,
+    order: Sequence[int] | None = None,
+    fork: bool = True,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts; those marked `norun` are not, and cause no event.
 
     Args:
         root: the course folder, which becomes the working directory.
-        jobs: what to run, started in this order.
+        jobs: what to run.
         parallel: how many at a time, at least 1.
         on_event: is told of every start and end, in this thread. What it raises ends the run.
+        order: indices of jobs in the order of their start; without it they start as they stand.
+        fork: let a server fork the scripts, where it can.
 
     Returns:
         What each did, in the order of the jobs.
@@ -116,68 +86,149 @@ def run_scripts(
     Raises:
         EffectError: there is no place for temporary files.
     """
-    work = _Work(root.resolve(), jobs, on_event or (lambda event: None))
-    if not work.waiting:
+    with ScriptServer(fork=fork) as server:
+        return server.run(root, jobs, parallel=parallel, on_event=on_event, order=order)
+
+
+class ScriptServer:
+    """Runs scripts, again and again: what they import stays imported in a process apart.
+
+    The process is started when scripts are first run; a new one takes its place when it has died,
+    when packages of other versions were installed, and when the environment is another one.
+    """
+
+    def __init__(self, *, fork: bool = True) -> None:
+        self._fork = fork and sys.platform == "linux"
+        self._server: ForkServer | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the process."""
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+
+    def run(
+        self,
+        root: Path,
+        jobs: Sequence[ScriptJob],
+        *,
+        parallel: int,
+        on_event: Callable[[RunEvent], None] | None = None,
+        order: Sequence[int] | None = None,
+    ) -> tuple[ScriptRun, ...]:
+        """As `run_scripts`; one run at a time."""
+        work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order)
+        if not work.waiting:
+            return work.results()
+        with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
+            work.scratch = _scratch()
+            stack.callback(supervisor.remove_folder, work.scratch)
+            for _ in range(min(max(parallel, 1), len(work.waiting))):
+                self._start(stack, selector, work)
+            while selector.get_map():
+                for key, _ in selector.select():
+                    worker: Worker = key.data
+                    if work.hear(worker):
+                        continue
+                    selector.unregister(worker)
+                    if worker.jobs is not None:  # it did not end because nothing is left
+                        worker.dismiss()
+                        if work.waiting:
+                            self._start(stack, selector, work)
         return work.results()
-    with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
-        work.scratch = _scratch()
-        stack.callback(supervisor.remove_folder, work.scratch)
-        for _ in range(min(max(parallel, 1), len(work.waiting))):
-            _start(stack, selector, work)
-        while selector.get_map():
-            for key, _ in selector.select():
-                worker: _Worker = key.data
-                if worker.read(work):
-                    continue
-                selector.unregister(worker.output)
-                if not worker.stopped():
-                    _start(stack, selector, work)
-    return work.results()
 
+    def _start(
+        self, stack: contextlib.ExitStack, selector: selectors.BaseSelector, work: _Work
+    ) -> None:
+        worker = self._worker(work)
+        stack.callback(worker.close)
+        selector.register(worker, selectors.EVENT_READ, worker)
+        work.next(worker)
 
-def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:
-    """The environment of scripts, but for their TMPDIR, given the one that the tool runs in."""
-    return {name: outer[name] for name in _PASSED_ON if name in outer} | _FIXED
-
-
-def _start(stack: contextlib.ExitStack, selector: selectors.BaseSelector, work: _Work) -> None:
-    worker = _Worker(work.environment)
-    stack.callback(worker.close)
-    selector.register(worker.output, selectors.EVENT_READ, worker)
-    worker.next(work)
+    def _worker(self, work: _Work) -> Worker:
+        for _ in range(2):  # a server that dies while it is asked is replaced once
+            if not self._fork:
+                break
+            if self._server is not None and not self._server.usable(work.environment):
+                self.close()
+            if self._server is None:
+                self._server = ForkServer(work.environment)
+            try:
+                self._server.load(work.packages())
+                return self._server.worker(work.scratch)
+            except ServerLostError:
+                self.close()
+        return spawn_worker(work.environment)
 
 
 class _Work:
     """What is to be done, and what is done."""
 
     def __init__(
-        self, root: Path, jobs: Sequence[ScriptJob], tell: Callable[[RunEvent], None]
+        self,
+        root: Path,
+        jobs: Sequence[ScriptJob],
+        tell: Callable[[RunEvent], None],
+        order: Sequence[int] | None,
     ) -> None:
         self.root = root
         self.jobs = jobs
         self.tell = tell
         self.environment = clean_environment(os.environ)
-        self.library = _library()
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
             for i, job in enumerate(jobs)
             if job.norun
         }
-        self.waiting = [i for i in range(len(jobs)) if i not in self.runs]
+        self.waiting = [i for i in order or range(len(jobs)) if i not in self.runs]
         self.total = len(self.waiting)
         self.done = 0
+        self._packages: tuple[str, ...] | None = None
 
-    def take(self) -> int | None:
-        """The next job's index."""
+    def packages(self) -> tuple[str, ...]:
+        """What is worth importing before."""
+        if self._packages is None:
+            self._packages = wanted_packages(self.root / self.jobs[i].path for i in self.waiting)
+        return self._packages
+
+    def next(self, worker: Worker) -> None:
+        """Hand over the next job, or let the supervisor go."""
         if not self.waiting:
-            return None
+            worker.dismiss()
+            return
         index = self.waiting.pop(0)
         self.tell(RunStarted(self.jobs[index].path, self.total))
-        return index
+        worker.give(index, self._message(self.jobs[index]))
 
-    def message(self, index: int) -> bytes:
-        job = self.jobs[index]
+    def hear(self, worker: Worker) -> bool:
+        """Take what a supervisor says; `False` when it is gone."""
+        if not worker.read():
+            if worker.job is not None:
+                index, worker.job = worker.job, None
+                self._finish(index, _lost(self.jobs[index].path, worker.status()))
+            return False
+        if worker.job is not None and (report := worker.take_report()) is not None:
+            index, worker.job = worker.job, None
+            self._finish(index, _script_run(self.jobs[index].path, *report))
+            self.next(worker)
+        return True
+
+    def results(self) -> tuple[ScriptRun, ...]:
+        return tuple(self.runs[i] for i in range(len(self.jobs)))
+
+    def _message(self, job: ScriptJob) -> bytes:
         request: supervisor.Job = {
             "root": str(self.root),
             "path": job.path,
@@ -186,106 +237,24 @@ class _Work:
             "requires": list(job.requires),
             "environment": self.environment,
             "scratch": self.scratch,
-            "library": self.library,
+            "library": library_folder(),
         }
-        data = json.dumps(request).encode()
-        return supervisor.LENGTH.pack(len(data)) + data
+        return json.dumps(request).encode()
 
-    def finish(self, index: int, run: ScriptRun) -> None:
+    def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
         self.done += 1
         self.tell(RunFinished(run, self.done, self.total))
 
-    def results(self) -> tuple[ScriptRun, ...]:
-        return tuple(self.runs[i] for i in range(len(self.jobs)))
 
-
-class _Worker:
-    """A supervisor, seen from here."""
-
-    def __init__(self, environment: Mapping[str, str]) -> None:
-        self.job: int | None = None
-        self.buffer = bytearray()
-        self.process = subprocess.Popen(
-            # -E and -P: its search path is a script's, without the script's folder.
-            [sys.executable, "-E", "-P", supervisor.__file__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=0,
-            env=dict(environment),
-            start_new_session=True,  # Ctrl-C is for this process, which then ends it
-        )
-        assert self.process.stdin is not None and self.process.stdout is not None
-        self.input = self.process.stdin
-        self.output = self.process.stdout
-
-    def next(self, work: _Work) -> None:
-        """Hand over the next job, or let the supervisor go."""
-        self.job = work.take()
-        if self.job is None:
-            self.input.close()
-            return
-        message = memoryview(work.message(self.job))
-        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
-            while message:
-                message = message[self.input.write(message) :]
-
-    def read(self, work: _Work) -> bool:
-        """Take what the supervisor says; `False` when it is gone."""
-        data = self.output.read(1 << 16)
-        if not data:
-            if self.job is not None:
-                index, self.job = self.job, None
-                work.finish(index, _lost(work.jobs[index].path, self.process.wait()))
-            return False
-        self.buffer += data
-        report = _parse(self.buffer)
-        if report is not None and self.job is not None:
-            index, self.job = self.job, None
-            self.buffer.clear()
-            work.finish(index, _script_run(work.jobs[index].path, *report))
-            self.next(work)
-        return True
-
-    def stopped(self) -> bool:
-        """Whether it ended because there was nothing more to do."""
-        return self.input.closed
-
-    def close(self) -> None:
-        """Let it kill what it runs, and wait for that."""
-        with contextlib.suppress(OSError):
-            self.input.close()
-        try:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self.process.wait(10.0)
-        finally:
-            self.output.close()
-            self.process.kill()  # if it is still there; on Linux the script dies with it
-            self.process.wait()
-
-
-def _parse(buffer: bytearray) -> tuple[supervisor.Report, bytes, bytes] | None:
-    """A whole report and its two texts, if the buffer holds them."""
-    size = supervisor.LENGTH.size
-    if len(buffer) < size:
-        return None
-    (length,) = supervisor.LENGTH.unpack(buffer[:size])
-    at = size + length
-    if len(buffer) < at:
-        return None
-    report: supervisor.Report = json.loads(buffer[size:at])
-    end = at + report["stdout"]
-    if len(buffer) < end + report["stderr"]:
-        return None
-    return report, bytes(buffer[at:end]), bytes(buffer[end:])
-
-
-def _script_run(path: str, report: supervisor.Report, out: bytes, err: bytes) -> ScriptRun:
+def _script_run(
+    path: str, report: supervisor.Report, out: bytes, err: bytes, trace: bytes
+) -> ScriptRun:
     stdout, is_text = _decode(out)
     outcome, status = _outcome(report)
     if outcome is Outcome.OK and not is_text:
         outcome = Outcome.ENCODING
-    if len(err) == supervisor.STDERR_KEPT:
+    if len(err) == STDERR_KEPT:
         err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
     return ScriptRun(
         path,
@@ -295,6 +264,17 @@ def _script_run(path: str, report: supervisor.Report, out: bytes, err: bytes) ->
         _decode(err)[0],
         report["seconds"],
         missing=tuple(report["missing"]),
+        trace=_trace(json.loads(trace)) if trace else None,
+    )
+
+
+def _trace(notes: Notes) -> Trace:
+    return Trace(
+        files=tuple(notes["files"]),
+        folders=tuple(notes["folders"]),
+        outside=tuple(notes["outside"]),
+        modules=tuple(notes["modules"]),
+        opaque=notes["opaque"],
     )
 
 
@@ -339,8 +319,3 @@ def _scratch() -> str:
         return tempfile.mkdtemp(prefix="coursebuild-")
     except OSError as error:
         raise EffectError(f"there is no place for temporary files: {reason(error)}") from None
-
-
-def _library() -> str:
-    """The folder that holds the package `mjcourse` that came with this tool."""
-    return str(Path(__file__).resolve().parents[2])

@@ -1,32 +1,33 @@
-"""The preview's web server: serves a site from memory and tells open pages when it changed.
+"""The preview's web server: serves a site from memory and tells open pages what is new.
 
 Entry point: `PreviewServer`.
 
 1. It listens on the loopback interface only and answers only requests that name it as their host,
    so that a page elsewhere cannot read the preview through a name that it points here.
-2. Files come from a mapping that is replaced whole, so a page never sees half a build. Nothing is
-   read from disk.
-3. Pages get one script more, which listens to `/.coursebuild/events`: `reload` after a build,
-   `problems` with the diagnostics when something is wrong. The last good site stays.
+2. Files come from a `PreviewSite`, which decides what there is; nothing is read from disk here.
+3. Pages get one script and one style sheet more. The script listens to `/.coursebuild/events`:
+   `page` says which state of the page there is now, `news` what is to be said beside its text.
+   A listener is told how things stand when it begins, so that nothing is lost by one that was away.
+4. What an author accepts in a page comes by `POST /.coursebuild/accept`, with a token that only a
+   page of this server can know.
 """
 
 from __future__ import annotations
 
-import contextlib
+import hashlib
 import json
 import posixpath
-import queue
+import re
+import secrets
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from html import escape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
-from urllib.parse import unquote, urlsplit
-
-from coursebuild.results import OutputFile
+from typing import Any, Protocol
+from urllib.parse import parse_qs, unquote, urlsplit
 
 PREFIX = "/.coursebuild/"
-_TAG = b'<script src="/.coursebuild/preview.js"></script>'
 _TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -53,23 +54,54 @@ _TYPES = {
 _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
 """
+_LASTING = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
+_LARGEST = 1 << 16
+"""Bytes of a request's body."""
+_NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
+
+
+class PreviewSite(Protocol):
+    """What is served."""
+
+    changed: threading.Condition
+    """Notified when `version` grows."""
+
+    @property
+    def version(self) -> int:
+        """Grows with everything that a page may be told."""
+
+    def find(self, path: str) -> bytes | None:
+        """A file, by its path in the site."""
+
+    def base(self) -> str:
+        """The path under which the published site will be, with a slash at both ends."""
+
+    def expected(self, path: str) -> bool:
+        """Whether there is a page that cannot be shown yet."""
+
+    def news(self, path: str) -> str:
+        """What a page is told, as JSON in one line."""
+
+    def accept(self, path: str, id: str) -> str:
+        """Write what a page offers under an id; gives why not, or nothing."""
 
 
 class PreviewServer:
-    """Serves the site on `127.0.0.1:port`; port 0 takes any free one."""
+    """Serves a site on `127.0.0.1:port`; port 0 takes any free one."""
 
-    def __init__(self, port: int, script: bytes) -> None:
-        self._files: Mapping[str, bytes] = {}
-        self._problems = ""
-        self._version = 0
-        self._listeners: set[queue.SimpleQueue[tuple[str, str] | None]] = set()
-        self._lock = threading.Lock()
-        self._script = script
+    def __init__(self, port: int, site: PreviewSite, own: Mapping[str, bytes]) -> None:
+        """`own` are the preview's files, by name: `preview.js`, `preview.css`."""
+        self.site = site
+        self.own = own
+        self.tool = digest(b"".join(own.values()))
+        self.token = secrets.token_urlsafe(18)
+        self.ended = False
         self._server = _Server(("127.0.0.1", port), _Handler)
         self._server.preview = self
         self._thread = threading.Thread(
-            target=self._server.serve_forever, name="preview", daemon=True
+            target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, name="preview"
         )
+        self._thread.daemon = True
 
     @property
     def port(self) -> int:
@@ -87,67 +119,72 @@ class PreviewServer:
 
     def stop(self) -> None:
         """End all event streams and stop answering."""
-        with self._lock:
-            for listener in self._listeners:
-                listener.put(None)
+        self.ended = True
+        if self.site.changed.acquire(timeout=1.0):  # whoever holds it longer is no reason to wait
+            self.site.changed.notify_all()
+            self.site.changed.release()
         self._server.shutdown()
         self._server.server_close()
 
-    def publish(self, files: Iterable[OutputFile]) -> None:
-        """Serve these files from now on, and have open pages load again."""
-        self._files = {file.path: file.data for file in files}
-        self._problems = ""
-        self._version += 1
-        self._tell("reload", str(self._version))
-
-    def problems(self, text: str) -> None:
-        """Keep the last good site, and show what is wrong over it."""
-        self._problems = text
-        self._tell("problems", json.dumps(text))
-
-    def _tell(self, event: str, data: str) -> None:
-        with self._lock:
-            for listener in self._listeners:
-                listener.put((event, data))
-
     # --- what the handler asks
-
-    def listen(self) -> queue.SimpleQueue[tuple[str, str] | None]:
-        """A queue of events, beginning with the state as it is now."""
-        events: queue.SimpleQueue[tuple[str, str] | None] = queue.SimpleQueue()
-        with self._lock:
-            events.put(("hello", str(self._version)))
-            if self._problems:
-                events.put(("problems", json.dumps(self._problems)))
-            self._listeners.add(events)
-        return events
-
-    def leave(self, events: queue.SimpleQueue[tuple[str, str] | None]) -> None:
-        """Forget a listener."""
-        with self._lock:
-            self._listeners.discard(events)
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
         """Status, content type and bytes of an address path."""
-        if path == f"{PREFIX}preview.js":
-            return HTTPStatus.OK, _TYPES[".js"], self._script
-        name = unquote(path).lstrip("/")
-        if name == "" or name.endswith("/"):
-            name += "index.html"
-        status = HTTPStatus.OK
-        files = self._files
-        data = files.get(name)
-        if data is None:
-            status, name = HTTPStatus.NOT_FOUND, "404.html"
-            data = files.get(
-                name,
-                b"<!DOCTYPE html><html lang=en><title>Preview</title><p>Nothing is built yet.</p>",
-            )
-        kind = _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
-        if kind.startswith("text/html"):
-            head, end, tail = data.rpartition(b"</body>")
-            data = head + _TAG + end + tail if end else data + _TAG
-        return status, kind, data
+        own = self.own.get(path.removeprefix(PREFIX)) if path.startswith(PREFIX) else None
+        if own is not None:
+            return HTTPStatus.OK, _type_of(path), own
+        name, data = self._file(path)
+        if data is not None and not name.endswith(".html"):
+            return HTTPStatus.OK, _type_of(name), data
+        if data is not None:
+            return HTTPStatus.OK, _type_of(name), _tagged(data, name, digest(data))
+        if self.site.expected(name):
+            text = b"This page cannot be shown before its mistakes are mended."
+            return HTTPStatus.OK, _TYPES[".html"], _tagged(_NOTHING % text, name, "")
+        missing = self.site.find("404.html")
+        if missing is None:
+            missing = _NOTHING % b"Nothing is built yet."
+        return HTTPStatus.NOT_FOUND, _TYPES[".html"], _tagged(missing, name, "")
+
+    def _file(self, path: str) -> tuple[str, bytes | None]:
+        """The path in the site that an address means, and what is there.
+
+        The page for missing addresses names everything from the root of the host, where the
+        published site may lie in a folder.
+        """
+        base = self.site.base()
+        names = [path.lstrip("/")]
+        if path.startswith(base):
+            names.append(path.removeprefix(base))
+        found = [
+            unquote(name) + ("index.html" if not name or name.endswith("/") else "")
+            for name in names
+        ]
+        for name in found:
+            data = self.site.find(name)
+            if data is not None:
+                return name, data
+        return found[0], None
+
+
+def digest(data: bytes | None) -> str:
+    """By which two states of a page are told apart; empty where there is no page."""
+    return "" if data is None else hashlib.sha256(data).hexdigest()[:16]
+
+
+def _type_of(name: str) -> str:
+    return _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
+
+
+def _tagged(page: bytes, name: str, state: str) -> bytes:
+    """The page with what the preview adds to it."""
+    about = f'data-page="{escape(name)}" data-state="{state}"'
+    tags = (
+        f'<link rel="stylesheet" href="{PREFIX}preview.css">'
+        f'<script src="{PREFIX}preview.js" {about}></script>'
+    ).encode("utf-8", "replace")
+    head, end, tail = page.rpartition(b"</body>")
+    return head + tags + end + tail if end else page + tags
 
 
 class _Server(ThreadingHTTPServer):
@@ -164,25 +201,44 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server: _Server
     timeout = 60
+    # Without it each answer's body waits for the acknowledgement of its head.
+    wbufsize = -1
+    disable_nagle_algorithm = True
 
     def do_GET(self) -> None:
         """Answer with a file, or with the stream of events."""
         try:
-            path = urlsplit(self.path).path
+            parts = urlsplit(self.path)
+            path, query = parts.path, parse_qs(parts.query)
         except ValueError:
-            path = ""  # no address of a page
+            path, query = "", {}  # no address of a page
         if not self._trusted():
-            self._send(
-                HTTPStatus.FORBIDDEN,
-                "text/plain; charset=utf-8",
-                b"this preview answers only on this machine\n",
-            )
+            self._refuse()
         elif path == f"{PREFIX}events":
-            self._events()
+            self._events(query.get("page", ["index.html"])[0])
         else:
             self._send(*self.server.preview.find(path))
 
     do_HEAD = do_GET
+
+    def do_POST(self) -> None:
+        """Accept what a page offers."""
+        preview = self.server.preview
+        body = self._body()
+        given = self.headers.get("X-Coursebuild-Token", "")
+        if self.path != f"{PREFIX}accept":
+            self._say(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is accepted here")
+        elif not (self._trusted() and self.headers.get("Origin")):
+            self._refuse()
+        elif not secrets.compare_digest(given.encode(), preview.token.encode()):
+            self._say(HTTPStatus.FORBIDDEN, "this page is older than the preview; load it again")
+        else:
+            wanted = _wanted(body)
+            if wanted is None:
+                self._say(HTTPStatus.BAD_REQUEST, "the request cannot be read")
+            else:
+                why = preview.site.accept(*wanted)
+                self._say(HTTPStatus.CONFLICT if why else HTTPStatus.OK, why)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not news."""
@@ -197,17 +253,37 @@ class _Handler(BaseHTTPRequestHandler):
             origin is None or origin.lower().removeprefix("http://") in hosts
         )
 
+    def _body(self) -> bytes:
+        """The body of a request; of one that is too long, or does not say how long, nothing."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > _LARGEST:
+            self.close_connection = True
+            return b""
+        return self.rfile.read(int(length))
+
+    def _refuse(self) -> None:
+        text = b"this preview answers only on this machine\n"
+        self._send(HTTPStatus.FORBIDDEN, "text/plain; charset=utf-8", text)
+
+    def _say(self, status: HTTPStatus, message: str) -> None:
+        self._send(status, _TYPES[".json"], json.dumps({"message": message}).encode())
+
     def _send(self, status: HTTPStatus, kind: str, data: bytes) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
-        self.send_header("Cache-Control", "no-store")
+        # What has a hash of its content in its name may be kept: fonts are there without a flash.
+        lasting = status is HTTPStatus.OK and _LASTING.fullmatch(self.path)
+        kept = "max-age=31536000, immutable" if lasting else "no-store"
+        self.send_header("Cache-Control", kept)
         self.send_header("X-Content-Type-Options", "nosniff")
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(data)
 
-    def _events(self) -> None:
+    # --- the stream of events
+
+    def _events(self, page: str) -> None:
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream; charset=utf-8")
         self.send_header("Cache-Control", "no-store")
@@ -216,20 +292,47 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         if self.command == "HEAD":
             return
-        events = self.server.preview.listen()
         try:
-            while True:
-                try:
-                    event = events.get(timeout=_HEARTBEAT)
-                except queue.Empty:
-                    self.wfile.write(b": still here\n\n")
-                else:
-                    if event is None:
-                        return
-                    self.wfile.write(f"event: {event[0]}\ndata: {event[1]}\n\n".encode())
-                self.wfile.flush()
-        except OSError:
+            self._follow(page)
+        except OSError:  # the browser has gone
             return
-        finally:
-            with contextlib.suppress(Exception):
-                self.server.preview.leave(events)
+
+    def _follow(self, page: str) -> None:
+        preview, site = self.server.preview, self.server.preview.site
+        self._tell("hello", json.dumps({"tool": preview.tool, "token": preview.token}))
+        seen, state, news = -1, None, None
+
+        def stir() -> bool:
+            return preview.ended or site.version != seen
+
+        while True:
+            with site.changed:
+                stirred = site.changed.wait_for(stir, _HEARTBEAT)
+                seen = site.version
+            if preview.ended:
+                return
+            now = digest(site.find(page))
+            if now != state:
+                state, news = now, None  # whoever takes the page is told again what belongs to it
+                self._tell("page", json.dumps(now))
+            latest = site.news(page)
+            if latest != news:
+                news = latest
+                self._tell("news", latest)
+            if not stirred:
+                self.wfile.write(b": still here\n\n")
+                self.wfile.flush()
+
+    def _tell(self, event: str, data: str) -> None:
+        self.wfile.write(f"event: {event}\ndata: {data}\n\n".encode("utf-8", "replace"))
+        self.wfile.flush()
+
+
+def _wanted(body: bytes) -> tuple[str, str] | None:
+    """The page and the id of what is accepted."""
+    try:
+        asked = json.loads(body)
+        page, id = asked["page"], asked["id"]
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return None
+    return (page, id) if isinstance(page, str) and isinstance(id, str) else None

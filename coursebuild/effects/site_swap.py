@@ -23,12 +23,10 @@ import contextlib
 import errno
 import hashlib
 import os
-import secrets
 import shutil
 import stat
 import unicodedata
 from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
@@ -36,6 +34,7 @@ from coursebuild.effects.exchange import exchange
 from coursebuild.effects.locks import is_abandoned, try_lock
 from coursebuild.effects.published import Entry, Published, write_published
 from coursebuild.results import OutputFile, SiteFile
+from coursebuild.values import dataclass
 
 MARKER = ".coursebuild-site"
 """A file in every site: a line that says what it is, then the path of every file of the site."""
@@ -146,7 +145,7 @@ class _Staging:
     @classmethod
     def make(cls, place: Path) -> _Staging:
         while True:
-            path = place.with_name(f".{place.name}.new-{secrets.token_hex(4)}")
+            path = place.with_name(f".{place.name}.new-{os.urandom(4).hex()}")
             path.mkdir(0o700)
             try:
                 fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -266,7 +265,7 @@ def _swap(staging: Path, place: Path) -> None:
         if os.path.lexists(place):
             if exchange(staging, place):
                 return
-            old = place.with_name(f".{place.name}.old-{secrets.token_hex(4)}")
+            old = place.with_name(f".{place.name}.old-{os.urandom(4).hex()}")
             with contextlib.suppress(FileNotFoundError):  # another build is between its two renames
                 place.rename(old)
         try:

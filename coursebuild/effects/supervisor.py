@@ -1,6 +1,7 @@
-"""The child process that runs scripts for `runner` and sees to it that nothing stays behind.
+"""The process that runs scripts for `runner` and sees to it that nothing stays behind.
 
-Entry point: run as a file by `runner`; it imports nothing but the standard library.
+Entry points: `work`, in a process that `forkserver` has forked; or run as a file by `runner`, where
+there is no fork server. It imports nothing but the standard library.
 
 It runs one script after another, each in a session of its own, so that
 
@@ -9,44 +10,43 @@ It runs one script after another, each in a session of its own, so that
 2. when the tool dies, by whatever signal, this process sees its input close and kills what runs;
 3. when this process dies, the system kills the script (Linux).
 
-It has one thread, so that it may act between fork and exec.
+It has one thread, so that it may act between fork and exec, and fork without an exec.
 
-The protocol: on standard input JSON objects (`Job`), each after its length in 4 bytes; on standard
-output for each one JSON object (`Report`) after its length, and then the bytes of the script's
-output and of the end of its error output.
+The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
+one JSON object (`Report`) after its length, and then the bytes of the script's output, of the end
+of its error output and of its trace.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
-import importlib
-import importlib.machinery
+import functools
+import itertools
 import json
 import os
-import select
 import shutil
 import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Literal, TypedDict
+from typing import Literal, Protocol, TypedDict
 
-STDOUT_LIMIT = 1 << 20
-"""Bytes that a script may print."""
-STDERR_KEPT = 1 << 16
-"""Bytes of its error output that are kept, from the end."""
-GRACE = 0.5
-"""Seconds between asking a script that ran too long where it is, and killing it."""
+from coursebuild.effects.notes import Notes, read_notes
+from coursebuild.effects.required import missing_modules
+from coursebuild.effects.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched
+
 LENGTH = struct.Struct(">I")
 
+_WARM = str(Path(__file__).with_name("warm"))
+_NOTES = ".notes"
+"""What the folder of a script's notes is called, after its temporary folder."""
+_COUNTER = itertools.count()
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _PR_SET_CHILD_SUBREAPER = 36
-_CHUNK = 1 << 16
 
 
 class Job(TypedDict):
@@ -79,34 +79,118 @@ class Report(TypedDict):
     stdout: int
     """Length in bytes."""
     stderr: int
+    trace: int
+    """Length in bytes of the `Notes` as JSON; 0 where nobody watched."""
+
+
+class Forker(Protocol):
+    """Makes a copy of this process that becomes a script."""
+
+    def can_run(self, job: Job) -> bool:
+        """Whether the copy would be what a fresh interpreter is to this script."""
+        ...
+
+    def fork(self, job: Job, environment: Mapping[str, str], notes: str) -> Launched | None:
+        """The copy, which has its pipes and its session; `None` in the copy itself.
+
+        `notes` is a folder that is made where there is much to note of what the script looks at.
+        """
+        ...
+
+
+class Slot:
+    """One supervisor: where its jobs come from and its reports go to."""
+
+    def __init__(
+        self, jobs: int, reports: int, forker: Forker | None = None, *, has_library: bool
+    ) -> None:
+        self.jobs = jobs
+        self.reports = reports
+        self.forker = forker
+        self.has_library = has_library
+        self.awake, wake = os.pipe()
+        os.set_blocking(self.awake, False)
+        os.set_blocking(wake, False)
+        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+        prctl(_PR_SET_CHILD_SUBREAPER, 1)
+        os.chdir("/")
+        self.scratch = ""
+
+    def work(self) -> bool:
+        """Serve until the input closes: `False`; `True` in a process that is to become a script."""
+        while (message := _receive(self.jobs)) is not None:
+            job: Job = json.loads(message)
+            self.scratch = job["scratch"]
+            answer = self._serve(job)
+            if answer is None:
+                return True
+            _send(self.reports, json.dumps(answer[0]).encode(), *answer[1:])
+        return False
+
+    def _serve(self, job: Job) -> tuple[Report, bytes, bytes, bytes] | None:
+        missing = missing_modules(
+            job["requires"], Path(job["root"], job["path"]).parent, job["library"]
+        )
+        if missing:
+            return _report("missing", missing=missing), b"", b"", b""
+        if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
+            return _unstartable(f"there is no file {job['path']}\n")
+        environment = dict(job["environment"])
+        if not self.has_library:
+            environment["PYTHONPATH"] = job["library"]
+        folder, forked = "", False
+        try:
+            start = time.monotonic()
+            try:
+                folder = _temporary(job["scratch"])
+                launched = self._launch(job, environment | {"TMPDIR": folder})
+            except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
+                return _unstartable(f"the script cannot be started: {error}\n")
+            if launched is None:
+                forked = True
+                return None
+            run = Watched(launched, start, job["timeout"], self.awake)
+            try:
+                run.watch(self.jobs)
+            finally:
+                run.end()
+            return _finished(run, launched.notes)
+        finally:
+            if folder and not forked:
+                remove_folder(folder)
+                remove_folder(folder + _NOTES)
+
+    def _launch(self, job: Job, environment: Mapping[str, str]) -> Launched | None:
+        for argument in job["args"]:
+            if b"\0" in os.fsencode(argument):
+                raise ValueError("embedded null byte")
+        if self.forker is not None and self.forker.can_run(job):
+            return self.forker.fork(job, environment, environment["TMPDIR"] + _NOTES)
+        return _spawn(job, environment)
 
 
 def main() -> None:
-    """Serve until the input closes."""
-    reply = os.dup(1)
+    """Serve the process that started this one, by standard input and output."""
+    reports = os.dup(1)
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)  # whatever prints here must not end up between the reports
     os.close(null)
-    prctl(_PR_SET_CHILD_SUBREAPER, 1)
-    awake, wake = os.pipe()
-    os.set_blocking(awake, False)
-    os.set_blocking(wake, False)
-    signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
-    signal.signal(signal.SIGCHLD, lambda *_: None)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    os.chdir("/")
-    scratch, tool = "", os.getppid()
+    tool = os.getppid()
+    slot = Slot(0, reports, has_library=library_is_installed())
     try:
-        while (message := _receive(0)) is not None:
-            job: Job = json.loads(message)
-            scratch = job["scratch"]
-            report, stdout, stderr = _serve(job, awake)
-            _send(reply, json.dumps(report).encode(), stdout, stderr)
+        slot.work()
     finally:
         # While the tool lives the folder is its own: another supervisor may be about to use it.
-        if scratch and os.getppid() != tool:
+        if slot.scratch and os.getppid() != tool:
             with contextlib.suppress(OSError):  # others still use it
-                Path(scratch).rmdir()
+                Path(slot.scratch).rmdir()
+
+
+def library_is_installed() -> bool:
+    """Whether scripts find `mjcourse` without being told where."""
+    return not missing_modules(["mjcourse"], None, "")
 
 
 def prctl(option: int, value: int) -> None:
@@ -119,178 +203,46 @@ def _libc() -> ctypes.CDLL:
     return ctypes.CDLL(None)
 
 
-def _serve(job: Job, awake: int) -> tuple[Report, bytes, bytes]:
-    missing = missing_modules(
-        job["requires"], Path(job["root"], job["path"]).parent, job["library"]
-    )
-    if missing:
-        return _report("missing", missing=missing), b"", b""
-    if not Path(job["root"], job["path"]).is_file():
-        text = f"there is no file {job['path']}\n"
-        return _report("unstartable", status=2, stderr=text), b"", text.encode()
-    environment = dict(job["environment"])
-    if missing_modules(["mjcourse"], None, ""):
-        environment["PYTHONPATH"] = job["library"]
-    folder = ""
-    try:
-        try:
-            folder = _temporary(job["scratch"])
-            run = _Run(job, environment | {"TMPDIR": folder}, awake)
-        except (OSError, ValueError) as error:  # a ValueError: an argument holds a null character
-            text = f"the script cannot be started: {error}\n"
-            return _report("unstartable", status=2, stderr=text), b"", text.encode()
-        try:
-            run.watch()
-        finally:
-            run.end()
-        return run.report(), bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
-    finally:
-        if folder:
-            remove_folder(folder)
-
-
 def _temporary(scratch: str) -> str:
     """A fresh folder in `scratch`, which another supervisor may have found empty and removed."""
     while True:
+        folder = f"{scratch}/{os.getpid()}-{next(_COUNTER)}"
         try:
-            return tempfile.mkdtemp(prefix="", dir=scratch)
+            os.mkdir(folder, 0o700)  # noqa: PTH102
+            return folder
+        except FileExistsError:
+            continue
         except FileNotFoundError:
             with contextlib.suppress(FileExistsError):
                 Path(scratch).mkdir(mode=0o700)
 
 
-class _Run:
-    """One script, from its start until nothing of it is left."""
-
-    def __init__(self, job: Job, environment: dict[str, str], awake: int) -> None:
-        self.awake = awake
-        self.stdout = bytearray()
-        self.stderr = bytearray()
-        self.over: Literal["exit", "timeout", "output-limit"] = "exit"
-        self.seconds = 0.0
-        self.start = time.monotonic()
-        self.deadline = self.start + job["timeout"]
-        self.process = subprocess.Popen(
+def _spawn(job: Job, environment: Mapping[str, str]) -> Launched:
+    """Start the script with an interpreter of its own."""
+    notes = environment["TMPDIR"] + _NOTES
+    path = os.pathsep.join(filter(None, (_WARM, environment.get("PYTHONPATH"))))
+    (out, stdout), (err, stderr) = os.pipe(), os.pipe()
+    try:
+        process = subprocess.Popen(
             [sys.executable, job["path"], *job["args"]],
             cwd=job["root"],
-            env=environment,
+            env={**environment, "PYTHONPATH": path, "COURSEBUILD_TRACE": notes},
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            bufsize=0,
+            stdout=stdout,
+            stderr=stderr,
             start_new_session=True,
             preexec_fn=_before_exec(os.getpid()),  # safe: there is no other thread
         )
-        assert self.process.stdout is not None and self.process.stderr is not None
-        self.pipes = {
-            self.process.stdout.fileno(): self.stdout,
-            self.process.stderr.fileno(): self.stderr,
-        }
-        for fd in self.pipes:
-            os.set_blocking(fd, False)
-
-    def watch(self) -> None:
-        """Return when the script has ended, or must; exit when the tool is gone."""
-        parent = os.getppid()
-        while not self._ended():
-            now = time.monotonic()
-            if now >= self.deadline:
-                self._ask_where()
-                return
-            ready = self._wait(min(self.deadline - now, 1.0), [0])
-            if 0 in ready or os.getppid() != parent:
-                sys.exit(0)  # `end` and the removal of the folder happen on the way out
-            if len(self.stdout) > STDOUT_LIMIT:
-                self.over = "output-limit"
-                return
-
-    def end(self) -> None:
-        """Kill whatever is left, and take what it had printed."""
-        self.seconds = time.monotonic() - self.start
-        with contextlib.suppress(OSError):
-            os.killpg(self.process.pid, signal.SIGKILL)
-        self._kill_descendants(time.monotonic() + 5.0)
-        for fd in list(self.pipes):
-            while self._read(fd):
-                pass
-        if self.over == "exit" and len(self.stdout) > STDOUT_LIMIT:
-            self.over = "output-limit"
-        for pipe in (self.process.stdout, self.process.stderr):
-            assert pipe is not None
-            pipe.close()
-
-    def report(self) -> Report:
-        status = self.process.returncode
-        return {
-            "end": self.over,
-            "status": -signal.SIGKILL if status is None or self.over != "exit" else status,
-            "seconds": self.seconds,
-            "missing": [],
-            "stdout": len(self.stdout[:STDOUT_LIMIT]),
-            "stderr": len(self.stderr[-STDERR_KEPT:]),
-        }
-
-    def _ask_where(self) -> None:
-        """Let the script say where it hangs: Python's fault handler answers SIGABRT."""
-        self.over = "timeout"
-        with contextlib.suppress(OSError):
-            os.kill(self.process.pid, signal.SIGABRT)
-        until = time.monotonic() + GRACE
-        while not self._ended() and (left := until - time.monotonic()) > 0:
-            self._wait(left, [])
-            if len(self.stdout) > STDOUT_LIMIT:
-                return
-
-    def _wait(self, seconds: float, others: list[int]) -> set[int]:
-        """Wait for a pipe, the end of a child, or one of `others`; returns which of these."""
-        poll = select.poll()
-        for fd in (*self.pipes, self.awake, *others):
-            poll.register(fd, select.POLLIN)
-        ready = {fd for fd, _ in poll.poll(max(1.0, seconds * 1000.0))}
-        if self.awake in ready:
-            with contextlib.suppress(BlockingIOError):
-                os.read(self.awake, _CHUNK)
-        for fd in ready & self.pipes.keys():
-            self._read(fd)
-        return ready.intersection(others)
-
-    def _read(self, fd: int) -> bool:
-        """Take what a pipe holds, at most a chunk; whether there may be more."""
-        try:
-            data = os.read(fd, _CHUNK)
-        except BlockingIOError:
-            return False
-        if not data:
-            self.pipes.pop(fd, None)
-            return False
-        kept = self.pipes[fd]
-        kept += data
-        if kept is self.stderr and len(kept) > 4 * STDERR_KEPT:
-            del kept[:-STDERR_KEPT]
-        return kept is self.stderr or len(kept) <= STDOUT_LIMIT
-
-    def _ended(self) -> bool:
-        """Reap every child that has ended; whether the script is among them."""
-        with contextlib.suppress(ChildProcessError):
-            while (child := os.waitpid(-1, os.WNOHANG))[0]:
-                if child[0] == self.process.pid:
-                    self.process.returncode = os.waitstatus_to_exitcode(child[1])
-        return self.process.returncode is not None
-
-    def _kill_descendants(self, until: float) -> None:
-        """Kill every process that the script left: a dying one hands its children on to us."""
-        while time.monotonic() < until:
-            self._ended()
-            children = list(_children())
-            if not children and self.process.returncode is not None:
-                return
-            for child in children:
-                with contextlib.suppress(OSError):
-                    os.kill(child, signal.SIGKILL)
-            if self.process.returncode is None:
-                with contextlib.suppress(OSError):
-                    os.kill(self.process.pid, signal.SIGKILL)
-            time.sleep(0.001)
+    except BaseException:
+        os.close(out)
+        os.close(err)
+        raise
+    finally:
+        os.close(stdout)
+        os.close(stderr)
+    process.returncode = 0  # who watches the script reaps it
+    read = functools.partial(read_notes, b"", notes, job["root"], job["path"])
+    return Launched(process.pid, out, err, read)
 
 
 def _before_exec(parent: int) -> Callable[[], None]:
@@ -303,64 +255,38 @@ def _before_exec(parent: int) -> Callable[[], None]:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
         for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)  # `nohup coursebuild` must not make scripts deaf
-        if libc is not None:
-            libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-            if os.getppid() != parent:
-                os._exit(1)
+        die_with(parent, libc)
 
     return prepare
 
 
-def missing_modules(names: Sequence[str], folder: Path | None, library: str) -> list[str]:
-    """Which of these modules a script in `folder` could not import; none is imported."""
-    path = [*([str(folder)] if folder else []), *sys.path, *([library] if library else [])]
-    importlib.invalidate_caches()
-    return [name for name in names if not _exists(name, path)]
+def die_with(parent: int, libc: ctypes.CDLL | None) -> None:
+    """Let the system end this process when `parent`, which has just forked it, ends."""
+    if libc is not None:
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:
+            os._exit(1)
 
 
-def _exists(name: str, path: list[str]) -> bool:
-    prefix = ""
-    where: Sequence[str] | None = path
-    for part in name.split("."):
-        prefix = f"{prefix}.{part}" if prefix else part
-        if where is None or not part.isidentifier():
-            return False
-        spec = _find(prefix, where, top=prefix == part)
-        if spec is None:
-            return False
-        where = spec.submodule_search_locations
-    return True
+def _finished(
+    run: Watched, notes: Callable[[], Notes] | None
+) -> tuple[Report, bytes, bytes, bytes]:
+    stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
+    trace = json.dumps(notes()).encode() if notes is not None else b""
+    report: Report = {
+        "end": run.over,
+        "status": run.exit_status(),
+        "seconds": run.seconds,
+        "missing": [],
+        "stdout": len(stdout),
+        "stderr": len(stderr),
+        "trace": len(trace),
+    }
+    return report, stdout, stderr, trace
 
 
-def _find(name: str, path: Sequence[str], *, top: bool) -> importlib.machinery.ModuleSpec | None:
-    saved = sys.path
-    try:
-        if top:
-            sys.path = list(path)
-        for finder in sys.meta_path:
-            # A finder of some installed package may do anything.
-            with contextlib.suppress(Exception):
-                spec = finder.find_spec(name, None if top else path)
-                if spec is not None:
-                    return spec
-        return None
-    finally:
-        sys.path = saved
-
-
-def _children() -> Iterator[int]:
-    """The children of this process that are alive or not yet reaped, where the system can tell."""
-    me = os.getpid()
-    listed = Path(f"/proc/self/task/{me}/children")
-    with contextlib.suppress(OSError):
-        yield from map(int, listed.read_text().split())
-        return
-    with contextlib.suppress(OSError):
-        for entry in Path("/proc").iterdir():
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                # The name, in parentheses, may hold anything; the parent is the second field after.
-                if int((entry / "stat").read_text().rpartition(")")[2].split()[1]) == me:
-                    yield int(entry.name)
+def _unstartable(text: str) -> tuple[Report, bytes, bytes, bytes]:
+    return _report("unstartable", status=2, stderr=text), b"", text.encode(), b""
 
 
 def _report(
@@ -377,11 +303,19 @@ def _report(
         "missing": missing or [],
         "stdout": 0,
         "stderr": len(stderr.encode()),
+        "trace": 0,
     }
 
 
 def remove_folder(folder: str) -> None:
     """Remove a script's temporary folder, also where it took away its own permissions."""
+    try:
+        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
+        return
+    except FileNotFoundError:
+        return
+    except OSError:
+        pass
     shutil.rmtree(folder, ignore_errors=True)
     if Path(folder).exists():
         with contextlib.suppress(OSError):

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import stat
 from collections.abc import Iterable
 from pathlib import Path
@@ -104,7 +103,7 @@ def _remove_if_abandoned(path: Path) -> None:
 def _open_temporary(folder: Path) -> tuple[int, str]:
     """A fresh locked file in a folder."""
     while True:
-        path = folder / f"{PREFIX}{secrets.token_hex(6)}"
+        path = folder / f"{PREFIX}{os.urandom(6).hex()}"
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
         try_lock(fd)
         # Another run may have taken it for abandoned before it was locked.

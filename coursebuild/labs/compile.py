@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from coursebuild.model import Lab, LabControl, LabPlot
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a piece inside the lab's JSON: `("controls", 2, "set")`."""

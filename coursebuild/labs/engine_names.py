@@ -9,8 +9,9 @@ holds these tables against the bindings.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
+
+from coursebuild.values import dataclass
 
 Element: TypeAlias = Literal["f64", "f32", "int"]
 

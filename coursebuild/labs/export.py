@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from coursebuild.labs import export_text as text
 from coursebuild.labs.export_text import About
@@ -32,6 +31,7 @@ from coursebuild.labs.python_context import field_types
 from coursebuild.labs.python_library import LIBRARY
 from coursebuild.labs.python_values import Code, Names, Type, Used
 from coursebuild.model import Lab, LabControl
+from coursebuild.values import dataclass
 
 _PLACE = re.compile(r"\{\{control:\d+\}\}")
 _HALVES = re.compile("[\ud800-\udfff]")

@@ -8,11 +8,11 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from coursebuild.labs.python_library import LIBRARY
 from coursebuild.labs.python_values import NUMBERS, Type
 from coursebuild.model import Lab, LabControl
+from coursebuild.values import dataclass
 
 _WIDTH = 88
 _LONGEST = 100

@@ -5,8 +5,9 @@ Entry points: the unions `Expression` and `Statement`. `javascript` makes them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
+
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

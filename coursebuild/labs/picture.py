@@ -1,41 +1,47 @@
 """A picture of a scene, drawn without a graphics processor.
 
-Entry points: `draw(solids, camera, size)` → pixels, `png(pixels)` → bytes.
+Entry point: `draw(solids, camera, size, light)` → pixels.
 
 1. Every solid's triangles are taken into the camera's frame (MuJoCo's free camera) and projected.
-2. A depth buffer keeps the nearest surface of each sample; there are 2 × 2 samples a pixel.
-3. Light comes from the camera and from above, as in MuJoCo's own default scene. What is seen
-   through is mixed in afterwards, the farthest first.
+2. A depth buffer keeps the nearest surface of each sample, and what of it is there: place, normal,
+   texture coordinates. There are 2 × 2 samples a pixel.
+3. What is there is coloured by its texture and the light (`light.py`), and the first shiny plane or
+   box shows what its mirror image of the camera sees.
+4. What is seen through is mixed in afterwards, the farthest first, and the sky is put behind all.
 
 The same input gives the same bytes: no clock, no threads, colours rounded at the end.
 """
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coursebuild.labs.light import Light, Material, shaded, studio
+from coursebuild.labs.raster import NORMAL, PLACE, WRAP, Eye, Layer, Placed, Raster, turned
 from coursebuild.labs.shapes import Array, Surface
+from coursebuild.labs.textures import Dress, Texture, sharpness, sky
+from coursebuild.values import dataclass, replace
 
 _SAMPLES = 2
 _NEAR = 0.01
 """What is nearer to the camera than this part of its distance is not drawn."""
-_AMBIENT, _FRONT, _ABOVE = 0.3, 0.4, 0.3
-"""Brightness of light from all sides, from the camera, and from above: white stays white."""
-_FAR_AWAY = 1e12
-"""m; what is beyond, or nowhere, is not drawn."""
-_AT_ONCE = 1 << 20
-"""Samples that are looked at together."""
+_OPAQUE, _CLEAR = 0.999, 0.001
+_FROM_BELOW = 0.5
+"""What is left of a plane that is seen from below, as in MuJoCo."""
+_TOP = 0.5
+_AT_ONCE = 1 << 16
+"""Samples that are coloured together."""
+_STEPS = 127
+"""From black to white: no eye tells more apart, and the file is a quarter smaller."""
+_PLAIN = Material()
 
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """A surface, where it stands and its colour."""
+    """A surface, where it stands and its looks."""
 
     surface: Surface
     position: Array
@@ -43,8 +49,14 @@ class Solid:
     rotation: Array
     """(3, 3); columns are the solid's axes in the world."""
     rgba: tuple[float, float, float, float]
-    checker: float = 0.0
-    """Width (m) of the squares of a plane's pattern; 0: plain."""
+    material: Material = _PLAIN
+    dress: Dress | None = None
+    plane: bool = False
+    """Whether it has an upper side, by which it is lit."""
+    mirror: float | None = None
+    """Where its upper face is along its z axis, m, if that can reflect."""
+    open: bool = False
+    """Whether both of its sides are outside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,227 +74,168 @@ class Camera:
     fovy: float = 45.0
     """Vertical field of view, degrees."""
 
+    @property
+    def forward(self) -> Array:
+        """(3,), of length 1: where it looks."""
+        a, e = np.radians(self.azimuth), np.radians(self.elevation)
+        return np.array((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
 
-def draw(solids: Sequence[Solid], camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+    @property
+    def eye(self) -> Array:
+        """(3,), m, world."""
+        found: Array = np.array(self.target) - self.distance * self.forward
+        return found
+
+
+def draw(
+    solids: Sequence[Solid],
+    camera: Camera,
+    size: tuple[int, int],
+    light: Light | None = None,
+    background: Texture | None = None,
+) -> NDArray[np.uint8]:
     """The picture: (height, width, 4) bytes, RGBA, clear where there is nothing.
 
-    `size` is (width, height) in pixels.
+    `size` is (width, height) in pixels; without a light it is that of a model without lights;
+    `background` is the texture of a sky.
     """
-    width, height = size[0] * _SAMPLES, size[1] * _SAMPLES
-    canvas = _Canvas(width, height, camera)
-    opaque = [solid for solid in solids if solid.rgba[3] >= 0.999]
-    through = [solid for solid in solids if 0.001 < solid.rgba[3] < 0.999]
-    for solid in opaque:
-        canvas.add(solid)
-    for solid in sorted(through, key=lambda s: -canvas.depth_of(s)):
-        canvas.add(solid)
+    light = studio(camera.forward) if light is None else light
+    right = np.array((np.sin(np.radians(camera.azimuth)), -np.cos(np.radians(camera.azimuth)), 0.0))
+    axes = np.stack((right, np.cross(right, camera.forward), camera.forward))
+    eye = Eye(camera.eye, axes)
+    lens = (camera.fovy, _NEAR * camera.distance)
+    canvas = _Canvas((size[0] * _SAMPLES, size[1] * _SAMPLES), eye, lens, light)
+    shown = [_seen_from(solid, eye) for solid in solids if solid.rgba[3] > _CLEAR]
+    mirror = next((s for s in shown if _reflects(s)), None)
+    reflected = None
+    if mirror is not None and (image := _image(mirror, eye)) is not None:
+        reflected = _Canvas(size, image, lens, light)
+        reflected.paint([solid for solid in shown if solid is not mirror], None, None)
+    canvas.paint(shown, mirror, reflected)
+    if background is not None:
+        canvas.put_behind(background)
     mean = canvas.colour.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 4).mean(axis=(1, 3))
     # Colours were weighted with how much they cover.
     mean[..., :3] /= np.where(mean[..., 3:] > 0, mean[..., 3:], 1.0)
-    pixels: NDArray[np.uint8] = np.clip(np.rint(255 * mean), 0, 255).astype(np.uint8)
+    steps = np.rint(_STEPS * np.clip(mean, 0.0, 1.0))
+    pixels: NDArray[np.uint8] = np.rint(255 / _STEPS * steps).astype(np.uint8)
     return pixels
 
 
+def _reflects(solid: Solid) -> bool:
+    shiny = solid.material.reflectance > 0 and solid.mirror is not None
+    return shiny and solid.rgba[3] >= _OPAQUE
+
+
+def _seen_from(solid: Solid, eye: Eye) -> Solid:
+    """The solid as it shows itself to an eye."""
+    if not solid.plane or not np.isfinite(solid.position).all():
+        return solid
+    if solid.rotation[:, 2] @ (eye.position - solid.position) >= 0:
+        return solid
+    red, green, blue, alpha = solid.rgba
+    return replace(solid, rgba=(red, green, blue, alpha * _FROM_BELOW))
+
+
+def _image(solid: Solid, eye: Eye) -> Eye | None:
+    """The image of an eye in the upper face of a solid; `None` if it is behind it."""
+    normal = solid.rotation[:, 2]
+    offset = float(normal @ solid.position) + (solid.mirror or 0.0)
+    height = float(normal @ eye.position) - offset
+    if not height > 0:
+        return None
+    axes = turned(eye.axes, np.eye(3) - 2 * np.outer(normal, normal))
+    return Eye(eye.position - 2 * height * normal, axes, (normal, offset))
+
+
+def _placed(index: int, solid: Solid) -> Placed:
+    # Of what is seen through, only the outside is drawn, as in the live view.
+    front = solid.rgba[3] < _OPAQUE and not (solid.open or solid.plane)
+    return Placed(index, solid.surface, solid.position, solid.rotation, front)
+
+
 class _Canvas:
-    """Colours and depths of the samples."""
+    """Colours of the samples."""
 
-    def __init__(self, width: int, height: int, camera: Camera) -> None:
-        self.colour = np.zeros((height, width, 4))
+    def __init__(
+        self, size: tuple[int, int], eye: Eye, lens: tuple[float, float], light: Light
+    ) -> None:
+        self.raster = Raster(size, eye, lens)
+        self.colour = np.zeros((size[1], size[0], 4))
         """RGB times how much is covered, and how much is covered."""
-        self.depth = np.full((height, width), np.inf)
-        self.width, self.height = width, height
-        self.camera = camera
-        azimuth, elevation = np.radians(camera.azimuth), np.radians(camera.elevation)
-        forward = np.array(
-            (
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
-            )
-        )
-        right = np.array((np.sin(azimuth), -np.cos(azimuth), 0.0))
-        self.axes = np.stack((right, np.cross(right, forward), forward))
-        self.eye = np.array(camera.target) - camera.distance * forward
-        self.focal = height / 2 / np.tan(np.radians(camera.fovy) / 2)
-        self.near = max(_NEAR * camera.distance, 1e-6)
-        above = np.array((0.25, -0.35, 0.9))
-        self.lights = ((-forward, _FRONT), (above / np.linalg.norm(above), _ABOVE))
+        self.eye, self.light = eye, light
 
-    def depth_of(self, solid: Solid) -> float:
-        depth = float(self.axes[2] @ (solid.position - self.eye))
+    def paint(
+        self, solids: Sequence[Solid], mirror: Solid | None, reflected: _Canvas | None
+    ) -> None:
+        """Draw solids; `mirror` shows what is in `reflected`."""
+        layer = Layer(np.full(self.colour.shape[:2], np.inf))
+        opaque = [solid for solid in solids if solid.rgba[3] >= _OPAQUE]
+        through = [solid for solid in solids if solid.rgba[3] < _OPAQUE]
+        for i, solid in enumerate(opaque):
+            self.raster.add(layer, _placed(i, solid))
+        for i, solid in enumerate(opaque):
+            self._colour(layer, i, solid, reflected if solid is mirror else None)
+        for solid in sorted(through, key=lambda s: -self._depth_of(s)):
+            film = Layer(layer.depth.copy())
+            self.raster.add(film, _placed(0, solid))
+            self._colour(film, 0, solid, None)
+
+    def put_behind(self, background: Texture) -> None:
+        """Fill what is not covered with a sky."""
+        free = np.flatnonzero(self.colour[..., 3] < 1)
+        for start in range(0, len(free), _AT_ONCE):
+            y, x = np.divmod(free[start : start + _AT_ONCE], self.raster.width)
+            self._fill(background, y, x)
+
+    def _fill(self, background: Texture, y: NDArray[np.int64], x: NDArray[np.int64]) -> None:
+        height, width, _ = self.colour.shape
+        sight = np.column_stack(
+            (x + 0.5 - width / 2, height / 2 - y - 0.5, np.full(len(x), self.raster.focal))
+        )
+        free = 1 - self.colour[y, x, 3:]
+        self.colour[y, x, :3] += free * sky(background, turned(sight, self.eye.axes.T))
+        self.colour[y, x, 3] = 1
+
+    def _depth_of(self, solid: Solid) -> float:
+        depth = float(self.eye.axes[2] @ (solid.position - self.eye.position))
         return depth if np.isfinite(depth) else 0.0
 
-    def add(self, solid: Solid) -> None:
-        with np.errstate(over="ignore", invalid="ignore"):
-            world = _turned(solid.surface.vertices, solid.rotation) + solid.position
-            normals = _turned(solid.surface.normals, solid.rotation)
-            seen = _turned(world - self.eye, self.axes)
-            shade = self._shade(world, normals)
-        # One row a vertex: place in the camera's frame, brightness, place in the solid's own plane.
-        rows = np.column_stack((seen, shade, solid.surface.vertices[:, :2]))
-        faces = solid.surface.faces
-        # A simulation that blew up has no picture of what it threw out of the world.
-        known = np.all(np.abs(np.nan_to_num(rows, nan=np.inf)) < _FAR_AWAY, axis=1)
-        faces = faces[np.all(known[faces], axis=1)]
-        near = seen[:, 2][faces] > self.near
-        whole = faces[np.all(near, axis=1)]
-        if solid.rgba[3] >= 0.999:
-            whole = self._small(solid, rows, whole)
-        for face in whole:
-            self._triangle(solid, rows[face])
-        for face in faces[np.any(near, axis=1) & ~np.all(near, axis=1)]:
-            part = self._clipped(rows[face])
-            for k in range(1, len(part) - 1):
-                self._triangle(solid, part[[0, k, k + 1]])
+    def _colour(self, layer: Layer, index: int, solid: Solid, reflected: _Canvas | None) -> None:
+        """Mix a solid of a layer into the picture."""
+        samples = np.flatnonzero(layer.solid == index)
+        for start in range(0, len(samples), _AT_ONCE):
+            y, x = np.divmod(samples[start : start + _AT_ONCE], self.raster.width)
+            self._shade(layer, solid, reflected, (y, x))
 
-    def _small(self, solid: Solid, rows: Array, faces: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Draw all small triangles of an opaque solid at once; gives those that remain."""
-        places = self._places(rows)
-        corners = places[faces]
-        low, high = np.floor(corners.min(axis=1)), np.floor(corners.max(axis=1))
-        shown = np.all((high >= 0) & (low < (self.width, self.height)), axis=1)
-        widest = (high - low).max(axis=1)
-        below = 0
-        for side in (6, 14, 30):
-            batch = faces[shown & (widest >= below) & (widest < side)]
-            for start in range(0, len(batch), _AT_ONCE // side**2):
-                self._batch(solid, rows, places, batch[start : start + _AT_ONCE // side**2], side)
-            below = side
-        rest: NDArray[np.int64] = faces[shown & (widest >= below)]
-        return rest
-
-    def _batch(
-        self, solid: Solid, rows: Array, places: Array, faces: NDArray[np.int64], side: int
+    def _shade(
+        self,
+        layer: Layer,
+        solid: Solid,
+        reflected: _Canvas | None,
+        samples: tuple[NDArray[np.int64], NDArray[np.int64]],
     ) -> None:
-        """Triangles that fit into squares of `side` samples."""
-        corners = places[faces]
-        first = np.floor(corners.min(axis=1)).astype(np.int64)
-        x = first[:, None, None, 0] + np.arange(side)[None, None, :]
-        y = first[:, None, None, 1] + np.arange(side)[None, :, None]
-        px, py = corners.transpose(2, 1, 0)[..., None, None]
-        shares, inside = _cover(px, py, x + 0.5, y + 0.5)
-        inside &= (x >= 0) & (x < self.width) & (y >= 0) & (y < self.height)
-        which, i, j = np.nonzero(inside)
-        weights = shares[:, which, i, j] / rows[faces[which], 2].T
-        depth = 1.0 / weights.sum(axis=0)
-        x, y = first[which, 0] + j, first[which, 1] + i
-        # The nearest is written last, and so remains.
-        order = np.argsort(-depth, kind="stable")
-        order = order[depth[order] < self.depth[y[order], x[order]]]
-        which, weights, depth, x, y = (
-            which[order],
-            weights[:, order],
-            depth[order],
-            x[order],
-            y[order],
-        )
-        values = np.einsum("ks,skc->sc", weights, rows[faces[which], 3:]) * depth[:, None]
-        self.colour[y, x] = self._painted(solid, values[:, 0], values[:, 1:])
-        self.depth[y, x] = depth
-
-    def _places(self, rows: Array) -> Array:
-        """Where vertices are on the screen, in samples."""
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            x = self.width / 2 + self.focal * rows[:, 0] / rows[:, 2]
-            y = self.height / 2 - self.focal * rows[:, 1] / rows[:, 2]
-        return np.stack((x, y), axis=1)
-
-    def _painted(self, solid: Solid, light: Array, place: Array) -> Array:
-        """Colour and coverage of samples of this brightness, at these places of the solid."""
-        if solid.checker > 0:
-            squares = np.floor(place / solid.checker).sum(axis=-1)
-            light = light * np.where(squares % 2 == 0, 1.0, 0.9)
-        colour = np.clip(light[..., None] * np.array(solid.rgba[:3]), 0.0, 1.0)
-        return np.concatenate((colour, np.ones((*light.shape, 1))), axis=-1)
-
-    def _clipped(self, triangle: Array) -> Array:
-        """The part of a triangle in front of the camera, as a polygon."""
-        kept = []
-        for here, there in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-            a, b = here[2] - self.near, there[2] - self.near
-            if a > 0:
-                kept.append(here)
-            if (a > 0) != (b > 0):
-                kept.append(here + (there - here) * (a / (a - b)))
-        return np.array(kept)
-
-    def _shade(self, world: Array, normals: Array) -> Array:
-        """Brightness at each vertex; surfaces are lit from both sides."""
-        view = self.eye - world
-        facing = np.sign(np.einsum("ij,ij->i", normals, view))
-        facing[facing == 0] = 1.0
-        turned = normals * facing[:, None]
-        light = np.full(len(world), _AMBIENT)
-        for direction, strength in self.lights:
-            light += strength * np.clip(np.einsum("ij,j->i", turned, direction), 0.0, None)
-        return light
-
-    def _triangle(self, solid: Solid, rows: Array) -> None:
-        px, py = self._places(rows).T
-        pz = rows[:, 2]
-        left, right = max(int(px.min()), 0), min(int(px.max()) + 1, self.width - 1)
-        top, bottom = max(int(py.min()), 0), min(int(py.max()) + 1, self.height - 1)
-        if left > right or top > bottom:
-            return
-        gx: Array = np.arange(left, right + 1, dtype=np.float64) + 0.5
-        gy: Array = np.arange(top, bottom + 1, dtype=np.float64)[:, None] + 0.5
-        shares, inside = _cover(px, py, gx, gy)
-        # What is linear on the surface is linear in 1/z on the screen.
-        parts = shares / pz[:, None, None]
-        depth = 1.0 / np.where(inside, parts.sum(axis=0), 1.0)
-        window = (slice(top, bottom + 1), slice(left, right + 1))
-        inside &= depth < self.depth[window]
-        if not inside.any():
-            return
-        values = sum(part[..., None] * row for part, row in zip(parts, rows[:, 3:], strict=True))
-        values = values * depth[..., None]
-        colour = self._painted(solid, values[..., 0], values[..., 1:])
-        alpha = solid.rgba[3]
-        target = self.colour[window]
-        if alpha >= 0.999:
-            target[inside] = colour[inside]
-            self.depth[window][inside] = depth[inside]
-        else:
-            target[inside] = alpha * colour[inside] + (1 - alpha) * target[inside]
-
-
-def _turned(vectors: Array, matrix: Array) -> Array:
-    """Each vector times the matrix, without the threads and kernels of a linear algebra library."""
-    found: Array = np.einsum("ij,kj->ik", vectors, matrix)
-    return found
-
-
-def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Shares of a triangle's three corners in samples, and whether these are inside.
-
-    A sample on the edge between two triangles belongs to one of them, or a transparent surface
-    would have seams.
-    """
-    area = (px[1] - px[0]) * (py[2] - py[0]) - (px[2] - px[0]) * (py[1] - py[0])
-    turn = np.sign(area)
-    inside = np.broadcast_to(turn != 0, np.broadcast_shapes(gx.shape, gy.shape, area.shape)).copy()
-    shares = []
-    for a, b in ((1, 2), (2, 0), (0, 1)):
-        edge = turn * ((px[a] - gx) * (py[b] - gy) - (px[b] - gx) * (py[a] - gy))
-        right, down = turn * (px[b] - px[a]), turn * (py[b] - py[a])
-        owned = (down > 0) | ((down == 0) & (right > 0))
-        inside &= (edge > 0) | ((edge == 0) & owned)
-        shares.append(edge / np.where(turn == 0, 1.0, np.abs(area)))
-    return np.stack(shares), inside
-
-
-def png(pixels: NDArray[np.uint8]) -> bytes:
-    """An RGBA picture as PNG, losslessly, with the same bytes each time."""
-    height, width, _ = pixels.shape
-    rows = pixels.astype(np.int16).reshape(height, width * 4)
-    above = np.vstack((np.zeros((1, width * 4), np.int16), rows[:-1]))
-    filtered = np.column_stack((np.full(height, 2, np.uint8), ((rows - above) & 255)))
-    data = zlib.compress(filtered.astype(np.uint8).tobytes(), 9)
-    header = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(name, body) for name, body in chunks)
-
-
-def _chunk(name: bytes, body: bytes) -> bytes:
-    checksum = zlib.crc32(name + body)
-    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", checksum)
+        """Mix a solid into some samples (rows, columns) that show it."""
+        y, x = samples
+        kept = layer.kept[y, x].astype(float)
+        points = turned(kept[:, PLACE], solid.rotation) + solid.position
+        own = kept[:, NORMAL] / np.linalg.norm(kept[:, NORMAL], axis=1).clip(1e-12)[:, None]
+        normals = turned(own, solid.rotation)
+        view = self.eye.position - points
+        toward = view / np.linalg.norm(view, axis=1).clip(1e-12)[:, None]
+        facing = (normals * toward).sum(axis=1)
+        if not solid.plane:
+            normals[facing < 0] *= -1
+        texel = np.ones((1, 3))
+        if solid.dress is not None:
+            steps = layer.depth[y, x] / self.raster.focal * sharpness(facing)
+            texel = solid.dress.texels(kept[:, PLACE], own, kept[:, WRAP], steps)
+        where = points, normals, toward
+        colour = shaded(self.light, solid.material, np.array(solid.rgba[:3]), texel, where)
+        if reflected is not None:
+            shown = reflected.colour[y // _SAMPLES, x // _SAMPLES, :3]
+            colour += solid.material.reflectance * (own[:, 2:] > _TOP) * shown
+        # What a solid is seen through is its own transparency; a sample lies in it or not.
+        alpha = min(solid.rgba[3], 1.0) if solid.rgba[3] < _OPAQUE else 1.0
+        mixed = np.column_stack((np.clip(colour, 0.0, 1.0), np.ones(len(y))))
+        self.colour[y, x] = alpha * mixed + (1 - alpha) * self.colour[y, x]

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 
 from coursebuild.model import LabPlot, LabTrace
+from coursebuild.values import dataclass
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
 _TOP, _BOTTOM = 12.0, 38.0

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import assert_never
 
 from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
@@ -45,6 +44,7 @@ from coursebuild.labs.python_values import (
     floating,
     refuse,
 )
+from coursebuild.values import dataclass
 
 _INDENT = "    "
 RESERVED = frozenset(

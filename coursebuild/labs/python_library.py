@@ -9,7 +9,7 @@ that does not use it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from coursebuild.labs.engine_names import Element
 from coursebuild.labs.javascript_tokens import UntranslatableError
+from coursebuild.values import dataclass, field
 
 Type: TypeAlias = Literal["nat", "int", "num", "bool", "str", "vector", "rows", "energy", "nothing"]
 """Of a Python expression; `rows` is an array that has two dimensions there, and one in JavaScript.

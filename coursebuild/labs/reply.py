@@ -6,12 +6,12 @@ Entry point: `read_trial(reply)`. docs/labs.md says what a reply holds.
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from coursebuild.labs.compile import Entry
+from coursebuild.values import dataclass
 
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
 
@@ -22,7 +22,8 @@ class Failure:
 
     entry: Entry
     kind: str
-    """`throws`, `nan`, `type`, `warning`, `diverged`, `expect`, `stopAt`, `timeout` or `engine`."""
+    """`throws`, `nan`, `type`, `warning`, `diverged`, `expect`, `stopAt`, `timeout`, `engine` or
+    `shared`."""
     message: str
     time: float | None
     """Simulated time, s."""

@@ -9,12 +9,14 @@ normals at the vertices shade round things round and edges sharp.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from coursebuild.values import dataclass
 
 Array: TypeAlias = NDArray[np.float64]
 Kind: TypeAlias = Literal[
@@ -25,6 +27,9 @@ _AROUND = 28
 """Segments around a round thing."""
 _FAR = 30.0
 """Half-length (m) at which a plane without a size ends in a picture."""
+_AROUND_ROPE = 12
+_SMOOTH = 0.8
+"""Cosine between a face and its vertex's normal from which on the edge is not sharp."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,8 @@ class Surface:
     """(n, 3), of length 1."""
     faces: NDArray[np.int64]
     """(m, 3), counter-clockwise seen from outside."""
+    uv: Array | None = None
+    """(n, 2), texture coordinates of a file."""
 
 
 def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) -> Surface | None:
@@ -69,6 +76,50 @@ def mesh_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
         np.repeat(normals, 3, axis=0),
         np.arange(count).reshape(-1, 3),
     )
+
+
+def smooth_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
+    """A mesh whose normals are the mean of those of the faces around, by their area."""
+    corners = vertices[faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], across)
+    return Surface(vertices, _unit(normals), faces)
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """Several surfaces, none of which has texture coordinates, as one."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in surfaces[:-1])])
+    return Surface(
+        np.concatenate([part.vertices for part in surfaces]),
+        np.concatenate([part.normals for part in surfaces]),
+        np.concatenate([part.faces + n for part, n in zip(surfaces, starts, strict=True)]),
+    )
+
+
+def sharpened(corners: Array, normals: Array) -> Array:
+    """Normals (m, 3, 3) of triangles' corners (m, 3, 3): the face's where they are far off."""
+    face = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))[:, None]
+    sharp = (face * normals).sum(axis=2, keepdims=True) < _SMOOTH
+    known = np.any(face != 0, axis=2, keepdims=True)
+    found: Array = np.where(sharp & known, face, normals)
+    return found
+
+
+def ropes(points: Array, ends: NDArray[np.int64], radius: float) -> Surface:
+    """Lines between points (n, 3), `ends` (m, 2) of each, of a radius and round at the ends."""
+    knot = _turned(np.linspace(0.0, np.pi, _AROUND_ROPE // 2 + 1), _AROUND_ROPE)
+    rows = _grid_faces(_AROUND_ROPE // 2 + 1, _AROUND_ROPE + 1)
+    parts = [Surface(knot * radius + point, knot, rows) for point in points]
+    around = np.linspace(0.0, 2 * np.pi, _AROUND_ROPE + 1)
+    for a, b in points[ends]:
+        z = _unit(b - a)
+        x = _unit(np.cross(z, np.eye(3)[np.abs(z).argmin()]))
+        ring = np.outer(np.cos(around), x) + np.outer(np.sin(around), np.cross(z, x))
+        side = np.concatenate((ring * radius + b, ring * radius + a))
+        parts.append(Surface(side, np.tile(ring, (2, 1)), _grid_faces(2, _AROUND_ROPE + 1)))
+    return joined(parts)
 
 
 def _unit(vectors: Array) -> Array:
@@ -114,9 +165,9 @@ def _unit_sphere() -> Surface:
     return Surface(vertices, vertices, _grid_faces(rows, _AROUND + 1))
 
 
-def _turned(polar: Array) -> Array:
+def _turned(polar: Array, segments: int = _AROUND) -> Array:
     """Points of the unit sphere: a row all around for each angle from the pole."""
-    around = np.linspace(0.0, 2 * np.pi, _AROUND + 1)
+    around = np.linspace(0.0, 2 * np.pi, segments + 1)
     t, p = np.meshgrid(polar, around, indexing="ij")
     xyz = np.stack((np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)), axis=-1)
     return xyz.reshape(-1, 3)

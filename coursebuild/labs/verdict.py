@@ -1,18 +1,19 @@
 """What a trial found, as diagnostics at the entries of the lesson.
 
-Entry points: `trial_diagnostics(lab, trial)`, `parity_diagnostics(lab, parity)`, `code_diagnostic`.
+Entry points: `trial_diagnostics(lab, trial)`, `reset_diagnostics(lab, trial)`,
+`parity_diagnostics(lab, parity)`, `code_diagnostic`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.labs.compile import Entry, Piece
 from coursebuild.labs.reply import Failure, Trial
 from coursebuild.model import Lab
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 PARITY_RTOL = 1e-9
 """How far (relative) the two engines may be apart over the first second, unless a lab says."""
@@ -27,6 +28,7 @@ _RULES = {
     "stopAt": "lab-expect",
     "timeout": "lab-timeout",
     "engine": "lab-engine",
+    "shared": "lab-shared",
 }
 
 
@@ -151,6 +153,9 @@ def _told(lab: Lab, failure: Failure) -> tuple[str, str]:
             return f"trying {name} takes too long", 'run less of it: `"verify": {"seconds": …}`'
         case "timeout":
             return f"{name} {message}", "look for a loop or a list without an end"
+        case "shared":
+            help = "labs run side by side; keep what this one needs in `ctx`"
+            return f"{name} changes what all labs share: {message}", help
         case "engine":
             return f"the browser's engine says: {message.replace('MuJoCo Error: ', '')}", ""
         case _:
@@ -163,6 +168,25 @@ def _claim(lab: Lab, entry: Entry) -> str:
             return _short(lab.expect[i].expr)
         case _:
             return "the claim"
+
+
+def reset_diagnostics(lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
+    """A reset after the main run that led to another state than that of the start."""
+    found = trial.main["resetDiffers"] if trial.main is not None else None
+    if found is None:
+        return
+    entry: Entry = tuple(found["entry"])
+    message = f"a reset does not lead back to the start: `{found['what']}` differs"
+    match entry:
+        case ("controls", int(i), *_) if not lab.controls[i].init:
+            help = f'{_named(lab, entry)} is not applied again; give it `"init": true`'
+        case _:
+            help = (
+                "chance from `lib.random()` begins anew with each reset, from `Math.random()` it "
+                "does not; what code has changed in `ctx` or `model` stays until `setup` puts it "
+                "back"
+            )
+    yield diagnose("lab-reset", entry_span(lab, entry), message, help=help)
 
 
 def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:

@@ -6,13 +6,13 @@ Entry points: the union `Block`, and `Document`.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Literal, TypeAlias
 
 from coursebuild.model.inlines import Inline
 from coursebuild.model.interactive import Lab, Quiz
 from coursebuild.source import Excerpt, Source, Span
+from coursebuild.values import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,3 +293,7 @@ class Document:
     source: Source
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
+    _all: list[Block] = field(
+        default_factory=list, init=False, repr=False, compare=False, hash=False
+    )
+    """What `document_blocks` gives, once it was asked for."""

@@ -6,10 +6,10 @@ Entry point: `Course`.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 
 from coursebuild.model.blocks import Comparison, Document, Filter
 from coursebuild.source import Source, Span
+from coursebuild.values import dataclass
 
 
 class Status(enum.Enum):

@@ -5,10 +5,10 @@ Entry point: the union `Inline`; `plain_text(inlines)`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,11 @@ Entry points: `Lab`, `Quiz`, the union `AnyQuestion`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from coursebuild.model.inlines import Inline
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.model.blocks import Block

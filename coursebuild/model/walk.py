@@ -30,6 +30,12 @@ from coursebuild.model.interactive import (
     Quiz,
 )
 
+_HOLDERS = (BlockQuote, Callout, ListBlock, Lab, Quiz, Recording)
+"""Blocks that may have others in them."""
+_LINES = (Heading, Paragraph, HtmlFlow)
+_AROUND = (Emphasis, Strong, Strikethrough, Link)
+"""Inlines that may have others in them."""
+
 
 def child_blocks(block: Block) -> tuple[Block, ...]:
     """The blocks directly inside a block, texts of quizzes and labs included."""
@@ -58,7 +64,7 @@ def _question_blocks(question: AnyQuestion) -> tuple[Block, ...]:
 
 def block_inlines(block: Block) -> tuple[Inline, ...]:
     """The inlines directly inside a block (not inside its child blocks)."""
-    if isinstance(block, Heading | Paragraph | HtmlFlow):
+    if isinstance(block, _LINES):
         return block.children
     if isinstance(block, Callout):
         return block.title
@@ -87,21 +93,25 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
     """Every block in document order, a container before what it holds."""
     for block in blocks:
         yield block
-        yield from walk_blocks(child_blocks(block))
+        if isinstance(block, _HOLDERS):
+            yield from walk_blocks(child_blocks(block))
 
 
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
-    yield from walk_blocks(document.blocks)
-    for footnote in document.footnotes:
-        yield from walk_blocks(footnote.blocks)
+    known = document._all
+    if not known:
+        known += walk_blocks(document.blocks)
+        for footnote in document.footnotes:
+            known += walk_blocks(footnote.blocks)
+    return iter(known)
 
 
 def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
     """Every inline in order, a container before what it holds."""
     for inline in inlines:
         yield inline
-        if isinstance(inline, Emphasis | Strong | Strikethrough | Link):
+        if isinstance(inline, _AROUND):
             yield from walk_inlines(inline.children)
 
 

@@ -7,38 +7,62 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.locks import project_lock
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.depends import depends_on
+from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.verify import verify
+from coursebuild.pipeline.shards import Shard, write_timings
+from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
+from coursebuild.report.values import plural
+from coursebuild.scripts.extract import extract
+from coursebuild.values import replace
 
 
-def check(options: Options, names: tuple[str, ...] = ()) -> Report:
-    """Verify the lessons that the names mean; all, and the pages, where there are none."""
+def check(
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    shard: Shard | None = None,
+    timings: str | None = None,
+) -> Report:
+    """Verify the lessons that the names mean; all, and the pages, where there are none.
+
+    `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
+    it writes how long each took.
+    """
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
-        return _check(options, names, progress)
+        return _check(options, names, progress, shard, timings)
 
 
-def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Report:
+def _check(
+    options: Options,
+    names: tuple[str, ...],
+    progress: Progress,
+    shard: Shard | None,
+    timings: str | None,
+) -> Report:
     began = time.monotonic()
-    loaded = load(options.root)
+    with Documents(options.store, options.jobs, progress.stage) as documents:
+        loaded = load(options.root, documents.parse, documents.ahead, documents.course_map)
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
     chosen = select(course, names, options.root)
-    verified = verify(course, options, progress, chosen.documents)
+    verified = verify(course, options, progress, chosen.documents, shard=shard)
+    if timings is not None:
+        write_timings(timings, _seconds(verified), _names(course))
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)
-    found += _no_scripts(course, chosen, verified.scripts, found)
+    if shard is None or not any(True for _ in extract(course).value):
+        found += _no_scripts(course, chosen, verified.scripts, found)
     report = judge(
         course,
         found,
@@ -47,8 +71,27 @@ def _check(options: Options, names: tuple[str, ...], progress: Progress) -> Repo
         lessons=len(chosen.lessons),
         documents=chosen.documents,
         labs=verified.labs,
+        remarks=() if shard is None else (_part(shard, verified),),
     )
     return replace(report, depends=depends_on(course, verified.results))
+
+
+def _part(shard: Shard, verified: Verified) -> str:
+    """What a part of the work was, so that its report is not taken for the whole."""
+    scripts, labs = plural(len(verified.scripts), "script"), plural(len(verified.labs), "lab")
+    return f"this was part {shard} of the work: {scripts} and {labs}"
+
+
+def _seconds(verified: Verified) -> dict[str, float]:
+    """How long scripts and labs took, or took when they were last run."""
+    found = {s.path: s.seconds for s in verified.scripts if s.status not in ("skipped", "norun")}
+    return found | {lab.name: lab.seconds for lab in verified.labs if lab.tried}
+
+
+def _names(course: Course) -> list[str]:
+    from coursebuild.pipeline.lab_inputs import labs_of
+
+    return [*(e.path for e in extract(course).value), *(name for _, name, _ in labs_of(course))]
 
 
 def no_lessons(course: Course) -> list[Diagnostic]:

@@ -55,6 +55,7 @@ def judge(
         warnings=len(kept) - errors,
         silenced=len(told) - len(kept),
         seconds=seconds,
+        cached=sum(line.cached for line in scripts),
     )
     return Report(kept, tuple(scripts), summary, remarks, labs)
 

@@ -9,18 +9,18 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from coursebuild.effects.native import NativeEngine, NativeError
-from coursebuild.effects.store import keep, load
+from coursebuild.effects.store import Store
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
 from coursebuild.labs.export_text import About
 from coursebuild.labs.verdict import PARITY_RTOL, Parity
 from coursebuild.model import Course, Lab
+from coursebuild.values import dataclass
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
@@ -37,6 +37,7 @@ class Offer:
 
 
 def exported(
+    store: Store,
     root: Path,
     native: NativeEngine,
     course: Course,
@@ -56,7 +57,7 @@ def exported(
         return Offer(None, export)
     if main.get("recorded") is None:
         return Offer(None, "the lab makes no step")
-    reason = _checked(root, native, itself, export, main, parity)
+    reason = _checked(store, root, native, itself, export, main, parity)
     return Offer(None, reason) if reason else Offer((export.name, export.text))
 
 
@@ -80,6 +81,7 @@ def _seconds(lab: Lab, main: dict[str, Any]) -> float:
 
 
 def _checked(
+    store: Store,
     root: Path,
     native: NativeEngine,
     lab: Lab,
@@ -104,7 +106,7 @@ def _checked(
     for part in ({**request, "path": export.name}, {**asked, "rtol": rtol}):
         digest.update(json.dumps(part).encode() + b"\0")
     key = digest.hexdigest()
-    found = load(root, "exports", key)
+    found = store.load("exports", key)
     if found is not None:
         return found.decode()
     try:
@@ -113,7 +115,7 @@ def _checked(
         return f"the script {error}"
     reason = told["failure"] and f"the script fails: {told['failure']}"
     reason = reason or export_check.difference(main, told, exact=exact, rtol=rtol) or ""
-    keep(root, "exports", key, reason.encode())
+    store.keep("exports", key, reason.encode())
     return reason
 
 

@@ -21,15 +21,14 @@ import json
 import time
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.lab_engine import LabEngine, engine_digest
+from coursebuild.effects.mjcf import model_files
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
-from coursebuild.effects.store import keep, kept, load
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
 from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
@@ -39,25 +38,25 @@ from coursebuild.labs.verdict import (
     code_diagnostic,
     entry_span,
     parity_diagnostics,
+    reset_diagnostics,
     trial_diagnostics,
 )
-from coursebuild.model import Course, Lab, document_blocks
+from coursebuild.model import Course, Lab
 from coursebuild.pipeline.custom_labs import custom_lab
 from coursebuild.pipeline.lab_export import Offer, exported
+from coursebuild.pipeline.lab_inputs import SIMULATED, WALL, lab_inputs, tried_data
+from coursebuild.pipeline.lab_inputs import labs_of as labs_of
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.remember import LabTrial, Memory
+from coursebuild.pipeline.remember_models import need_of
 from coursebuild.results import CompileResult, LabResult, StaticForm
-from coursebuild.scripts.extract import owners
+from coursebuild.values import dataclass
 
-_OURS = "simlab"
-_WALL = 60.0
-"""Seconds that a trial may take."""
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
 _PASSING = ("timeout", "engine")
 """Kinds of failure that may not happen again, so that they are not kept."""
-_UNTRIED = ("id", "title", "model", "height", "toggles")
-"""Data that no trial depends on."""
 
 
 class Engines:
@@ -87,14 +86,6 @@ class Engines:
         self.native.interrupt()
 
 
-def labs_of(course: Course) -> Iterator[tuple[str, str, Lab]]:
-    """Every lab with the id of its lesson or page and its name, in order."""
-    for owner, document in owners(course):
-        labs = (block for block in document_blocks(document) if isinstance(block, Lab))
-        for number, lab in enumerate(labs, 1):
-            yield owner, f"{owner}-lab-{number}", lab
-
-
 def try_labs(
     course: Course,
     models: Mapping[str, CompileResult],
@@ -104,32 +95,36 @@ def try_labs(
     wrong: Sequence[Diagnostic] = (),
     *,
     static: bool = False,
+    only: frozenset[str] | None = None,
 ) -> tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]:
     """Try the labs, of all documents or of some, whose models compile; `engines` end with it.
 
     A lab of which something is in `wrong` already, such as a keyframe that is not there, is left.
-    `static` forms are made when they are asked for.
+    `static` forms are made when they are asked for; `only` names the labs to try.
     """
     results: list[LabResult] = []
     found: list[Diagnostic] = []
+    memory = Memory(options.root, options.store)
     with engines:
         for owner, name, lab in labs_of(course):
             if documents is not None and lab.span.path not in documents:
                 continue
+            if only is not None and name not in only:
+                continue
             if any(lab.span.contains(diagnostic.span) for diagnostic in wrong):
                 continue
-            if lab.kind != _OURS:
-                native = engines.native.save
+            if lab.kind != SIMULATED:
+                save = functools.partial(_saved_model, memory, engines)
                 result, diagnostics = custom_lab(
-                    options.root, course, models, owner, name, lab, native
+                    options.root, course, models, owner, name, lab, save
                 )
                 found += diagnostics
                 results += [result] if result is not None else []
                 continue
-            source = _source(course, models, lab)
+            source = _source(course, models, memory, lab)
             if source is None:
                 continue
-            attempt = _Attempt(options.root, engines, course, owner, name, lab, source)
+            attempt = _Attempt(options.root, memory, engines, course, owner, name, lab, source)
             result, diagnostics = attempt.run(static)
             found += diagnostics
             results.append(result)
@@ -143,20 +138,43 @@ class _Source:
     path: str
     """Where it stands, or would."""
     text: str
-    files: tuple[str, ...] | None
-    """Other files that it consists of; `None` where they are not known."""
+    files: tuple[str, ...]
+    """Other files that it may consist of."""
 
 
-def _source(course: Course, models: Mapping[str, CompileResult], lab: Lab) -> _Source | None:
+def _source(
+    course: Course, models: Mapping[str, CompileResult], memory: Memory, lab: Lab
+) -> _Source | None:
     """A lab's model; `None` for one that does not compile, as is told already."""
     if lab.xml is not None:
         text = lab.xml.text
-        return _Source("models/.lab.xml", text, None if "file" in text else ())
+        path = "models/.lab.xml"
+        return _Source(path, text, model_files(memory.states.root, path, text))
     compiled = models.get(lab.model or "")
     if compiled is None or compiled.facts is None:
         return None
     source = next(model.source for model in course.models if model.name == lab.model)
-    return _Source(source.path, source.text, compiled.facts.includes)
+    files = model_files(memory.states.root, source.path, source.text)
+    return _Source(source.path, source.text, files)
+
+
+def _saved_model(memory: Memory, engines: Engines, path: str, text: str) -> bytes:
+    files = model_files(memory.states.root, path, text)
+    return _saved(memory, engines, _Source(path, text, files))
+
+
+def _saved(memory: Memory, engines: Engines, source: _Source) -> bytes:
+    """A model as an MJB file, from the store where nothing that it is made of has changed."""
+    needed = [need_of(file) for file in source.files]
+    states = [memory.states(need) for need in needed]
+    parts = json.dumps([engine_version(), source.path, source.text, source.files, states])
+    key = hashlib.sha256(parts.encode()).hexdigest()
+    made = memory.store.load("mjb", key)
+    if made is None:
+        made = engines.native.save(source.path, source.text)
+        if states == [memory.states.now(need) for need in needed]:  # nobody saved one meanwhile
+            memory.store.keep("mjb", key, made)
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +182,7 @@ class _Attempt:
     """Trying one lab."""
 
     root: Path
+    memory: Memory
     engines: Engines
     course: Course
     owner: str
@@ -190,18 +209,22 @@ class _Attempt:
             told = diagnose("lab-engine", entry_span(lab, ()), f"native MuJoCo {error}")
             return self._failed(module, began), [told]
         trial, parity = read_trial(reply), _parity(reply)
+        seconds, made = _lasted(reply)
         found = [*trial_diagnostics(lab, trial), *self._version(trial)]
         if parity is not None:
             found += parity_diagnostics(lab, parity)
         form = self._static(key, trial) if static and not found else None
         offer = Offer(None) if found else self._export(trial, parity)
+        own = () if self.lab.xml is not None else (self.source.path,)
+        tried = LabTrial(not found, _is_kept(reply), seconds, made)
+        self.memory.note_lab(lab_inputs(lab, self.name), (*own, *self.source.files), tried)
         result = LabResult(
             span=lab.span,
             name=module.name,
             lesson=self.owner,
             title=lab.title,
             status="failed" if found else "ok",
-            seconds=time.monotonic() - began,
+            seconds=seconds if cached else time.monotonic() - began,
             steps_per_second=trial.steps_per_second,
             tried=trial.tried,
             parity=parity.describe() if parity is not None else "",
@@ -213,7 +236,7 @@ class _Attempt:
             export=offer.script,
             unexported=offer.reason,
         )
-        return result, found
+        return result, [*found, *reset_diagnostics(lab, trial)]
 
     def _failed(self, module: LabModule, began: float) -> LabResult:
         """A lab that could not be tried."""
@@ -234,22 +257,8 @@ class _Attempt:
         )
 
     def _model(self) -> bytes:
-        """The model as an MJB file, from the store where all that it is made of is known."""
-        path, text, files = self.source.path, self.source.text, self.source.files
-
-        def save() -> bytes:
-            return self.engines.native.save(path, text)
-
-        try:
-            parts = [(self.root / file).read_bytes() for file in files or ()]
-        except OSError:
-            files = None
-        if files is None:
-            return save()
-        digest = hashlib.sha256(engine_version().encode())
-        for part in (path.encode(), text.encode(), *parts):
-            digest.update(hashlib.sha256(part).digest())
-        return kept(self.root, "mjb", digest.hexdigest(), save)
+        """The model as an MJB file."""
+        return _saved(self.memory, self.engines, self.source)
 
     def _mistakes(self) -> list[Diagnostic]:
         """What no engine could run."""
@@ -262,23 +271,26 @@ class _Attempt:
         ]
 
     def _stored(self, key: str) -> dict[str, Any] | None:
-        found = load(self.root, "labs", key)
+        found = self.memory.store.load("labs", key)
         return None if found is None else json.loads(zlib.decompress(found))
 
     def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
         """The reply of the trial, with the comparison in place of what it was made from."""
         request = {
-            "config": _data(module),
+            "config": tried_data(module),
             "code": module.literal,
             "seconds": self.lab.verify_seconds,
         }
-        reply = self.engines.browser.trial(request, mjb, _WALL)
+        began = time.monotonic()
+        reply = self.engines.browser.trial(request, mjb, WALL)
         main = reply["main"]
         if main is not None and main["parity"] is not None:
             main["recorded"] = export_check.recorded(main["parity"], self._horizon(main))
             main["parity"] = self._compared(main, mjb)
-        if all(failure["kind"] not in _PASSING for failure in reply["failures"]):
-            keep(self.root, "labs", key, zlib.compress(json.dumps(reply).encode()))
+        reply["seconds"] = round(time.monotonic() - began, 4)
+        reply["made"] = int(time.time())
+        if _is_kept(reply):
+            self.memory.store.keep("labs", key, zlib.compress(json.dumps(reply).encode()))
         return reply
 
     def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any] | None:
@@ -301,7 +313,9 @@ class _Attempt:
         if trial.main is None:
             return Offer(None)
         lab = self.owner, self.name, self.lab
-        return exported(self.root, self.engines.native, self.course, lab, trial.main, parity)
+        return exported(
+            self.memory.store, self.root, self.engines.native, self.course, lab, trial.main, parity
+        )
 
     def _version(self, trial: Trial) -> Iterator[Diagnostic]:
         if trial.version != engine_version():
@@ -319,23 +333,27 @@ class _Attempt:
         def draw() -> bytes:
             return draw_picture(lab, main)
 
-        return static_form(lab, main, kept(self.root, "pictures", digest.hexdigest(), draw))
+        return static_form(lab, main, self.memory.store.kept("pictures", digest.hexdigest(), draw))
+
+
+def _lasted(reply: dict[str, Any]) -> tuple[float, int]:
+    """How long a trial took, s, and when it was, in seconds since 1970."""
+    return float(reply["seconds"]), int(reply["made"])
+
+
+def _is_kept(reply: dict[str, Any]) -> bool:
+    """Whether the same trial would have the same result another time."""
+    return all(failure["kind"] not in _PASSING for failure in reply["failures"])
 
 
 def _to_parse(piece: Piece) -> tuple[str, str, str, bool]:
     return piece.code, piece.form, piece.function, piece.takes_value
 
 
-def _data(module: LabModule) -> dict[str, Any]:
-    """What of a lab's data its trial is given."""
-    config: dict[str, Any] = json.loads(module.config)
-    return {name: value for name, value in config.items() if name not in _UNTRIED}
-
-
 def _key(lab: Lab, module: LabModule, mjb: bytes) -> str:
     digest = hashlib.sha256(mjb)
     for part in (
-        json.dumps(_data(module)),
+        json.dumps(tried_data(module)),
         module.literal,
         f"{lab.verify_seconds}/{lab.verify_rtol is None}",
         engine_digest(),
@@ -349,9 +367,9 @@ def _key(lab: Lab, module: LabModule, mjb: bytes) -> str:
 @functools.lru_cache(maxsize=1)
 def _drawing_digest() -> str:
     """A hash of how pictures are drawn."""
-    from coursebuild.labs import picture, reply, shapes, static
+    from coursebuild import labs
 
-    files = [Path(module.__file__ or "") for module in (picture, reply, shapes, static)]
+    files = sorted(Path(labs.__file__ or "").parent.glob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 

@@ -1,6 +1,7 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
-Entry point: `load(root)`.
+Entry point: `load(root)`; `parse` may remember what it parsed before, and `ahead` be told first of
+all that will be parsed.
 
 1. Read everything (`effects.read`), parse `content/course.toml`. Where the map is broken the
    lessons are parsed all the same, so that all mistakes are told in one run.
@@ -10,18 +11,17 @@ Entry point: `load(root)`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
 from coursebuild.checks import check_course
-from coursebuild.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import Course, Document, Lesson, Level, Page, Status
 from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
+from coursebuild.values import dataclass, replace
 from coursebuild.vocabulary import CALLOUTS
 
 MAP = "content/course.toml"
@@ -35,10 +35,39 @@ class Loaded:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def load(root: Path) -> Loaded:
+class Parse(Protocol):
+    """`parse_document`, or what remembers its results."""
+
+    def __call__(
+        self, source: Source, callouts: frozenset[str], *, lesson: bool
+    ) -> Parsed[Document]:
+        """The document that a text holds, and its mistakes."""
+
+
+Ahead: TypeAlias = Callable[[Sequence[tuple[Source, bool]], frozenset[str]], None]
+"""Is told which texts will be parsed, and which of them are lessons."""
+
+ParseMap: TypeAlias = Callable[[Source], Parsed[Course | None]]
+"""`parse_course_map`, or what remembers its results."""
+
+
+def load(
+    root: Path,
+    parse: Parse | None = None,
+    ahead: Ahead | None = None,
+    course_map: ParseMap | None = None,
+) -> Loaded:
     """Read and parse everything below `root`."""
     read = read_course(root)
-    loader = _Loader(root, read.value, list(read.diagnostics))
+    if parse is None:
+        from coursebuild.syntax.document import parse_document
+
+        parse = parse_document
+    if course_map is None:
+        from coursebuild.syntax.coursemap import parse_course_map
+
+        course_map = parse_course_map
+    loader = _Loader(root, read.value, list(read.diagnostics), parse, ahead, course_map)
     course = loader.course()
     return Loaded(course, tuple(loader.found))
 
@@ -46,8 +75,19 @@ def load(root: Path) -> Loaded:
 class _Loader:
     """The state of one loading: what was read, and what was found wrong."""
 
-    def __init__(self, root: Path, files: CourseFiles, found: list[Diagnostic]) -> None:
+    def __init__(
+        self,
+        root: Path,
+        files: CourseFiles,
+        found: list[Diagnostic],
+        parse: Parse,
+        ahead: Ahead | None,
+        course_map: ParseMap,
+    ) -> None:
         self.root = root
+        self.parse = parse
+        self.ahead = ahead
+        self.course_map = course_map
         self.files = files
         self.found = found
         self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
@@ -61,11 +101,18 @@ class _Loader:
         course = self._map()
         if course is None:
             if self.files.map is not None:
+                self._announce(self.files.lessons, ())
                 for source in self.files.lessons:
                     self._document(source, lesson=True)
             return None
         self.callouts = frozenset(kind.name for kind in course.callouts)
         self.unnamed = self._unnamed(course)
+        planned = {x.path for x in course.lessons if x.status is Status.PLANNED}
+        named = {page.path for page in course.pages}
+        self._announce(
+            [source for source in self.files.lessons if source.path not in planned],
+            [source for source in self.files.pages if source.path in named],
+        )
         levels = tuple(self._level(level) for level in course.levels)
         self._unlisted()
         pages = self._pages(course.pages)
@@ -80,12 +127,17 @@ class _Loader:
     def _map(self) -> Course | None:
         if self.files.map is None:
             return None
-        parsed = parse_course_map(self.files.map)
+        parsed = self.course_map(self.files.map)
         self.found += parsed.diagnostics
         return parsed.value
 
+    def _announce(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
+        if self.ahead is not None:
+            sources = [*((s, True) for s in lessons), *((s, False) for s in pages)]
+            self.ahead(sources, self.callouts)
+
     def _document(self, source: Source, *, lesson: bool) -> Document:
-        parsed = parse_document(source, self.callouts, lesson=lesson)
+        parsed = self.parse(source, self.callouts, lesson=lesson)
         self.found += parsed.diagnostics
         return parsed.value
 

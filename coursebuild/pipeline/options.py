@@ -1,18 +1,22 @@
 """What every command needs to know, and the wrong usage that is no mistake of the course.
 
-Entry points: `Options`, `find_course(directory)`, `select`.
+Entry points: `Options`, `find_course(directory)`, `open_store`, `select`.
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import find_root
+from coursebuild.effects.shared import shared_cache
+from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
+from coursebuild.values import dataclass
 
 
 class UsageError(Exception):
@@ -28,6 +32,13 @@ class Options:
     jobs: int
     """Scripts at a time."""
     quiet: bool
+    cache: Store | None = None
+    """What was made before; what is kept in the course's folder where nothing is said."""
+
+    @property
+    def store(self) -> Store:
+        """Where results are kept."""
+        return Store(self.root) if self.cache is None else self.cache
 
 
 def find_course(directory: str | None) -> Path:
@@ -46,6 +57,47 @@ def find_course(directory: str | None) -> Path:
         shown = os.fsencode(root).decode("utf-8", "backslashreplace")
         raise UsageError(f"the path of the course is not UTF-8: {shown}") from None
     return root
+
+
+def open_store(
+    root: Path,
+    where: str | None,
+    size: str | None,
+    environment: Mapping[str, str],
+    *,
+    fresh: bool = False,
+) -> Store:
+    """The results made before: here, and at a shared place.
+
+    What the command line does not say (`None`), the environment may: `COURSEBUILD_CACHE` a place,
+    `COURSEBUILD_CACHE_SIZE` what the store here may take.
+
+    Raises:
+        UsageError: one of them cannot be.
+    """
+    said = "--cache-size"
+    if size is None:
+        said, size = "COURSEBUILD_CACHE_SIZE", environment.get("COURSEBUILD_CACHE_SIZE") or None
+    limit = SIZE if size is None else _size(said, size)
+    if where is None:
+        where = environment.get("COURSEBUILD_CACHE") or None
+    elif not where:
+        raise UsageError("--cache names no place")
+    shared = None
+    if where is not None:
+        try:
+            shared = shared_cache(where)
+        except EffectError as error:
+            raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
+    return Store(root, shared=shared, size=limit, fresh=fresh)
+
+
+def _size(said: str, text: str) -> int:
+    """Bytes."""
+    match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", text, re.IGNORECASE)
+    if match is None:
+        raise UsageError(f"{said}: {text!r} is no size: a whole number, perhaps with K, M, G or T")
+    return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 
 
 @dataclass(frozen=True, slots=True)

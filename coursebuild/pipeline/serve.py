@@ -1,66 +1,147 @@
-"""`coursebuild serve`: build, serve from memory, build again and reload the page after each save.
+"""`coursebuild serve`: the course as a site in memory that follows every save.
 
-Entry point: `serve(options, port)`. The last good site stays while something is wrong; what is
-wrong is printed and shown over the page.
+Entry point: `serve(options, port)`.
+
+1. A server answers at once; the course is read, and its pages are drawn when they are asked for.
+2. A thread takes saves (`preview.follow`): the page that was saved is new within milliseconds.
+3. The main thread does the rest behind it (`preview.behind`): scripts, labs, fonts, whole checks.
+
+The last good page stays while something is wrong; what is wrong is printed and shown over it.
 """
 
 from __future__ import annotations
 
+import functools
 import sys
 import threading
-from dataclasses import replace
 
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.resources import bundled_files
+from coursebuild.effects.packages import distributions, library_files
+from coursebuild.effects.read import read_bytes
+from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
-from coursebuild.effects.watch import changes
-from coursebuild.pipeline.build import prepare
+from coursebuild.effects.watch import Watcher
+from coursebuild.model import Course
 from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.preview.behind import Behind
+from coursebuild.pipeline.preview.follow import follow
+from coursebuild.pipeline.preview.live import LiveCourse
+from coursebuild.pipeline.preview.told import accept, page_news
 from coursebuild.pipeline.progress import Progress
-from coursebuild.report import Style, render_report
+from coursebuild.render.assets import Assets, page_script
+from coursebuild.render.fonts import FontJob, subset_font
+from coursebuild.render.zips import Package, Surroundings, imported_modules
+from coursebuild.results import OutputFile
+
+_SWITCH = 0.001
+"""Seconds after which a thread that computes lets another one: a save should not wait for long."""
+
+
+class Site:
+    """A live course as the server sees it."""
+
+    def __init__(self, live: LiveCourse) -> None:
+        self._live = live
+        self.changed = live.changed
+
+    @property
+    def version(self) -> int:
+        """See `LiveCourse`."""
+        return self._live.version
+
+    def find(self, path: str) -> bytes | None:
+        """A file of the site."""
+        return self._live.find(path)
+
+    def base(self) -> str:
+        """The path of the course's base address."""
+        return self._live.pages.base()
+
+    def expected(self, path: str) -> bool:
+        """Whether a page has mistakes and was never good."""
+        return self._live.pages.has_page(path)
+
+    def news(self, path: str) -> str:
+        """What a page is told."""
+        return page_news(self._live, path)
+
+    def accept(self, path: str, id: str) -> str:
+        """Write what a page offers."""
+        return accept(self._live, path, id)
 
 
 def serve(options: Options, port: int) -> None:
     """Serve until interrupted, which is how a preview ends."""
     progress = Progress(quiet=options.quiet)
-    script = dict(bundled_files())["js/preview.js"]
+    live = live_course(options)
+    bundled = dict(bundled_files())
+    files = {
+        "preview.js": page_script(bundled["js/preview.js"]),
+        "preview.css": bundled["css/preview.css"],
+    }
     try:
-        server = PreviewServer(port, script)
+        server = PreviewServer(port, Site(live), files)
     except OSError as error:
         raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
-    server.start()
-    print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
-    stop = threading.Event()
+    watcher = Watcher(options.root)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH)
     try:
-        # Watched from before the first build on, so that no save is missed.
-        for changed in changes(options.root, stop):
-            if changed:
-                names = sorted(changed)
-                progress.say(f"changed: {', '.join(names[:3])}{' …' if len(names) > 3 else ''}")
-            _rebuild(options, progress, server)
+        server.start()
+        print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        watcher.start()
+        _work(live, watcher, options, progress, server.url)
     except KeyboardInterrupt:
         progress.say("stopped")
     finally:
-        stop.set()
+        watcher.stop()
         server.stop()
+        live.parts.close()
+        sys.setswitchinterval(before)
 
 
-def _rebuild(options: Options, progress: Progress, server: PreviewServer) -> None:
-    """Build once; a course that cannot be read right now is told like any other mistake."""
-    try:
-        with project_lock(options.root, progress.say):
-            prepared = prepare(options, progress)
-    except EffectError as error:
-        text = f"coursebuild: {error.message}" + (f"\n{error.help}" if error.help else "")
-        print(text, file=sys.stderr, flush=True)
-        server.problems(text)
-        return
-    report = prepared.report
-    if report.ok:
-        server.publish(prepared.files)
-        progress.say(f"ready: {server.url}")
-    else:
-        text = render_report(replace(report, scripts=()), "text", Style())
-        print(text, file=sys.stderr, flush=True)
-        server.problems(text)
+def live_course(options: Options) -> LiveCourse:
+    """The course of these options, not read yet."""
+
+    def subset(job: FontJob) -> bytes:
+        return options.store.kept("fonts", job.key, lambda: subset_font(job))
+
+    assets = Assets(template_texts(), bundled_files())
+    return LiveCourse(options.root, assets, subset, functools.partial(_surroundings, options))
+
+
+def _work(
+    live: LiveCourse, watcher: Watcher, options: Options, progress: Progress, url: str
+) -> None:
+    """Read the course, then follow it; ends by an exception only."""
+    live.reread()
+    progress.say(f"ready: {url}")
+    behind = Behind(live, options, progress)
+    watcher.wait()
+
+    def saved(paths: frozenset[str], seconds: float) -> None:
+        names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
+        progress.say(f"changed: {names} ({1e3 * seconds:.0f} ms)")
+
+    def run() -> None:
+        try:
+            follow(live, watcher, behind.notice, saved)
+        except BaseException as error:  # told by the main thread
+            behind.fail(error)
+
+    threading.Thread(target=run, name="saves", daemon=True).start()
+    behind.follow()
+
+
+def _surroundings(options: Options, course: Course) -> Surroundings:
+    """What the archives of scripts need."""
+    library = library_files()
+    packages = tuple(Package(*p) for p in distributions(imported_modules(course, library)))
+    meshes: list[OutputFile] = []
+    for path in course.files:
+        if path.startswith("models/"):
+            try:
+                meshes.append(OutputFile(path, read_bytes(options.root, path)))
+            except EffectError:
+                continue  # gone since the course was read
+    return Surroundings(packages, library, tuple(meshes))

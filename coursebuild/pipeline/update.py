@@ -2,7 +2,9 @@
 
 Entry point: `update(options, names, dry_run=…)`.
 
-1. Every chosen script runs twice. What differs between the two runs cannot be recorded.
+1. Every chosen script runs twice. What differs between the two runs cannot be recorded. A
+   remembered result counts as the first of them, and where nothing of it is to be recorded as both:
+   what is written has always been printed by two runs, the second of them now.
 2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
    changed it meanwhile.
 3. The bound numbers of the lessons as they are now are checked, so that prose which a new output
@@ -24,6 +26,7 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts, run, script_lines
 from coursebuild.report import Report
 from coursebuild.results import Outcome, ScriptRun
@@ -53,7 +56,7 @@ def _update(
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
     first = run(scripts, options, progress)
-    again = run(scripts, options, progress, "running scripts again")
+    again = _again(course, chosen, scripts, first, options, progress)
     edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
@@ -74,6 +77,36 @@ def _update(
         documents=chosen.documents,
         remarks=remarks,
     )
+
+
+def _again(
+    course: Course,
+    chosen: Selection,
+    scripts: Sequence[Extraction],
+    first: Sequence[ScriptRun],
+    options: Options,
+    progress: Progress,
+) -> tuple[ScriptRun, ...]:
+    """The second runs; a remembered first one that is recorded already stands for both."""
+    edits, refused = _edits(course, chosen, first, first, frozenset())
+    wrong = {r.script for r in _recordings(course, chosen) if _is_touched(r, edits, refused)}
+    left = [
+        extraction
+        for extraction, one in zip(scripts, first, strict=True)
+        if not one.cached or one.path in wrong
+    ]
+    memory = Memory(options.root, options.store, fresh=True)
+    ran = {r.path: r for r in run(left, options, progress, "running scripts again", memory)}
+    return tuple(ran.get(one.path, one) for one in first)
+
+
+def _is_touched(
+    recording: Recording, edits: Mapping[Source, list[Edit]], refused: Sequence[Diagnostic]
+) -> bool:
+    """Whether something is to be written into a recording, or cannot be."""
+    whole = recording.span
+    written = any(whole.contains(edit.span) for edit in edits.get(whole.source, ()))
+    return written or any(whole.contains(d.span) for d in refused)
 
 
 def _recordings(course: Course, chosen: Selection) -> list[Recording]:

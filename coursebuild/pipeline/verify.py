@@ -1,51 +1,54 @@
-"""Course → Results: extract and run the scripts, compare, compile the models, typeset the formulas.
+"""Course → Results: extract and run the scripts, compare, compile the models.
 
 Entry point: `verify(course, options, progress, lessons)`.
 
 1. Scripts are written to `examples/`; one that was edited there by hand is reported and not run.
 2. The scripts of the chosen lessons run, `options.jobs` at a time.
 3. Recorded outputs and bound numbers are held against the runs.
-4. Models and MJCF blocks are compiled in a child process, formulas are typeset in V8; neither is
-   started for a course that has none.
+4. Models and MJCF blocks are compiled in a child process, which is not started for a course that
+   has none.
+
+Documents may be skeletons. Formulas are no part of this: see `pipeline.documents`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
-from collections.abc import Collection, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import assert_never
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, assert_never
 
-from coursebuild.checks import check_compiled, check_formulas, course_formulas, mjcf_texts
+from coursebuild.checks import check_compiled, mjcf_texts
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.effects import mjcf
 from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
-from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted, run_scripts
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.effects.write import remove_leftovers
-from coursebuild.model import Course, OutputQuestion, Quiz, document_blocks
-from coursebuild.pipeline.labs import Engines, labs_of, try_labs
+from coursebuild.model import Course, Lab, OutputQuestion, Quiz, document_blocks
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory, longest_first
+from coursebuild.pipeline.shards import Shard
 from coursebuild.report import LabLine, ScriptLine
 from coursebuild.results import (
     CompileResult,
-    Formula,
     LabResult,
-    MathError,
     Outcome,
     Results,
+    ScriptJob,
     ScriptRun,
     Verdict,
 )
 from coursebuild.scripts.bindings import document_bindings
 from coursebuild.scripts.compare import verify as compare_all
+from coursebuild.scripts.dependencies import Inputs
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
+from coursebuild.scripts.repeat import repeat_findings
+from coursebuild.values import dataclass
+
+if TYPE_CHECKING:
+    from coursebuild.effects.runner import RunEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,38 +68,54 @@ def verify(
     documents: frozenset[str] | None = None,
     *,
     static: bool = False,
+    shard: Shard | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
-    `static`: with the static forms of labs, which only a build needs.
+    `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
+    the scripts and labs.
     """
+    options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
     chosen: Sequence[Extraction] = extracted.runnable
     if documents is not None:
         leaned_on = _leaned_on(course, documents)
         chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
-    models, compiled = _compile(course, options, progress)
-    engines = Engines(options.root)
-    with ThreadPoolExecutor(1, "labs") as beside:
-        work = functools.partial(try_labs, course, dict(models), options, engines, static=static)
-        trying = beside.submit(work, documents, compiled)
-        try:
-            runs = run(chosen, options, progress)
-            there_are_labs = any(True for _ in labs_of(course))
-            with progress.stage("trying labs") if there_are_labs else contextlib.nullcontext():
-                labs, lab_findings = trying.result()
-        except BaseException:  # Ctrl-C does not wait for a lab
-            engines.stop()
-            raise
+    only = None
+    if shard is not None:
+        from coursebuild.pipeline.lab_inputs import labs_of
+
+        names = (name for _, name, lab in labs_of(course) if _is_in(lab, documents))
+        only = shard.takes([*(e.path for e in chosen), *names])
+        chosen = [e for e in chosen if e.path in only]
+    models, compiled = compile_models(course, options, progress)
+    memory = Memory(options.root, options.store)
+    scripts = functools.partial(run, chosen, options, progress, memory=memory)
+    labs: tuple[LabResult, ...] = ()
+    lab_findings: tuple[Diagnostic, ...] = ()
+    if _has_labs(course):
+        from coursebuild.pipeline.beside import Trials, run_beside
+
+        trials = Trials(course, dict(models), options, documents, compiled, only, static)
+        runs, (labs, lab_findings) = run_beside(scripts, trials, progress)
+    else:
+        runs = scripts()
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]
     found += script_findings(course, chosen, runs, verdicts)
+    found += repeat_findings(course, chosen, memory.differing)
     found += check_output_lines(course, runs)
-    formulas = _typeset(course, progress)
-    found += check_formulas(course, dict(formulas))
     versions = python_version(), engine_version()
-    results = Results(runs, verdicts, formulas, models, *versions, labs)
+    results = Results(runs, verdicts, (), models, *versions, labs)
     return Verified(results, tuple(found), script_lines(chosen, runs, verdicts), lab_lines(labs))
+
+
+def _has_labs(course: Course) -> bool:
+    return any(isinstance(b, Lab) for d in course.documents for b in document_blocks(d))
+
+
+def _is_in(lab: Lab, documents: Collection[str] | None) -> bool:
+    return documents is None or lab.span.path in documents
 
 
 def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
@@ -183,25 +202,62 @@ def run(
     options: Options,
     progress: Progress,
     stage: str = "running scripts",
+    memory: Memory | None = None,
 ) -> tuple[ScriptRun, ...]:
-    """Run the chosen scripts, telling of each when it begins and ends."""
+    """The results of the chosen scripts: remembered ones, and those of the others run now.
+
+    What begins and ends is told. `memory` is what is remembered; another one than that of the
+    options where everything is to run.
+    """
+    chosen = tuple(chosen)
+    memory = Memory(options.root, options.store) if memory is None else memory
     todo = jobs(chosen)
+    texts = {extraction.path: extraction.data for extraction in chosen}
+    inputs = {job.path: memory.inputs(job, texts[job.path]) for job in todo if not job.norun}
+    done = memory.recall(tuple(inputs.values()))
+    left = [job for job in todo if job.path not in done]
+    for finished in _run(left, inputs, options, progress, stage, memory):
+        done[finished.path] = finished
+    return tuple(done[job.path] for job in todo)
+
+
+def _run(
+    todo: Sequence[ScriptJob],
+    inputs: Mapping[str, Inputs],
+    options: Options,
+    progress: Progress,
+    stage: str,
+    memory: Memory,
+) -> tuple[ScriptRun, ...]:
+    """Run scripts, the longest first, and remember what they did."""
+    if not todo:
+        return ()
+    from coursebuild.effects.runner import RunFinished, RunStarted, run_scripts
+
     count = sum(not job.norun for job in todo)
     if not count:
         return run_scripts(options.root, todo, parallel=1)
+    lasted = {job.path: memory.last(job.path) for job in todo}
+    seconds = {path: None if last is None else last.seconds for path, last in lasted.items()}
 
     def told(event: RunEvent) -> None:
         match event:
             case RunStarted():
+                memory.started(event.path)
                 progress.started(event.path)
             case RunFinished():
                 done = event.run
+                memory.keep(inputs[done.path], done)
                 progress.finished(done.path, done.outcome.value, done.seconds)
             case _:
                 assert_never(event)
 
+    memory.begin()
     with progress.stage(stage, count):
-        return run_scripts(options.root, todo, parallel=options.jobs, on_event=told)
+        ordered = longest_first(todo, seconds)
+        runs = run_scripts(options.root, ordered, parallel=options.jobs, on_event=told)
+    memory.close()
+    return runs
 
 
 def script_lines(
@@ -238,30 +294,26 @@ def lab_lines(labs: Sequence[LabResult]) -> tuple[LabLine, ...]:
     )
 
 
-# --- models and formulas
+# --- models
 
 
-def _compile(
+def compile_models(
     course: Course, options: Options, progress: Progress
 ) -> tuple[tuple[tuple[str, CompileResult], ...], tuple[Diagnostic, ...]]:
+    """Compile the models and MJCF blocks of a course; what is wrong with them."""
     texts = mjcf_texts(course)
     if not course.models and not texts:
         return (), ()
-    with progress.stage("compiling models"):
-        compiled, parts = mjcf.compile_all(options.root, course.models, [t.text for t in texts])
+    from coursebuild.effects import mjcf
+    from coursebuild.pipeline.remember_models import compile_all
+
+    stage = functools.partial(progress.stage, "compiling models")
+    compiled, parts = compile_all(
+        options.root, options.store, course.models, [t.text for t in texts], stage
+    )
     models = tuple(
         (model.name, result) for model, result in zip(course.models, compiled, strict=True)
     )
     made = tuple(zip(texts, parts, strict=True))
     found = check_compiled(course, dict(models), made, mjcf.readable_error)
     return models, found
-
-
-def _typeset(course: Course, progress: Progress) -> tuple[tuple[Formula, str | MathError], ...]:
-    formulas = course_formulas(course)
-    if not formulas:
-        return ()
-    from coursebuild.effects.v8 import MathEngine
-
-    with progress.stage("typesetting formulas"), MathEngine() as engine:
-        return tuple(zip(formulas, engine.typeset(formulas), strict=True))

@@ -2,13 +2,22 @@
 
 `render_site(course, results, assets, options)` gives the files; `check_links(files, base_url)` says
 what is broken in them.
+
+What is named here is imported when it is first asked for: most of it is needed only where something
+is drawn.
 """
 
-from coursebuild.render.assets import Assets
-from coursebuild.render.fonts import FontJob, subset_font
-from coursebuild.render.links import BrokenLink, check_links
-from coursebuild.render.site import SiteOptions, render_site
-from coursebuild.render.zips import Package, Surroundings, imported_modules
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coursebuild.render.assets import Assets
+    from coursebuild.render.fonts import FontJob, subset_font
+    from coursebuild.render.links import BrokenLink, check_links
+    from coursebuild.render.site import SiteOptions, render_site
+    from coursebuild.render.zips import Package, Surroundings, imported_modules
 
 __all__ = [
     "Assets",
@@ -22,3 +31,22 @@ __all__ = [
     "render_site",
     "subset_font",
 ]
+
+_MODULES = {
+    "Assets": "assets",
+    "BrokenLink": "links",
+    "FontJob": "fonts",
+    "Package": "zips",
+    "SiteOptions": "site",
+    "Surroundings": "zips",
+    "check_links": "links",
+    "imported_modules": "zips",
+    "render_site": "site",
+    "subset_font": "fonts",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)

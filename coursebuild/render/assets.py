@@ -13,11 +13,14 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from dataclasses import dataclass
-
-from jinja2 import DictLoader, Environment, StrictUndefined
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol
 
 from coursebuild.render.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+from coursebuild.values import dataclass
+
+if TYPE_CHECKING:
+    from jinja2 import BytecodeCache, Environment
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +29,9 @@ class Assets:
 
     templates: tuple[tuple[str, str], ...]
     """Path relative to `templates/`, and text."""
-    dist: tuple[tuple[str, bytes], ...]
+    dist: tuple[tuple[str, bytes], ...] | Mapping[str, bytes]
     """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
-    bytes."""
+    bytes; a mapping may read them when they are asked for."""
 
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""
@@ -36,11 +39,15 @@ class Assets:
 
     def file(self, path: str) -> bytes:
         """The bytes of a bundled file (`KeyError` where there is none)."""
-        return dict(self.dist)[path]
+        return self._bundle()[path]
 
     def files(self, folder: str) -> tuple[tuple[str, bytes], ...]:
         """The bundled files of a folder."""
-        return tuple((path, data) for path, data in self.dist if path.startswith(f"{folder}/"))
+        bundle = self._bundle()
+        return tuple((path, bundle[path]) for path in bundle if path.startswith(f"{folder}/"))
+
+    def _bundle(self) -> Mapping[str, bytes]:
+        return self.dist if isinstance(self.dist, Mapping) else dict(self.dist)
 
 
 def hashed_name(path: str, data: bytes) -> str:
@@ -59,9 +66,33 @@ def page_script(code: bytes) -> bytes:
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
 
 
+class Compiled(Protocol):
+    """Keeps the code that templates are compiled to."""
+
+    def __hash__(self) -> int:
+        """Engines are made once for each."""
+
+    def load(self, name: str) -> bytes | None:
+        """What was kept under a name."""
+
+    def keep(self, name: str, data: bytes) -> None:
+        """Keep a template's code."""
+
+
+def templates_of(
+    templates: tuple[tuple[str, str], ...], compiled: Compiled | None = None
+) -> Callable[[], Environment]:
+    """Gives the template engine, which is imported when it is first asked for."""
+    return functools.cache(lambda: template_environment(templates, compiled))
+
+
 @functools.lru_cache(maxsize=8)
-def template_environment(templates: tuple[tuple[str, str], ...]) -> Environment:
+def template_environment(
+    templates: tuple[tuple[str, str], ...], compiled: Compiled | None = None
+) -> Environment:
     """The template engine: it escapes all that is not `Markup`, and refuses undefined names."""
+    from jinja2 import DictLoader, Environment, StrictUndefined
+
     environment = Environment(
         loader=DictLoader({path: text for path, text in templates if path.endswith(".html")}),
         autoescape=True,
@@ -69,8 +100,28 @@ def template_environment(templates: tuple[tuple[str, str], ...]) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
+        bytecode_cache=None if compiled is None else _bytecode_cache(compiled),
     )
     return environment
+
+
+def _bytecode_cache(compiled: Compiled) -> BytecodeCache:
+    import jinja2
+    from jinja2.bccache import Bucket, BytecodeCache
+
+    class Cache(BytecodeCache):
+        def load_bytecode(self, bucket: Bucket) -> None:
+            data = compiled.load(_name(bucket))
+            if data is not None:
+                bucket.bytecode_from_string(data)
+
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            compiled.keep(_name(bucket), bucket.bytecode_to_string())
+
+    def _name(bucket: Bucket) -> str:
+        return f"{jinja2.__version__}/{bucket.key}/{bucket.checksum}"
+
+    return Cache()
 
 
 @functools.lru_cache(maxsize=8)

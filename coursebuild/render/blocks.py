@@ -7,7 +7,6 @@ shown is worked out here as values; templates in `blocks/` say how it looks.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, assert_never
 
@@ -25,10 +24,13 @@ from coursebuild.model import (
     Script,
     Table,
 )
+from coursebuild.render.characters import visible
 from coursebuild.render.folding import Part, fold
-from coursebuild.render.highlight import highlight_lines, visible
+from coursebuild.render.sheet import ShownRun, ShownVerdict
 from coursebuild.render.strings import Strings
-from coursebuild.results import Outcome, ScriptRun, Verdict
+from coursebuild.render.tools import Tools
+from coursebuild.results import Outcome
+from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
@@ -55,11 +57,11 @@ class Receipt:
 
 def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
     """A script and the outputs that belong to it, as one object."""
-    run = page.library.runs.get(block.path)
+    run = page.shown.runs.get(block.path)
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page.library.words, block.code.text),
+        parts=_parts(page.tools, block.code.text),
         href=page.place.href(block.path),
         command=" ".join(("python", block.path, *block.args)),
         outputs=tuple(_output(page, recording) for recording in recordings),
@@ -87,8 +89,8 @@ def callout(page: PageContext, block: Callout) -> Markup:
     return page.template(
         "blocks/callout.html",
         callout=block,
-        label=page.library.callout_label(block.kind),
-        promise=page.library.callout_promise(block.kind),
+        label=page.shown.callouts[block.kind].label,
+        promise=page.shown.callouts[block.kind].promise,
         title=page.inlines(block.title),
         body=page.blocks(block.blocks),
     )
@@ -96,7 +98,7 @@ def callout(page: PageContext, block: Callout) -> Markup:
 
 def io(page: PageContext, block: Io) -> Markup:
     """What a script takes, does and gives."""
-    words = page.library.words
+    words = page.tools.words
     rows = (
         (words("io.input"), page.inlines(block.input)),
         (words("io.process"), page.inlines(block.process)),
@@ -111,7 +113,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
         "blocks/mjcf.html",
         mjcf=block,
         html=page.highlight("xml", block.code.text.rstrip("\n")),
-        engine=page.library.results.engine,
+        engine=page.shown.engine,
     )
 
 
@@ -137,8 +139,8 @@ class Output:
 
 
 def _output(page: PageContext, block: Recording) -> Output:
-    verdict = page.library.verdict(block)
-    run = page.library.runs.get(block.script) if block.script is not None else None
+    verdict = page.shown.verdicts.get(block.span.start)
+    run = page.shown.runs.get(block.script) if block.script is not None else None
     table = isinstance(block.body, Table)
     return Output(
         caption=page.inlines(block.caption),
@@ -150,10 +152,10 @@ def _output(page: PageContext, block: Recording) -> Output:
 
 
 def _output_receipt(
-    page: PageContext, verdict: Verdict | None, run: ScriptRun | None, table: bool
+    page: PageContext, verdict: ShownVerdict | None, run: ShownRun | None, table: bool
 ) -> Receipt:
-    words, results = page.library.words, page.library.results
-    versions = {"engine": results.engine, "python": results.python}
+    words, shown = page.tools.words, page.shown
+    versions = {"engine": shown.engine, "python": shown.python}
     if verdict is None or verdict.status == "unchecked":
         return _not_run(words, run)
     match verdict.status:
@@ -195,16 +197,16 @@ def short(value: Decimal) -> str:
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
-def _script_receipt(page: PageContext, run: ScriptRun | None) -> Receipt:
+def _script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
     """What can be said for a script without a recorded output."""
-    words, results = page.library.words, page.library.results
+    words, shown = page.tools.words, page.shown
     if run is not None and run.outcome is Outcome.OK:
-        text = words("receipt.ran", engine=results.engine, python=results.python)
+        text = words("receipt.ran", engine=shown.engine, python=shown.python)
         return Receipt("verified", text)
     return _not_run(words, run)
 
 
-def _not_run(words: Strings, run: ScriptRun | None) -> Receipt:
+def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
     if run is not None and run.outcome is Outcome.SKIPPED:
         return Receipt("unverified", words("receipt.skipped", modules=", ".join(run.missing)))
     if run is not None and run.outcome is Outcome.NORUN:
@@ -215,13 +217,13 @@ def _not_run(words: Strings, run: ScriptRun | None) -> Receipt:
 # --- code
 
 
-def _parts(words: Strings, text: str) -> tuple[CodePart, ...]:
-    lines = highlight_lines("python", text.rstrip("\n"))
+def _parts(tools: Tools, text: str) -> tuple[CodePart, ...]:
+    lines = tools.mark("python", text.rstrip("\n"))
     return tuple(
         CodePart(
             Markup("\n").join(lines[part.first - 1 : part.last]),
             part.folded,
-            _fold_label(words, part),
+            _fold_label(tools.words, part),
         )
         for part in fold(text.rstrip("\n"))
     )

@@ -9,9 +9,7 @@ which recordings those are, and such a recording gives nothing where it stands b
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import assert_never
-from urllib.parse import urlsplit
 
 from markupsafe import Markup
 
@@ -19,38 +17,34 @@ from coursebuild.model import (
     Block,
     Callout,
     Document,
-    ExampleTarget,
     Inline,
     Io,
     Lab,
-    LessonTarget,
-    LevelTarget,
     ListBlock,
     Mjcf,
-    ModelTarget,
     NumberBinding,
-    PageTarget,
     PlainCode,
     Quiz,
     Recording,
     Script,
     Target,
-    UrlTarget,
     child_blocks,
-    local_file,
-    resolve,
 )
 from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
-from coursebuild.render.highlight import highlight
 from coursebuild.render.library import Library
+from coursebuild.render.sheet import Shown
+from coursebuild.render.shown import file_address, shown
 from coursebuild.render.strings import Strings
+from coursebuild.render.tools import Tools
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class PageContext:
     """One document on one page."""
 
-    library: Library
+    tools: Tools
+    shown: Shown
     place: urls.Place
     document: Document
     joined: Mapping[int, tuple[Recording, ...]]
@@ -60,43 +54,28 @@ class PageContext:
 
     @classmethod
     def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
-        """The context of a document, once it is known which outputs belong to which scripts."""
-        look = markup.Look(words=_markup_words(library.words))
-        return cls(library, place, document, dict(_joined(document)), look)
+        """The context of a document on a page of a course."""
+        return cls.made(library.tools, shown(library, place, document), place, document)
+
+    @classmethod
+    def made(cls, tools: Tools, shown: Shown, place: urls.Place, document: Document) -> PageContext:
+        """The context, once it is known what the page shows of the course."""
+        look = markup.Look(words=_markup_words(tools.words))
+        return cls(tools, shown, place, document, dict(_joined(document)), look)
 
     # what the Markdown renderer asks
 
     def href(self, target: Target) -> str:
         """The address of a link's target."""
-        library, place = self.library, self.place
-        target = resolve(target, library.course, self.document.source.path)
-        match target:
-            case LessonTarget():
-                return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
-            case LevelTarget():
-                return place.href(urls.level_path(library.levels[target.id]))
-            case ModelTarget():
-                return place.href(urls.model_page_path(target.name))
-            case PageTarget():
-                return place.href(urls.page_path(library.pages[target.id]), target.anchor)
-            case ExampleTarget():
-                return place.href(target.path)
-            case UrlTarget():
-                return self.url(target.url)
-            case _:
-                assert_never(target)
+        return self.shown.hrefs[target]
 
     def url(self, url: str) -> str:
         """An address as written, but a file of the course becomes its place in the site."""
-        parts = urlsplit(url)
-        if parts.scheme or parts.netloc or not parts.path:
-            return url
-        path = urls.file_path(local_file(url, self.document.source.path))
-        return self.place.href(path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
+        return file_address(self.place, self.document.source.path, url)
 
     def math(self, tex: str, display: bool) -> Markup:
         """A formula; one on a line of its own scrolls inside itself where it is too wide."""
-        mathml = self.library.mathml(tex, display)
+        mathml = self.tools.mathml(tex, display)
         if display:
             return self.template("blocks/formula.html", mathml=mathml)
         return Markup(formulas.breakable(mathml))
@@ -152,11 +131,11 @@ class PageContext:
 
     def highlight(self, language: str, text: str) -> Markup:
         """Code with its tokens marked."""
-        return highlight(language, text)
+        return self.tools.highlight(language, text)
 
     def template(self, name: str, **values: object) -> Markup:
         """A filled-in template."""
-        return self.library.render(name, **values)
+        return self.tools.render(name, **values)
 
 
 def _markup_words(words: Strings) -> markup.Words:

@@ -1,6 +1,7 @@
 """Which parts of a long script a reader sees at first, and which are folded.
 
-Entry point: `fold(code)`.
+Entry points: `fold(code)`; `imported(code)`, the modules that it imports. A text is parsed once for
+both.
 
 1. The code is cut at its top-level statements: a fold never begins or ends inside one.
 2. The head (docstring, imports, constants) is folded when it is long: the page around the script
@@ -12,7 +13,9 @@ Entry point: `fold(code)`.
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
+import functools
+
+from coursebuild.values import dataclass
 
 LONG = 48
 """Lines; a script up to this length is shown whole."""
@@ -44,13 +47,60 @@ class Part:
 
 def fold(code: str) -> tuple[Part, ...]:
     """The parts of a script; a short one, and one that does not parse, is one part in sight."""
-    lines = code.removesuffix("\n").split("\n")
-    whole = (Part(1, len(lines), folded=False),)
-    if len(lines) <= LONG:
-        return whole
+    lines = code.count("\n") + (not code.endswith("\n"))
+    return (Part(1, lines, folded=False),) if lines <= LONG else _read(*_ended(code)).parts
+
+
+def imported(code: str) -> frozenset[str]:
+    """Top-level modules that a Python text imports by name; none where it does not parse."""
+    return _read(*_ended(code)).modules
+
+
+@dataclass(frozen=True, slots=True)
+class _Outline:
+    parts: tuple[Part, ...]
+    modules: frozenset[str]
+
+
+def _ended(code: str) -> tuple[str, int]:
+    """The code without its last line ends where they mean nothing, and how many lines it has."""
+    core = code.rstrip("\n")
+    if core.endswith("\\") or len(code) - len(core) > 1:
+        core = code
+    return core, code.count("\n") + (not code.endswith("\n"))
+
+
+@functools.lru_cache(maxsize=1024)
+def _read(code: str, count: int) -> _Outline:
     try:
         body = ast.parse(code).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return _Outline((Part(1, count, folded=False),), frozenset())
+    return _Outline(_cut(body, code.removesuffix("\n").split("\n")), _imported(body))
+
+
+def _imported(body: list[ast.stmt]) -> frozenset[str]:
+    """The modules that are imported by statements, at any depth."""
+    found: set[str] = set()
+    waiting: list[ast.AST] = [*body]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import):
+            found.update(alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            if node.module and not node.level:
+                found.add(node.module.partition(".")[0])
+        else:
+            for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+                if inner := getattr(node, name, None):
+                    waiting += inner
+    return frozenset(found)
+
+
+def _cut(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
+    """The parts of a script that parses."""
+    whole = (Part(1, len(lines), folded=False),)
+    if len(lines) <= LONG:
         return whole
     starts = [_start(statement) for statement in body]
     if not body or len(set(starts)) != len(starts):

@@ -19,13 +19,10 @@ from __future__ import annotations
 import functools
 import hashlib
 import io
+import json
 from collections.abc import Iterable
-from dataclasses import dataclass
 
-import msgspec
-from fontTools import subset
-from fontTools.ttLib import TTFont
-from fontTools.varLib import instancer
+from coursebuild.values import dataclass
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
 """Families, as the bundle names them."""
@@ -40,7 +37,8 @@ _VERSION = 1
 """Part of a job's key: to be raised when the way of cutting changes."""
 
 
-class Face(msgspec.Struct, frozen=True):
+@dataclass(frozen=True, slots=True)
+class Face:
     """A font file of the bundle, as `fonts.json` lists it."""
 
     family: str
@@ -71,7 +69,7 @@ class FontJob:
 
 def read_faces(listing: bytes) -> tuple[Face, ...]:
     """The faces that `fonts.json` lists."""
-    return msgspec.json.decode(listing, type=tuple[Face, ...])
+    return tuple(Face(**{**face, "weight": tuple(face["weight"])}) for face in json.loads(listing))
 
 
 def font_jobs(
@@ -158,6 +156,8 @@ _ITALIC_SYMBOLS = {
 @functools.lru_cache(maxsize=64)
 def covered(data: bytes) -> frozenset[str]:
     """The characters that a font has a glyph for."""
+    from fontTools.ttLib import TTFont
+
     with TTFont(io.BytesIO(data), lazy=True) as font:
         return frozenset(map(chr, font.getBestCmap()))
 
@@ -165,6 +165,10 @@ def covered(data: bytes) -> frozenset[str]:
 @functools.lru_cache(maxsize=64)
 def subset_font(job: FontJob) -> bytes:
     """The font with the job's characters only, as WOFF2. The same job gives the same bytes."""
+    from fontTools import subset
+    from fontTools.ttLib import TTFont
+    from fontTools.varLib import instancer
+
     options = subset.Options()
     options.hinting = False
     options.notdef_outline = True
@@ -221,6 +225,8 @@ others."""
 @functools.lru_cache(maxsize=16)
 def mean_width(data: bytes) -> float:
     """The mean advance width of a font in em, weighted by `_FREQUENCY`."""
+    from fontTools.ttLib import TTFont
+
     with TTFont(io.BytesIO(data), lazy=True) as font:
         names, advances = font.getBestCmap(), font["hmtx"]
         total = sum(advances[names[ord(c)]][0] * weight for c, weight in _FREQUENCY.items())
@@ -247,6 +253,8 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
 
 def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
     """The rule of a fallback, scaled to the face with the Latin letters, where that is used."""
+    from fontTools.ttLib import TTFont
+
     for job, _ in files:
         if (job.face.family, job.face.style, job.face.subset) == (
             fallback.family,

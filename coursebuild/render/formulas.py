@@ -20,9 +20,8 @@ LONG = 20
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
 _WHOLE = re.compile(r"<math>(.*)</math>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
-_TOUCHING = re.compile(
-    r"""([(\[“‘"']*)((?:<math>(?:(?!</math>).)*</math>)+)([,.;:!?)\]’”"'…%]*)""", re.DOTALL
-)
+_OPENING = frozenset("([“‘\"'")
+_TOUCHING = re.compile(r"""((?:<math>.*?</math>)+)([,.;:!?)\]’”"'…%]*)""", re.DOTALL)
 
 
 def breakable(mathml: str) -> str:
@@ -49,13 +48,24 @@ def _outer_rows(text: str) -> list[str]:
 
 def glue(html: str) -> str:
     """The page with each inline formula held together with the punctuation that touches it."""
-    return _TOUCHING.sub(_held, html)
+    parts: list[str] = []
+    at = 0
+    start = html.find("<math>")
+    while start >= 0:
+        found = _TOUCHING.match(html, start)
+        if found is None:
+            break
+        before = start
+        while before > at and html[before - 1] in _OPENING:
+            before -= 1
+        if before < start or found[2]:
+            parts += (html[at:before], _held(html[before:start], found[1], found[2]))
+            at = found.end()
+        start = html.find("<math>", found.end())
+    return "".join((*parts, html[at:]))
 
 
-def _held(match: re.Match[str]) -> str:
-    before, formula, after = match.groups()
-    if not before and not after:
-        return match[0]
+def _held(before: str, formula: str, after: str) -> str:
     first, last = formula.find("</math><math>"), formula.rfind("</math><math>")
     if first < 0:
         return _hold(before + formula + after)

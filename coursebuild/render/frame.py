@@ -1,7 +1,7 @@
 """A page without its frame, and the frame: head, site navigation, foot.
 
 Entry points: `Draft`, what the modules of the single kinds of page make; `frame(library, draft,
-names)`, the finished text.
+names)`, the finished text; `frame_around`, what stands before and after the body.
 
 Pages are drawn in two steps because a page's head names the style sheet by its content, and the
 style sheet holds the fonts' names, which depend on every character of every page.
@@ -12,13 +12,14 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from coursebuild.render import meta, urls
-from coursebuild.render.highlight import visible
+from coursebuild.render.characters import visible
+from coursebuild.render.draft import Draft as Draft
 from coursebuild.render.library import Library
+from coursebuild.values import dataclass
 
 PAGE_WORDS = (
     "theme.label",
@@ -34,27 +35,8 @@ PAGE_WORDS = (
 _LAB_WORDS = ("lab.live.", "overlay.")
 """Beginnings of the keys of what running labs say."""
 
-_LIVE_LAB = "data-script="
+LIVE_LAB = "data-script="
 """What a page with a lab that runs has in it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """A page without its frame."""
-
-    path: str
-    """Its site path."""
-    kind: str
-    """`home`, `lesson`, `stub`, `level`, `model`, `page`, `notfound`: also a class of the style
-    sheet."""
-    title: str
-    description: str
-    body: Markup
-    """What stands between the site's head and foot."""
-    json_ld: Markup = Markup()
-    og_type: str = "website"
-    indexed: bool = True
-    """Whether search engines should list it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,11 +87,20 @@ def place_of(library: Library, path: str) -> urls.Place:
 
 def frame(library: Library, draft: Draft, names: Names) -> str:
     """The finished text of a page."""
+    before, after = frame_around(library, draft, names, live=LIVE_LAB in draft.body)
+    return before + visible(draft.body) + after
+
+
+_HERE = Markup("<!--here-->")
+
+
+def frame_around(library: Library, draft: Draft, names: Names, *, live: bool) -> tuple[str, str]:
+    """What stands before and after the body of a page; `live`: whether labs run on it."""
     course = library.course
     place = place_of(library, draft.path)
     values: Mapping[str, object] = {
         "kind": draft.kind,
-        "body": draft.body,
+        "body": _HERE,
         "language": course.language or "en",
         "policy": policy(draft.json_ld),
         "head_title": meta.head_title(course, draft.title, draft.kind),
@@ -129,14 +120,16 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
         "course": course,
         "source": course.repository if "{path}" not in course.repository else "",
         "results": library.results,
-        "page_words": _page_words(library, draft.body),
+        "page_words": _page_words(library, live=live),
     }
-    return visible(library.render("base.html", **values)) + "\n"
+    # Nothing else has angle brackets there: texts are escaped, and so is the structured data.
+    before, _, after = visible(library.render("base.html", **values)).partition(_HERE)
+    return before, f"{after}\n"
 
 
-def _page_words(library: Library, body: str) -> tuple[str, ...]:
+def _page_words(library: Library, *, live: bool) -> tuple[str, ...]:
     """Keys of the texts that the page carries for its scripts."""
-    if _LIVE_LAB not in body:
+    if not live:
         return PAGE_WORDS
     labs = sorted(key for key in library.words.keys if key.startswith(_LAB_WORDS))
     return (*PAGE_WORDS, *labs, "lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")

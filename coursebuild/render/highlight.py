@@ -1,6 +1,6 @@
 """Code as HTML: tokens in a handful of classes, and no character that HTML forbids.
 
-Entry points: `highlight(language, code)`, `highlight_lines`, `visible(text)`.
+Entry points: `highlight(language, code)`, `highlight_lines`.
 
 1. Pygments tells tokens apart far finer than a page should show; they are folded into the few kinds
    of `_CLASSES`, and what belongs to none gets no element at all.
@@ -11,15 +11,16 @@ Entry points: `highlight(language, code)`, `highlight_lines`, `visible(text)`.
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Iterator
 from html import escape
 
 from markupsafe import Markup
 from pygments.lexer import Lexer
-from pygments.lexers import get_lexer_by_name
+from pygments.lexers import find_lexer_class_by_name
 from pygments.token import Comment, Keyword, Literal, Name, Operator, String, Token, _TokenType
 from pygments.util import ClassNotFound
+
+from coursebuild.render.characters import visible as visible
 
 _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -42,25 +43,6 @@ _CLASSES: tuple[tuple[_TokenType, str], ...] = (
 
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
 
-_FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
-_ASTRAL_NONCHARACTER = re.compile(
-    "["
-    + "".join(chr(p + 0xFFFE) + chr(p + 0xFFFF) for p in range(1 << 16, 17 << 16, 1 << 16))
-    + "]"
-)
-
-
-def visible(text: str) -> str:
-    """The text with what HTML forbids replaced: a control by its picture, the rest by U+FFFD."""
-    return _ASTRAL_NONCHARACTER.sub("\ufffd", _FORBIDDEN.sub(_picture, text))
-
-
-def _picture(match: re.Match[str]) -> str:
-    code = ord(match[0])
-    if code < 0x20:
-        return chr(0x2400 + code)
-    return "\u2421" if code == 0x7F else "\ufffd"
-
 
 def highlight(language: str, code: str) -> Markup:
     """The code with its tokens marked; plain escaped text where no lexer knows the language."""
@@ -73,18 +55,25 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     lexer = _lexer(_ALIASES.get(language.lower(), language.lower()))
     if lexer is None:
         return tuple(Markup(escape(line, quote=False)) for line in visible(code).split("\n"))
-    lines: list[list[tuple[str, str]]] = [[]]
+    lines: list[str] = []
+    line: list[str] = []
+    css, run = "", ""
     for token, text in _tokens(lexer, visible(code)):
-        css = _class_of(token)
-        for number, part in enumerate(text.split("\n")):
-            if number:
-                lines.append([])
-            line = lines[-1]
-            if line and (line[-1][0] == css or not part.strip()):
-                line[-1] = (line[-1][0], line[-1][1] + part)
-            else:
-                line.append((css, part))
-    return tuple(Markup("".join(_span(css, text) for css, text in line)) for line in lines)
+        kind = _class_of(token)
+        first, *others = text.split("\n")
+        if kind == css or (run and not first.strip()):
+            run += first
+        else:
+            line.append(_span(css, run))
+            css, run = kind, first
+        for part in others:
+            line.append(_span(css, run))
+            lines.append("".join(line))
+            line = []
+            css, run = kind, part
+    line.append(_span(css, run))
+    lines.append("".join(line))
+    return tuple(map(Markup, lines))
 
 
 def _tokens(lexer: Lexer, code: str) -> Iterator[tuple[_TokenType, str]]:
@@ -114,6 +103,11 @@ def _lexer(language: str) -> Lexer | None:
     if not language:
         return None
     try:
-        return get_lexer_by_name(language, stripnl=False, ensurenl=False)
+        found = find_lexer_class_by_name(language)
     except ClassNotFound:
         return None
+    if found.name == "Python":
+        from coursebuild.render.python_lexer import FastPythonLexer
+
+        found = FastPythonLexer
+    return found(stripnl=False, ensurenl=False)

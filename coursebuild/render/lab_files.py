@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from coursebuild.render.assets import Assets, hashed_name
 from coursebuild.results import LabResult, OutputFile
+from coursebuild.values import dataclass
 
 _FOLDER = "assets/labs"
 

@@ -6,17 +6,17 @@ puts the live instrument into `data-lab` when it starts, and reads its configura
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
 from coursebuild.model import Lab, LabControl, ModelTarget
 from coursebuild.render.strings import Strings
+from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
-    from coursebuild.render.lab_files import LabFiles
+    from coursebuild.render.sheet import ShownRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,15 +54,15 @@ class PlotView:
 
 def lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
-    words = page.library.words
-    files = page.library.labs.labs.get((block.span.path, block.span.start))
+    words = page.tools.words
+    live = page.shown.labs.get(block.span.start)
     return page.template(
         "blocks/lab.html",
         lab=block,
-        key=files.result.name if files is not None else None,
-        config=page.place.href(files.config) if files is not None else None,
-        script=page.place.href(files.script) if files is not None else None,
-        recorded=_recorded(page, block, files) if files is not None else None,
+        key=live.name if live is not None else None,
+        config=page.place.href(live.config) if live is not None else None,
+        script=page.place.href(live.script) if live is not None else None,
+        recorded=_recorded(page, block, live.record) if live is not None else None,
         title=block.title or words("lab.untitled"),
         note=page.blocks(block.note),
         model_href=page.href(ModelTarget(block.model)) if block.model is not None else None,
@@ -74,25 +74,24 @@ def lab(page: PageContext, block: Lab) -> Markup:
     )
 
 
-def _recorded(page: PageContext, block: Lab, files: LabFiles) -> RecordedView | None:
+def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> RecordedView | None:
     """What the trial recorded; `None` where it did not come to its end."""
-    static = files.result.static
-    if static is None or files.picture is None:
+    if record is None:
         return None
-    words = page.library.words
+    words = page.tools.words
     return RecordedView(
-        page.place.href(files.picture),
-        static.size[0],
-        static.size[1],
-        words("lab.picture", title=block.title or words("lab.untitled"), t=number(static.time, 4)),
-        static.readouts,
-        tuple(Markup(svg) for svg in static.plots),
-        words("lab.at", t=_seconds(static.end)),
+        page.place.href(record.picture),
+        record.size[0],
+        record.size[1],
+        words("lab.picture", title=block.title or words("lab.untitled"), t=number(record.time, 4)),
+        record.readouts,
+        tuple(Markup(svg) for svg in record.plots),
+        words("lab.at", t=_seconds(record.end)),
         words(
             "lab.proven",
-            engine=page.library.results.engine,
-            tried=str(len(files.result.tried)),
-            parity=files.result.parity,
+            engine=page.shown.engine,
+            tried=str(record.tried),
+            parity=record.parity,
         ),
     )
 
@@ -111,8 +110,7 @@ def _start(page: PageContext, block: Lab) -> str | None:
     """The name of the keyframe that the lab starts from."""
     if block.key is None or isinstance(block.key, str):
         return block.key
-    compiled = page.library.models.get(block.model or "")
-    names = compiled.facts.keyframes if compiled is not None and compiled.facts is not None else ()
+    names = page.shown.keyframes.get(block.model or "", ())
     return (names[block.key] if 0 <= block.key < len(names) else "") or str(block.key)
 
 

@@ -1,44 +1,18 @@
 """The page of a lesson: where it stands, what it needs and gives, its text, and the way on.
 
-Entry points: `lesson_draft`, and for a planned lesson `stub_draft`; `article` and `contents` serve
-other pages with a document.
+Entry points: `lesson_sheet`, and for a planned lesson `stub_sheet`; `lesson_draft` and
+`stub_draft`, the same drawn.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from markupsafe import Markup
-
-from coursebuild.model import (
-    Block,
-    Document,
-    Emphasis,
-    FootnoteRef,
-    HardBreak,
-    Heading,
-    HtmlBlock,
-    Image,
-    Inline,
-    Lab,
-    Lesson,
-    Link,
-    Mjcf,
-    Quiz,
-    RawInline,
-    Recording,
-    Script,
-    SoftBreak,
-    Status,
-    Strikethrough,
-    Strong,
-    Table,
-    Text,
-)
+from coursebuild.model import Document, Lesson, Status
 from coursebuild.render import meta, urls
-from coursebuild.render.context import PageContext
-from coursebuild.render.frame import Draft
+from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library, document_scripts
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.shown import shown
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +29,27 @@ class LessonLink:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """An entry of the contents list."""
+class LessonHead:
+    """What stands over a lesson."""
 
-    anchor: str
-    title: Markup
-    children: tuple[Entry, ...] = ()
+    id: str
+    title: str
+    summary: str
+    minutes: int | None
+    objectives: tuple[str, ...]
+
+    @classmethod
+    def of(cls, lesson: Lesson) -> LessonHead:
+        """The head of a lesson of the map."""
+        return cls(lesson.id, lesson.title, lesson.summary, lesson.minutes, lesson.objectives)
+
+
+@dataclass(frozen=True, slots=True)
+class LevelName:
+    """A level as a lesson names it."""
+
+    id: str
+    title: str
 
 
 def lesson_link(
@@ -79,50 +68,67 @@ def lesson_link(
     )
 
 
+def drawn(library: Library, sheet: Sheet, document: Document | None = None) -> Draft:
+    """A page drawn."""
+    from coursebuild.render.draw import draw  # with all that it takes to draw
+
+    return draw(sheet, document, library.tools)
+
+
 def lesson_draft(library: Library, lesson: Lesson, document: Document) -> Draft:
     """The page of a written lesson."""
+    return drawn(library, lesson_sheet(library, lesson, document), document)
+
+
+def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
+    """What the page of a written lesson shows; its document's skeleton is enough."""
     place = urls.Place(urls.lesson_path(lesson))
-    page = PageContext.of(library, place, document)
     scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
-    body = page.template(
-        "lesson.html",
+    values = {
         **_common(library, place, lesson),
-        contents=contents(page, document),
-        article=article(page, document),
-        scripts=scripts,
-        scripts_zip=place.href(urls.lesson_zip_path(lesson)) if scripts else None,
-        edit=edit_address(library, lesson.path),
-    )
-    return Draft(
+        "scripts": scripts,
+        "scripts_zip": place.href(urls.lesson_zip_path(lesson)) if scripts else None,
+        "edit": edit_address(library, lesson.path),
+    }
+    return Sheet(
         place.path,
         "lesson",
         lesson.title,
         lesson.summary,
-        body,
+        "lesson.html",
+        values,
         json_ld=meta.lesson_data(library, lesson),
         og_type="article",
+        document=document.source.path,
+        shown=shown(library, place, document),
     )
 
 
 def stub_draft(library: Library, lesson: Lesson) -> Draft:
-    """The page of a planned lesson: it says that it is planned, and what can be read now."""
+    """The page of a planned lesson."""
+    return drawn(library, stub_sheet(library, lesson))
+
+
+def stub_sheet(library: Library, lesson: Lesson) -> Sheet:
+    """What the page of a planned lesson shows: that it is planned, and what can be read now."""
     place = urls.Place(urls.lesson_path(lesson))
     written = [need for need in _ancestors(library, lesson) if need.document is not None]
     readable = tuple(lesson_link(library, place, need) for need in written)
-    body = library.render("stub.html", **_common(library, place, lesson), readable=readable)
-    return Draft(place.path, "stub", lesson.title, lesson.summary, body, indexed=False)
+    values = {**_common(library, place, lesson), "readable": readable}
+    return Sheet(
+        place.path, "stub", lesson.title, lesson.summary, "stub.html", values, indexed=False
+    )
 
 
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """What a lesson's page says whether it is written or not."""
     level = library.levels[lesson.level]
-    order = library.course.lessons
-    at = library.positions[lesson.id]
+    order, at = library.order, library.positions[lesson.id]
     return {
-        "lesson": lesson,
+        "lesson": LessonHead.of(lesson),
         "status": lesson.status.value,
         "draft": lesson.status is Status.DRAFT,
-        "level": level,
+        "level": LevelName(level.id, level.title),
         "home": place.href(urls.HOME),
         "level_href": place.href(urls.level_path(level)),
         "needs": lesson_link(library, place, lesson, needs=True).needs,
@@ -141,7 +147,7 @@ def _ancestors(library: Library, lesson: Lesson) -> tuple[Lesson, ...]:
         if need not in found:
             found.add(need)
             waiting += library.lessons[need].prerequisites
-    return tuple(other for other in library.course.lessons if other.id in found)
+    return tuple(other for other in library.order if other.id in found)
 
 
 def edit_address(library: Library, path: str) -> str | None:
@@ -157,96 +163,3 @@ def edit_address(library: Library, path: str) -> str | None:
         return repository.replace("{path}", urls.encode(path))
     middle = "/-/edit/main/" if "gitlab" in repository else "/edit/main/"
     return repository.rstrip("/") + middle + urls.encode(path)
-
-
-# --------------------------------------------------------------------------------- documents
-
-
-def article(page: PageContext, document: Document) -> Markup:
-    """The text of a document. A docked lab stands beside the paragraphs around it."""
-    parts: list[Markup] = []
-    for group in _groups(document.blocks):
-        if group.lab is None:
-            parts.append(page.blocks(group.before))
-        else:
-            before, after = page.blocks(group.before), page.blocks(group.after)
-            instrument = page.block(group.lab)
-            parts.append(
-                page.template("partials/dock.html", before=before, lab=instrument, after=after)
-            )
-    return Markup("\n").join((*parts, page.footnotes()))
-
-
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """Blocks that follow each other; with a docked lab, those before and after it."""
-
-    before: tuple[Block, ...]
-    lab: Lab | None = None
-    after: tuple[Block, ...] = ()
-
-
-_WIDE = (Script, Recording, Mjcf, Quiz, Lab, Table, HtmlBlock)
-"""Blocks that take the whole width, so that no lab can stand beside them."""
-
-
-def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
-    """Cut the text around its docked labs.
-
-    Each takes what lies between it and the next heading or wide block, on both sides.
-    """
-    groups: list[_Group] = []
-    rest = blocks
-    while (
-        at := next((i for i, b in enumerate(rest) if isinstance(b, Lab) and b.dock), None)
-    ) is not None:
-        lab = rest[at]
-        assert isinstance(lab, Lab)
-        start = next((i + 1 for i in range(at - 1, -1, -1) if isinstance(rest[i], _WIDE)), 0)
-        start = next(
-            (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
-        )
-        end = next(
-            (i for i in range(at + 1, len(rest)) if isinstance(rest[i], (*_WIDE, Heading))),
-            len(rest),
-        )
-        if start:
-            groups.append(_Group(rest[:start]))
-        groups.append(_Group(rest[start:at], lab, rest[at + 1 : end]))
-        rest = rest[end:]
-    return (*groups, _Group(rest)) if rest else tuple(groups)
-
-
-def contents(page: PageContext, document: Document) -> tuple[Entry, ...]:
-    """The contents list: headings of levels 2 and 3, the latter under the former."""
-    entries: list[Entry] = []
-    for block in document.blocks:
-        if not isinstance(block, Heading) or block.level > 3:
-            continue
-        entry = Entry(block.anchor, page.inlines(without_links(block.children)))
-        if block.level == 3 and entries:
-            last = entries[-1]
-            entries[-1] = Entry(last.anchor, last.title, (*last.children, entry))
-        else:
-            entries.append(entry)
-    return tuple(entries)
-
-
-def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
-    """Inlines that may stand inside a link: no link, footnote, raw HTML or picture, in one line."""
-    kept: list[Inline] = []
-    for inline in inlines:
-        match inline:
-            case Link():
-                kept += without_links(inline.children)
-            case Emphasis() | Strong() | Strikethrough():
-                kept.append(type(inline)(inline.span, without_links(inline.children)))
-            case Image():
-                kept.append(Text(inline.span, inline.alt))
-            case SoftBreak() | HardBreak():
-                kept.append(Text(inline.span, " "))
-            case RawInline() | FootnoteRef():
-                pass
-            case _:
-                kept.append(inline)
-    return tuple(kept)

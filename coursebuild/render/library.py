@@ -7,11 +7,9 @@ afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, TypeAlias
 
-from jinja2 import Environment
 from markupsafe import Markup
 
 from coursebuild.model import (
@@ -29,11 +27,16 @@ from coursebuild.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.render.assets import Assets, strings_for, template_environment
+from coursebuild.render.assets import Assets, strings_for, templates_of
 from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.strings import Strings
+from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
+from coursebuild.values import dataclass
 from coursebuild.vocabulary import CALLOUTS
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
 
@@ -58,7 +61,8 @@ class Library:
     course: Course
     results: Results
     words: Strings
-    templates: Environment
+    templates: Callable[[], Environment]
+    """Gives the template engine."""
     lessons: Mapping[str, Lesson]
     levels: Mapping[str, Level]
     pages: Mapping[str, Page]
@@ -67,6 +71,8 @@ class Library:
     scripts: Mapping[str, tuple[Script, Owner]]
     """By path, in the order of the course."""
     runs: Mapping[str, ScriptRun]
+    order: tuple[Lesson, ...]
+    """All lessons in the order of the course."""
     positions: Mapping[str, int]
     """Where a lesson stands in the order of the course, by id, from 0."""
     leads: Mapping[str, tuple[Lesson, ...]]
@@ -78,43 +84,77 @@ class Library:
     _verdicts: Mapping[tuple[str, int], Verdict]
 
     @classmethod
-    def of(cls, course: Course, results: Results, assets: Assets) -> Library:
-        """Look everything over once."""
+    def of(
+        cls,
+        course: Course,
+        results: Results,
+        assets: Assets,
+        templates: Callable[[], Environment] | None = None,
+        words: Strings | None = None,
+    ) -> Library:
+        """Look everything over once, with templates and words, where there are some already."""
+        return cls.made(
+            course,
+            results,
+            assets,
+            scripts_of=document_scripts,
+            models_of=named_models,
+            labs=lab_files(results.labs, assets),
+            formulas=dict(results.formulas),
+            verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
+            templates=templates,
+            words=words,
+        )
+
+    @classmethod
+    def made(
+        cls,
+        course: Course,
+        results: Results,
+        assets: Assets,
+        *,
+        scripts_of: Callable[[Document], tuple[Script, ...]],
+        models_of: Callable[[Document], NamedModels],
+        labs: PublishedLabs,
+        formulas: Mapping[Formula, str | MathError],
+        verdicts: Mapping[tuple[str, int], Verdict],
+        templates: Callable[[], Environment] | None = None,
+        words: Strings | None = None,
+    ) -> Library:
+        """The same from parts that whoever calls remembers; they are not copied."""
         return cls(
             course=course,
             results=results,
-            words=strings_for(assets.templates, course.language),
-            templates=template_environment(assets.templates),
+            words=words or strings_for(assets.templates, course.language),
+            templates=templates or templates_of(assets.templates),
             lessons={lesson.id: lesson for lesson in course.lessons},
             levels={level.id: level for level in course.levels},
             pages={page.id: page for page in course.pages},
             callouts={kind.name: kind for kind in course.callouts},
             models=dict(results.models),
-            scripts=_scripts(course),
+            scripts=course_scripts(course, scripts_of),
             runs={run.path: run for run in results.runs},
+            order=course.lessons,
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
-            uses=_uses(course),
-            labs=lab_files(results.labs, assets),
-            _formulas=dict(results.formulas),
-            _verdicts={_place(verdict.recording): verdict for verdict in results.verdicts},
+            uses=_uses(course, models_of),
+            labs=labs,
+            _formulas=formulas,
+            _verdicts=verdicts,
         )
 
-    def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template, without its last line end; it sees `t`, the interface's words."""
-        text = self.templates.get_template(template).render(t=self.words, **values)
-        return Markup(text.rstrip("\n"))
+    @property
+    def tools(self) -> Tools:
+        """What pages are drawn with."""
+        return Tools(self.words, self.templates, self._formulas)
 
-    def mathml(self, tex: str, display: bool) -> Markup:
-        """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
-        found = self._formulas[Formula(tex, display)]
-        if isinstance(found, MathError):
-            raise ValueError(f"formula {tex!r} does not parse: {found.message}")
-        return Markup(found)
+    def render(self, template: str, **values: object) -> Markup:
+        """A filled-in template; see `Tools`."""
+        return self.tools.render(template, **values)
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """How a recorded output compared with the run; `None` where nobody compared it."""
-        return self._verdicts.get(_place(recording))
+        return self._verdicts.get(place(recording))
 
     def callout_label(self, kind: str) -> str:
         """The label of a kind of callout: the course's own, else that of the interface."""
@@ -157,16 +197,39 @@ def models_named(script: Script) -> frozenset[str]:
     return frozenset(found)
 
 
-def _scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
+@dataclass(frozen=True, slots=True)
+class NamedModels:
+    """What a document names that may be models."""
+
+    by_labs: frozenset[str]
+    by_scripts: frozenset[str]
+    by_links: frozenset[str]
+
+
+def named_models(document: Document) -> NamedModels:
+    """The models that a document may use."""
+    blocks = tuple(document_blocks(document))
+    labs = {block.model for block in blocks if isinstance(block, Lab) and block.model is not None}
+    scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
+    targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
+    links = {target.name for target in targets if isinstance(target, ModelTarget)}
+    return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links))
+
+
+def course_scripts(
+    course: Course, scripts_of: Callable[[Document], tuple[Script, ...]] = document_scripts
+) -> dict[str, tuple[Script, Owner]]:
+    """The scripts of a course by path, in order; of two with one path, the first."""
     found: dict[str, tuple[Script, Owner]] = {}
     for owner in owners(course):
         if owner.document is not None:
-            for script in document_scripts(owner.document):
+            for script in scripts_of(owner.document):
                 found.setdefault(script.path, (script, owner))
     return found
 
 
-def _place(recording: Recording) -> tuple[str, int]:
+def place(recording: Recording) -> tuple[str, int]:
+    """What a recorded output is found by."""
     return recording.span.path, recording.span.start
 
 
@@ -178,17 +241,16 @@ def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
     return {id: tuple(lessons) for id, lessons in found.items()}
 
 
-def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
+def _uses(
+    course: Course, models_of: Callable[[Document], NamedModels]
+) -> dict[str, tuple[ModelUse, ...]]:
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
-    for owner in owners(course):
+    for owner in owners(course) if found else ():
         if owner.document is None:
             continue
-        blocks = tuple(document_blocks(owner.document))
-        labs = {block.model for block in blocks if isinstance(block, Lab)}
-        scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
-        targets = (i.target for i in document_inlines(owner.document) if isinstance(i, Link))
-        links = {target.name for target in targets if isinstance(target, ModelTarget)}
-        for name, uses in found.items():
-            if name in labs or name in scripts or name in links:
-                uses.append(ModelUse(owner, name in labs, name in scripts, name in links))
+        named = models_of(owner.document)
+        for name in sorted(named.by_labs | named.by_scripts | named.by_links):
+            if name in found:
+                how = (name in named.by_labs, name in named.by_scripts, name in named.by_links)
+                found[name].append(ModelUse(owner, *how))
     return {name: tuple(uses) for name, uses in found.items()}

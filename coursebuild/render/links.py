@@ -1,6 +1,7 @@
 """Every internal link, anchor, image and script of the built pages leads somewhere.
 
-Entry point: `check_links(files, base_url)`, which gives what is broken, sorted by page and place.
+Entry points: `check_links(files, base_url)`, which gives what is broken, sorted by page and place;
+`page_references` and `all_lead_somewhere`, by which it is known beforehand that nothing is.
 
 1. Each page is read once by a real parser: its ids, and the addresses in it with their lines.
 2. Each address is resolved as a browser would, from the page that has it; those on other hosts are
@@ -10,14 +11,16 @@ Entry point: `check_links(files, base_url)`, which gives what is broken, sorted 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from html.parser import HTMLParser
+import re
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from html import unescape
+from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
 from coursebuild.diagnostics import nearest
 from coursebuild.render import urls
 from coursebuild.results import OutputFile
+from coursebuild.values import dataclass
 
 _ADDRESSES = {
     "a": ("href",),
@@ -40,6 +43,11 @@ _ADDRESSES = {
 
 _ORIGIN = "https://site.invalid"
 """Stands for wherever the site is served from."""
+
+
+Reference: TypeAlias = tuple[str, str]
+"""A site path and an anchor there, or the empty text; an empty path: the address cannot be right.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,74 +78,108 @@ class _Page:
     addresses: tuple[_Address, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Base:
+    """Where the site is served."""
+
+    root: str
+    """The address of its root, with `_ORIGIN` for the host."""
+    own: str | None
+    """The host, where it is known."""
+
+    @classmethod
+    def of(cls, base_url: str) -> _Base:
+        base = urlsplit(base_url)
+        own = f"{base.scheme}://{base.netloc}" if base.netloc else None
+        return cls(f"{_ORIGIN}{base.path.rstrip('/')}/", own)
+
+
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
     """What is broken in a site that is served at `base_url`."""
     contents = {file.path: file.data for file in files}
-    pages = {path: _read(data) for path, data in contents.items() if path.endswith(".html")}
-    base = urlsplit(base_url)
-    root = f"{_ORIGIN}{base.path.rstrip('/')}/"
-    own = f"{base.scheme}://{base.netloc}" if base.netloc else None
+    pages = {path: _read(data.decode()) for path, data in contents.items() if _is_page(path)}
+    base = _Base.of(base_url)
     broken = (
         problem
         for path, page in pages.items()
         for address in page.addresses
-        if (problem := _problem(path, address, contents.keys(), pages, root, own)) is not None
+        if (problem := _problem(path, address, contents.keys(), pages, base)) is not None
     )
     return tuple(sorted(broken, key=lambda b: (b.page, b.line, b.url)))
+
+
+def _is_page(path: str) -> bool:
+    return path.endswith(".html")
+
+
+def page_references(
+    path: str, html: str, base_url: str
+) -> tuple[frozenset[str], frozenset[Reference]]:
+    """The ids in the text of a page, and where its addresses lead."""
+    page = _quickly_read(html)
+    if page is None:
+        page = _read(html)
+    base = _Base.of(base_url)
+    found: set[Reference] = set()
+    for url in {address.url for address in page.addresses}:
+        if url.startswith("#") and url.isascii() and "%" not in url and url == url.strip():
+            found.add((path, url[1:]))
+            continue
+        target = _target(path, url, base)
+        if target is not None:
+            found.add(target if isinstance(target, tuple) else ("", target))
+    return page.ids, frozenset(found)
+
+
+def all_lead_somewhere(
+    references: Iterable[Reference], files: Container[str], ids: Mapping[str, Container[str]]
+) -> bool:
+    """Whether references lead to files and, in pages, to ids; `check_links` says which do not."""
+    return all(
+        path in files and (anchor in ("", "top") or path not in ids or anchor in ids[path])
+        for path, anchor in references
+    )
+
+
+def _target(path: str, url: str, base: _Base) -> Reference | str | None:
+    """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
+    try:
+        parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
+    except ValueError:
+        return "the address cannot be read"
+    host = f"{parts.scheme}://{parts.netloc}"
+    if host not in (_ORIGIN, base.own):
+        return None
+    folder = urlsplit(base.root).path
+    if not f"{parts.path}/".startswith(folder):
+        return "the address leads out of the site" if host == _ORIGIN else None
+    target = unquote(parts.path[len(folder) :])
+    if not target or target.endswith("/"):
+        target += urls.HOME
+    return target, unquote(parts.fragment)
 
 
 def _problem(
     path: str,
     address: _Address,
-    files: Iterable[str],
+    files: Collection[str],
     pages: Mapping[str, _Page],
-    root: str,
-    own: str | None,
+    base: _Base,
 ) -> BrokenLink | None:
     def broken(reason: str, near: str | None = None) -> BrokenLink:
         return BrokenLink(path, address.line, address.url, reason, near)
 
-    try:
-        url = urlsplit(urljoin(root + urls.encode(path), address.url.strip()))
-    except ValueError:
-        return broken("the address cannot be read")
-    host = f"{url.scheme}://{url.netloc}"
-    if host not in (_ORIGIN, own):
+    found = _target(path, address.url, base)
+    if found is None:
         return None
-    folder = urlsplit(root).path
-    if not f"{url.path}/".startswith(folder):
-        return broken("the address leads out of the site") if host == _ORIGIN else None
-    target = unquote(url.path[len(folder) :])
-    if not target or target.endswith("/"):
-        target += urls.HOME
+    if isinstance(found, str):
+        return broken(found)
+    target, anchor = found
     if target not in files:
         return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
-    anchor = unquote(url.fragment)
-    if not anchor or anchor == "top" or target not in pages or anchor in pages[target].ids:
+    if anchor in ("", "top") or target not in pages or anchor in pages[target].ids:
         return None
     return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, pages[target].ids))
-
-
-class _Reader(HTMLParser):
-    """Collects ids and addresses."""
-
-    def __init__(self) -> None:
-        super().__init__(convert_charrefs=True)
-        self.ids: set[str] = set()
-        self.addresses: list[_Address] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note an element's id and addresses."""
-        wanted = _ADDRESSES.get(tag, ())
-        for name, value in attrs:
-            if value is None:
-                continue
-            if name == "id" or (name == "name" and tag == "a"):
-                self.ids.add(value)
-            elif name == "srcset" and name in wanted:
-                self.addresses += [_Address(url, self.getpos()[0]) for url in _srcset(value)]
-            elif name in wanted:
-                self.addresses.append(_Address(value, self.getpos()[0]))
 
 
 def _srcset(value: str) -> Iterator[str]:
@@ -146,8 +188,46 @@ def _srcset(value: str) -> Iterator[str]:
             yield part.split()[0]
 
 
-def _read(data: bytes) -> _Page:
-    reader = _Reader()
-    reader.feed(data.decode())
-    reader.close()
-    return _Page(frozenset(reader.ids), tuple(reader.addresses))
+def _read(html: str) -> _Page:
+    from coursebuild.render.elements import StartTags  # few pages need it
+
+    ids: set[str] = set()
+    addresses: list[_Address] = []
+    for tag, attributes, line in StartTags.of(html):
+        wanted = _ADDRESSES.get(tag, ())
+        for name, value in attributes:
+            if value is None:
+                continue
+            if name == "id" or (name == "name" and tag == "a"):
+                ids.add(value)
+            elif name == "srcset" and name in wanted:
+                addresses += [_Address(url, line) for url in _srcset(value)]
+            elif name in wanted:
+                addresses.append(_Address(value, line))
+    return _Page(frozenset(ids), tuple(addresses))
+
+
+_TAG = re.compile(r"""<([a-z][a-z0-9]*)((?:\s[\w:-]+(?:="[^"<>]*")?)*)\s*/?>""")
+_ATTRIBUTE = re.compile(r"""\s([\w:-]+)="([^"<>]*)\"""")
+_RAW_TEXT = re.compile(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
+
+
+def _quickly_read(html: str) -> _Page | None:
+    """The same as `_read` but for the lines, where all tags are written as we write them."""
+    tags = _TAG.findall(html)
+    if len(tags) + html.count("</") != html.count("<") or _RAW_TEXT.search(html):
+        return None
+    ids: set[str] = set()
+    addresses: list[_Address] = []
+    for tag, attributes in tags:
+        wanted = _ADDRESSES.get(tag, ())
+        if not wanted and ' id="' not in attributes:
+            continue
+        for name, value in _ATTRIBUTE.findall(attributes):
+            if name == "id" or (name == "name" and tag == "a"):
+                ids.add(unescape(value))
+            elif name in wanted:
+                url = unescape(value)
+                found = _srcset(url) if name == "srcset" else (url,)
+                addresses += [_Address(one, 0) for one in found]
+    return _Page(frozenset(ids), tuple(addresses))

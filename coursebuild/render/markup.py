@@ -11,7 +11,6 @@ written here.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, assert_never
 from urllib.parse import quote
 
@@ -56,6 +55,7 @@ from coursebuild.model import (
     Text,
     ThematicBreak,
 )
+from coursebuild.values import dataclass, field
 
 OwnBlock: TypeAlias = Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
 """The blocks that are more than Markdown."""

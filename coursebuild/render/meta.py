@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from html import escape
 from typing import TypeAlias
-from xml.sax.saxutils import escape
 
 from markupsafe import Markup
 
 from coursebuild.model import Course, Lesson, Status
 from coursebuild.render import urls
-from coursebuild.render.highlight import visible
+from coursebuild.render.characters import visible
 from coursebuild.render.library import Library
 
 Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
@@ -111,7 +111,8 @@ def _script(data: dict[str, Json]) -> Markup:
 def sitemap(course: Course, paths: Iterable[str]) -> bytes:
     """The sitemap of the given pages; the course must have a base address."""
     rows = "".join(
-        f"<url><loc>{escape(urls.absolute(course, path))}</loc></url>\n" for path in paths
+        f"<url><loc>{escape(urls.absolute(course, path), quote=False)}</loc></url>\n"
+        for path in paths
     )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -1,30 +1,22 @@
 """The pages around the lessons: home, levels, models, other pages, and that of missing addresses.
 
-Entry points: `home_draft`, `level_draft`, `model_draft`, `page_draft`, `not_found_draft`.
+Entry points: `home_sheet`, `level_sheet`, `model_sheet`, `page_sheet`, `not_found_sheet`, what each
+shows; `home_draft` and so on, the same drawn.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from coursebuild.model import (
-    Document,
-    Lesson,
-    Level,
-    MjcfModel,
-    Page,
-    Paragraph,
-    Status,
-    plain_text,
-)
+from coursebuild.model import Document, Lesson, Level, MjcfModel, Page, Status
 from coursebuild.render import meta, urls
-from coursebuild.render.context import PageContext
-from coursebuild.render.frame import Draft, place_of
-from coursebuild.render.highlight import highlight
+from coursebuild.render.draft import Draft
+from coursebuild.render.frame import place_of
 from coursebuild.render.labs import number
-from coursebuild.render.lesson import LessonLink, article, contents, edit_address, lesson_link
+from coursebuild.render.lesson import LessonHead, LessonLink, drawn, edit_address, lesson_link
 from coursebuild.render.library import Library, ModelUse
+from coursebuild.render.sheet import Highlighted, Sheet
+from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +32,14 @@ class LevelView:
 
 
 @dataclass(frozen=True, slots=True)
+class CourseHead:
+    """What stands over the course map."""
+
+    title: str
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
 class Named:
     """A link with its text, and a remark on it."""
 
@@ -49,49 +49,52 @@ class Named:
 
 
 def home_draft(library: Library) -> Draft:
-    """The home page: the course map."""
+    """The home page."""
+    return drawn(library, home_sheet(library))
+
+
+def home_sheet(library: Library) -> Sheet:
+    """What the home page shows: the course map."""
     course = library.course
     place = urls.Place(urls.HOME)
-    written = [lesson for lesson in course.lessons if lesson.document is not None]
-    body = library.render(
-        "home.html",
-        course=course,
-        levels=tuple(_level_view(library, place, level) for level in course.levels),
-        start=lesson_link(library, place, written[0]) if written else None,
-        total=len(course.lessons),
-        written=len(written),
-        models=tuple(
+    written = [lesson for lesson in library.order if lesson.document is not None]
+    values = {
+        "course": CourseHead(course.title, course.summary),
+        "levels": tuple(_level_view(library, place, level) for level in course.levels),
+        "start": lesson_link(library, place, written[0]) if written else None,
+        "total": len(library.order),
+        "written": len(written),
+        "models": tuple(
             Named(place.href(urls.model_page_path(m.name)), m.name) for m in course.models
         ),
-        scripts=len(library.scripts),
-        scripts_zip=place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
-    )
-    return Draft(
-        urls.HOME, "home", course.title, course.summary, body, json_ld=meta.course_data(library)
-    )
+        "scripts": len(library.scripts),
+        "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
+    }
+    data = meta.course_data(library)
+    return Sheet(urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data)
 
 
 def level_draft(library: Library, level: Level) -> Draft:
     """The page of a level."""
+    return drawn(library, level_sheet(library, level))
+
+
+def level_sheet(library: Library, level: Level) -> Sheet:
+    """What the page of a level shows."""
     place = urls.Place(urls.level_path(level))
     levels = library.course.levels
-    at = levels.index(level)
+    at = next(i for i, other in enumerate(levels) if other.id == level.id)
     view = _level_view(library, place, level)
-    body = library.render(
-        "level.html",
-        home=place.href(urls.HOME),
-        level=view,
-        entries=tuple(zip(level.lessons, view.lessons, strict=True)),
-        previous=_level_link(library, place, levels[at - 1]) if at else None,
-        following=_level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
-    )
-    return Draft(
-        place.path,
-        "level",
-        f"{library.words('level.label', id=level.id)}: {level.title}",
-        level.summary,
-        body,
-    )
+    heads = map(LessonHead.of, level.lessons)
+    values = {
+        "home": place.href(urls.HOME),
+        "level": view,
+        "entries": tuple(zip(heads, view.lessons, strict=True)),
+        "previous": _level_link(library, place, levels[at - 1]) if at else None,
+        "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
+    }
+    title = f"{library.words('level.label', id=level.id)}: {level.title}"
+    return Sheet(place.path, "level", title, level.summary, "level.html", values)
 
 
 def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
@@ -111,23 +114,26 @@ def _level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
 
 
 def model_draft(library: Library, model: MjcfModel) -> Draft:
-    """The page of a model: what it holds, its text, where it is used."""
-    words = library.words
+    """The page of a model."""
+    return drawn(library, model_sheet(library, model))
+
+
+def model_sheet(library: Library, model: MjcfModel) -> Sheet:
+    """What the page of a model shows: what it holds, its text, where it is used."""
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
-    title = words("model.title", name=model.name)
-    body = library.render(
-        "model.html",
-        home=place.href(urls.HOME),
-        name=model.name,
-        path=model.source.path,
-        title=title,
-        href=place.href(urls.model_file_path(model.name)),
-        facts=_facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
-        code=highlight("xml", model.source.text.rstrip()),
-        uses=tuple(_use_link(library, place, use) for use in library.uses[model.name]),
-    )
-    return Draft(place.path, "model", title, "", body)
+    title = library.words("model.title", name=model.name)
+    values = {
+        "home": place.href(urls.HOME),
+        "name": model.name,
+        "path": model.source.path,
+        "title": title,
+        "href": place.href(urls.model_file_path(model.name)),
+        "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
+        "code": Highlighted("xml", model.source.text.rstrip()),
+        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
+    }
+    return Sheet(place.path, "model", title, "", "model.html", values)
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
@@ -167,29 +173,32 @@ def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
 
 def page_draft(library: Library, page: Page, document: Document) -> Draft:
     """A page that is no lesson."""
+    return drawn(library, page_sheet(library, page, document), document)
+
+
+def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
+    """What a page that is no lesson shows; its document's skeleton is enough."""
     place = urls.Place(urls.page_path(page))
-    context = PageContext.of(library, place, document)
-    body = context.template(
+    return Sheet(
+        place.path,
+        "page",
+        page.title,
+        "",
         "page.html",
-        title=page.title,
-        contents=contents(context, document),
-        article=article(context, document),
-        edit=edit_address(library, page.path),
+        {"title": page.title, "edit": edit_address(library, page.path)},
+        document=document.source.path,
+        shown=shown(library, place, document),
     )
-    return Draft(place.path, "page", page.title, _first_sentences(document), body)
-
-
-def _first_sentences(document: Document) -> str:
-    """The first paragraph, cut at a word: what search engines show."""
-    first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
-    text = " ".join(plain_text(first.children).split()) if first is not None else ""
-    return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"
 
 
 def not_found_draft(library: Library) -> Draft:
     """The page for missing addresses."""
+    return drawn(library, not_found_sheet(library))
+
+
+def not_found_sheet(library: Library) -> Sheet:
+    """What the page for missing addresses shows."""
     place = place_of(library, urls.NOT_FOUND)
-    body = library.render("notfound.html", home=place.href(urls.HOME))
-    return Draft(
-        urls.NOT_FOUND, "notfound", library.words("notfound.title"), "", body, indexed=False
-    )
+    values = {"home": place.href(urls.HOME)}
+    title = library.words("notfound.title")
+    return Sheet(urls.NOT_FOUND, "notfound", title, "", "notfound.html", values, indexed=False)

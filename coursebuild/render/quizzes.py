@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
 from markupsafe import Markup, escape
@@ -27,8 +26,8 @@ from coursebuild.model import (
     Quiz,
     plain_text,
 )
-from coursebuild.render.highlight import visible
 from coursebuild.results import Outcome
+from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
@@ -160,11 +159,10 @@ def letter(index: int) -> str:
 
 def output_line(page: PageContext, path: str, line: int) -> str | None:
     """A line (from 1) of what a script printed; `None` where it did not run to its end."""
-    run = page.library.runs.get(path)
+    run = page.shown.runs.get(path)
     if run is None or run.outcome is not Outcome.OK:
         return None
-    lines = run.stdout.split("\n")
-    return visible(lines[line - 1].rstrip()) if 1 <= line <= len(lines) else None
+    return dict(run.lines)[line]
 
 
 def shuffle(count: int, key: str) -> tuple[int, ...]:

@@ -11,18 +11,22 @@ Entry point: `render_site(course, results, assets, options)`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
-
-from markupsafe import Markup
 
 from coursebuild.model import Course
-from coursebuild.render import fonts, formulas, lesson, meta, pages, styles, urls, zips
-from coursebuild.render.assets import Assets, hashed_name, page_script
-from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render import fonts, lesson, meta, pages, urls, zips
+from coursebuild.render.assets import Assets
+from coursebuild.render.frame import Draft, frame
 from coursebuild.render.library import Library
+from coursebuild.render.shared import (
+    PageFacts,
+    common_characters,
+    page_facts,
+    settled,
+    shared_files,
+)
 from coursebuild.results import OutputFile, Results
+from coursebuild.values import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +48,11 @@ def render_site(
     """The files of the site, sorted by path. The same values give the same bytes."""
     options = options or SiteOptions()
     library = Library.of(course, results, assets)
-    drafts, declarations = _settled(_drafts(library))
-    shared, names = _shared(library, assets, options, drafts, declarations)
+    drafts, facts = [], []
+    for draft, declarations in map(settled, _drafts(library)):
+        drafts.append(draft)
+        facts.append(page_facts(draft, declarations))
+    shared, names = shared_files(assets, options.subset, all_facts(library, facts))
     files = [OutputFile(draft.path, frame(library, draft, names).encode()) for draft in drafts]
     files += shared
     files += library.labs.files
@@ -73,80 +80,16 @@ def _drafts(library: Library) -> Iterator[Draft]:
     yield pages.not_found_draft(library)
 
 
-def _settled(drafts: Iterable[Draft]) -> tuple[tuple[Draft, ...], frozenset[str]]:
-    """The pages without styles in their elements, and the declarations that were there."""
-    kept: list[Draft] = []
-    declarations: set[str] = set()
-    for draft in drafts:
-        body, found = styles.hoist(formulas.glue(draft.body))
-        kept.append(replace(draft, body=Markup(body)))
-        declarations |= found
-    return tuple(kept), frozenset(declarations)
-
-
-# ------------------------------------------------------------------------------ shared files
-
-
-def _shared(
-    library: Library,
-    assets: Assets,
-    options: SiteOptions,
-    drafts: tuple[Draft, ...],
-    declarations: frozenset[str],
-) -> tuple[list[OutputFile], Names]:
-    """The files that every page refers to, and their names."""
-    files: list[OutputFile] = []
-
-    def publish(path: str, data: bytes) -> str:
-        name = hashed_name(f"assets/{path}", data)
-        files.append(OutputFile(name, data))
-        return name
-
-    text, mathematics = _characters(library, drafts)
-    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
-    jobs = fonts.font_jobs(
-        ((face, assets.file(f"fonts/{face.file}")) for face in faces), text, mathematics
-    )
-    fonts_made = [(job, publish(f"fonts/{job.face.file}", options.subset(job))) for job in jobs]
-    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
-    sheet = rules.encode() + assets.file("css/site.css") + styles.style_rules(declarations).encode()
-    names = Names(
-        style=publish("site.css", sheet),
-        theme_script=publish("theme.js", page_script(assets.file("js/theme.js"))),
-        script=publish("site.js", page_script(assets.file("js/site.js"))),
-        icon=publish("icon.svg", assets.template("icon.svg").encode()),
-        credits=publish("licences.txt", _licences(assets)),
-    )
-    return files, names
-
-
-_FORMULA = re.compile(r"<math\b.*?</math>", re.DOTALL)
-_TAGS = re.compile(r"<[^>]*>")
-
-
-def _characters(library: Library, drafts: tuple[Draft, ...]) -> tuple[str, str]:
-    """The characters of all pages: those of text, and those of formulas."""
-    course = library.course
-    text: set[str] = set()
+def all_facts(library: Library, pages: Iterable[PageFacts]) -> PageFacts:
+    """The facts of all pages together, with those of what every page has around it."""
+    text: set[str] = {*common_characters(library)}
     mathematics: set[str] = set()
-    for draft in drafts:
-        text.update(draft.title)
-        text.update(Markup(_TAGS.sub("", _FORMULA.sub("", draft.body))).unescape())
-        for formula in _FORMULA.findall(draft.body):
-            mathematics.update(Markup(_TAGS.sub("", formula)).unescape())
-    for _, words in library.words.entries:
-        text.update(words)
-    text.update(course.title, course.licence, *(page.title for page in course.pages))
-    return "".join(sorted(text)), "".join(sorted(mathematics))
-
-
-def _licences(assets: Assets) -> bytes:
-    """The licences of fonts and libraries that the site ships."""
-    parts = []
-    for path, data in assets.files("licences"):
-        name = path.removeprefix("licences/").removesuffix(".txt")
-        parts.append(f"{name}\n{'=' * len(name)}\n\n{data.decode().strip()}\n")
-    return "\n\n".join(parts).encode()
+    declarations: set[str] = set()
+    for facts in pages:
+        text |= facts.text
+        mathematics |= facts.mathematics
+        declarations |= facts.declarations
+    return PageFacts(frozenset(text), frozenset(mathematics), frozenset(declarations))
 
 
 # --------------------------------------------------------------------------------- downloads

@@ -12,9 +12,9 @@ Entry point: `parse_strings(text, fallback)`, which gives `Strings`; a template 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+
+from coursebuild.values import dataclass, field
 
 DEFAULT_LANGUAGE = "en"
 
@@ -26,6 +26,11 @@ class Strings:
     entries: tuple[tuple[str, str], ...]
     """Dotted key and text, sorted by key."""
     _table: dict[str, str] = field(repr=False, compare=False, hash=False)
+
+    @classmethod
+    def of(cls, table: dict[str, str]) -> Strings:
+        """The words of a table: dotted key and text."""
+        return cls(tuple(sorted(table.items())), table)
 
     @property
     def keys(self) -> frozenset[str]:
@@ -49,8 +54,10 @@ class Strings:
 def parse_strings(text: str, fallback: Strings | None = None) -> Strings:
     """Read a file of texts; what it lacks comes from `fallback`."""
     table = dict(fallback.entries) if fallback is not None else {}
+    import tomllib
+
     table.update(_flatten(tomllib.loads(text), ""))
-    return Strings(tuple(sorted(table.items())), table)
+    return Strings.of(table)
 
 
 def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]:

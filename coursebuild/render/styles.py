@@ -10,6 +10,7 @@ named by its content.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
 from collections.abc import Iterable
@@ -24,29 +25,50 @@ _PIECE = re.compile(
 """A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
 for one."""
 
+_OTHERS = re.compile(
+    r"""(?:[^<]++|<(?![a-z]|!--)"""
+    r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
+    r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
+    re.IGNORECASE,
+)
+"""What has no style in it: texts, end tags, most tags. Where it ends, `_PIECE` may begin."""
+
 _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
 def hoist(html: str) -> tuple[str, frozenset[str]]:
     """The page with classes in place of `style` attributes, and what they stand for."""
     found: set[str] = set()
+    parts: list[str] = []
+    at = 0
+    while at < len(html):
+        others = _OTHERS.match(html, at)
+        end = at if others is None else others.end()
+        piece = _PIECE.match(html, end)
+        if piece is None:
+            parts.append(html[at : end + 1])
+            at = end + 1
+        else:
+            tag, declaration = _without_style(piece["tag"]) if piece["tag"] else (piece[0], "")
+            if declaration:
+                found.add(declaration)
+            parts += (html[at:end], tag)
+            at = piece.end()
+    return "".join(parts), frozenset(found)
 
-    def without_style(match: re.Match[str]) -> str:
-        tag = match["tag"]
-        if tag is None or "style" not in tag.lower():
-            return match[0]
-        names = {name.lower(): value for name, value in _ATTRIBUTE.findall(tag)}
-        if "style" not in names:
-            return match[0]
-        declaration = _normal(unescape(names["style"].strip("\"'")))
-        classes = [unescape(names.get("class", "").strip("\"'"))]
-        if declaration:
-            found.add(declaration)
-            classes.append(class_name(declaration))
-        value = escape(" ".join(filter(None, classes)))
-        return f"<{_with_class(tag, value)}>"
 
-    return _PIECE.sub(without_style, html), frozenset(found)
+@functools.lru_cache(maxsize=4096)
+def _without_style(tag: str) -> tuple[str, str]:
+    """The tag with this inside with a class in place of its style, and the style, if it has one."""
+    names = {name.lower(): value for name, value in _ATTRIBUTE.findall(tag)}
+    if "style" not in names:
+        return f"<{tag}>", ""
+    declaration = _normal(unescape(names["style"].strip("\"'")))
+    classes = [unescape(names.get("class", "").strip("\"'"))]
+    if declaration:
+        classes.append(class_name(declaration))
+    value = escape(" ".join(filter(None, classes)))
+    return f"<{_with_class(tag, value)}>", declaration
 
 
 def class_name(declaration: str) -> str:

@@ -13,10 +13,10 @@ Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass
 from urllib.parse import quote, urlsplit
 
 from coursebuild.model import Course, Lesson, Level, Page
+from coursebuild.values import dataclass
 
 HOME = "index.html"
 NOT_FOUND = "404.html"

@@ -1,7 +1,7 @@
 """Scripts as archives that run elsewhere, with models, `mjcourse` and exact requirements.
 
-Entry points: `course_zip`, `lesson_zip`; `imported_modules` says which packages whoever calls
-should give the versions of.
+Entry points: `archives`; `course_zip`, `lesson_zip`; `imported_modules` says which packages whoever
+calls should give the versions of.
 
 The bytes depend on the content alone: entries in order of their paths, one fixed date, one fixed
 way to compress.
@@ -9,19 +9,18 @@ way to compress.
 
 from __future__ import annotations
 
-import ast
-import io
+import hashlib
 import re
 import sys
-import zipfile
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 
 from coursebuild.model import Course, Lesson, Script
 from coursebuild.render import urls
 from coursebuild.render.library import Library, document_scripts, models_named, owners
 from coursebuild.results import OutputFile
+from coursebuild.values import dataclass
 
+_NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -36,6 +35,13 @@ class Package:
     version: str
 
 
+def imports(text: str) -> frozenset[str]:
+    """Top-level modules that a Python text imports by name; none where it does not parse."""
+    from coursebuild.render.folding import imported  # with the parser
+
+    return imported(text)
+
+
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """What scripts need around them, besides the course itself."""
@@ -46,29 +52,83 @@ class Surroundings:
     model_files: tuple[OutputFile, ...] = ()
     """Files in `models/` that are no MJCF (meshes, height fields), by path relative to the project
     root."""
+    imports: Callable[[str], frozenset[str]] = imports
+    """What a Python text imports: whoever calls may know it already."""
 
 
-def course_zip(library: Library, around: Surroundings) -> OutputFile:
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """An archive that is not packed yet."""
+
+    path: str
+    """Site path."""
+    files: Mapping[str, bytes]
+
+    @property
+    def key(self) -> str:
+        """A hash of all that is in it."""
+        digest = hashlib.sha256()
+        for path, data in sorted(self.files.items()):
+            digest.update(f"{path}\0{len(data)}\0".encode() + data)
+        return digest.hexdigest()
+
+    def packed(self) -> bytes:
+        """Its bytes."""
+        return _zip(self.files)
+
+
+def archives(library: Library, around: Surroundings) -> tuple[Archive, ...]:
+    """That of the course and those of its lessons."""
+    found = [course_archive(library, around)] if library.scripts else []
+    by_module = _by_module(library)
+    lessons = (lesson_archive(library, around, lesson, by_module) for lesson in library.order)
+    return (*found, *(archive for archive in lessons if archive is not None))
+
+
+def course_archive(library: Library, around: Surroundings) -> Archive:
     """All scripts of the course."""
     scripts = tuple(script for script, _ in library.scripts.values())
-    return OutputFile(
-        urls.EXAMPLES_ZIP, _archive(library, around, scripts, _slug(library.course.title))
-    )
+    folder = _slug(library.course.title)
+    files = _files(library, around, scripts, folder, _by_module(library))
+    return Archive(urls.EXAMPLES_ZIP, files)
 
 
-def lesson_zip(library: Library, around: Surroundings, lesson: Lesson) -> OutputFile | None:
-    """The scripts of a lesson and those that they import; `None` where it has none."""
+def lesson_archive(
+    library: Library,
+    around: Surroundings,
+    lesson: Lesson,
+    by_module: Mapping[str, Script] | None = None,
+) -> Archive | None:
+    """The scripts of a lesson and those that they import; `None` where it has none.
+
+    `by_module` are all scripts by what imports them.
+    """
     scripts = document_scripts(lesson.document) if lesson.document is not None else ()
     if not scripts:
         return None
-    needed = _with_siblings(library, scripts)
-    return OutputFile(
-        urls.lesson_zip_path(lesson),
-        _archive(library, around, needed, f"{lesson.id}-{lesson.slug}"),
-    )
+    by_module = _by_module(library) if by_module is None else by_module
+    needed = _with_siblings(by_module, around, scripts)
+    files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
+    return Archive(urls.lesson_zip_path(lesson), files)
 
 
-def imported_modules(course: Course, library: Iterable[OutputFile] = ()) -> tuple[str, ...]:
+def course_zip(library: Library, around: Surroundings) -> OutputFile:
+    """The archive of the course, packed."""
+    archive = course_archive(library, around)
+    return OutputFile(archive.path, archive.packed())
+
+
+def lesson_zip(library: Library, around: Surroundings, lesson: Lesson) -> OutputFile | None:
+    """The archive of a lesson, packed; `None` where it has no script."""
+    archive = lesson_archive(library, around, lesson)
+    return None if archive is None else OutputFile(archive.path, archive.packed())
+
+
+def imported_modules(
+    course: Course,
+    library: Iterable[OutputFile] = (),
+    imports: Callable[[str], frozenset[str]] = imports,
+) -> tuple[str, ...]:
     """Top-level modules of others that the scripts, and the package they come with, import."""
     documents = (owner.document for owner in owners(course))
     scripts = [
@@ -84,58 +144,62 @@ def imported_modules(course: Course, library: Iterable[OutputFile] = ()) -> tupl
     return tuple(sorted(found - own - sys.stdlib_module_names))
 
 
-def imports(text: str) -> frozenset[str]:
-    """Top-level modules that a Python text imports by name; none where it does not parse."""
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return frozenset()
-    found: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found.update(alias.name.partition(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found.add(node.module.partition(".")[0])
-    return frozenset(found)
-
-
 def _module(path: str) -> str:
     return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
 
 
-def _with_siblings(library: Library, scripts: Iterable[Script]) -> tuple[Script, ...]:
-    by_module = {_module(path): script for path, (script, _) in library.scripts.items()}
+def _by_module(library: Library) -> dict[str, Script]:
+    return {_module(path): script for path, (script, _) in library.scripts.items()}
+
+
+def _with_siblings(
+    by_module: Mapping[str, Script], around: Surroundings, scripts: Iterable[Script]
+) -> tuple[Script, ...]:
     found: dict[str, Script] = {}
     waiting = list(scripts)
     while waiting:
         script = waiting.pop()
         if script.path not in found:
             found[script.path] = script
-            waiting += [by_module[name] for name in imports(script.code.text) if name in by_module]
+            named = around.imports(script.code.text)
+            waiting += [by_module[name] for name in named if name in by_module]
     return tuple(found[path] for path in sorted(found))
 
 
-def _archive(
-    library: Library, around: Surroundings, scripts: tuple[Script, ...], folder: str
-) -> bytes:
-    """An archive of one folder. `mjcourse` lies beside the scripts, where Python looks first."""
+def _files(
+    library: Library,
+    around: Surroundings,
+    scripts: tuple[Script, ...],
+    folder: str,
+    own: Mapping[str, Script],
+) -> dict[str, bytes]:
+    """What is in an archive of one folder.
+
+    `mjcourse` lies beside the scripts, where Python looks first.
+    """
     files: dict[str, bytes] = {script.path: script.code.text.encode() for script in scripts}
-    texts = [script.code.text for script in scripts]
-    if any("mjcourse" in imports(text) for text in texts):
+    modules = [around.imports(script.code.text) for script in scripts]
+    if any("mjcourse" in names for names in modules):
         files |= {f"examples/{file.path}": file.data for file in around.library}
-        texts += [file.data.decode() for file in around.library if file.path.endswith(".py")]
+        modules += [
+            around.imports(file.data.decode())
+            for file in around.library
+            if file.path.endswith(".py")
+        ]
     files |= _models(library, around, scripts)
-    files["requirements.txt"] = _requirements(library, around.packages, texts)
+    files["requirements.txt"] = _requirements(library, around.packages, modules, own)
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
-    return _zip({f"{folder}/{path}": data for path, data in files.items()})
+    return {f"{folder}/{path}": data for path, data in files.items()}
 
 
 def _models(
     library: Library, around: Surroundings, scripts: tuple[Script, ...]
 ) -> Mapping[str, bytes]:
     """The models that scripts name, and the files that these pull in."""
+    if not library.course.models:
+        return {}
     sources = {model.source.path: model.source.text.encode() for model in library.course.models}
     others = {file.path: file.data for file in around.model_files}
     named = {name for script in scripts for name in models_named(script)}
@@ -151,12 +215,16 @@ def _models(
     return found
 
 
-def _requirements(library: Library, packages: Iterable[Package], texts: Iterable[str]) -> bytes:
-    """One line for each package that the texts import, with its exact version where it is known."""
+def _requirements(
+    library: Library,
+    packages: Iterable[Package],
+    modules: Iterable[frozenset[str]],
+    own: Mapping[str, Script],
+) -> bytes:
+    """One line for each package that is imported, with its exact version where it is known."""
     known = {package.module: f"{package.name}=={package.version}" for package in packages}
     known.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    own = {_module(path) for path in library.scripts} | {"mjcourse"}
-    used = {name for text in texts for name in imports(text)} - own - sys.stdlib_module_names
+    used = {name for names in modules for name in names} - own.keys() - _NEVER_REQUIRED
     return "".join(f"{line}\n" for line in sorted(known.get(name, name) for name in used)).encode()
 
 
@@ -165,6 +233,9 @@ def _slug(title: str) -> str:
 
 
 def _zip(files: Mapping[str, bytes]) -> bytes:
+    import io
+    import zipfile
+
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for path in sorted(files):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias, assert_never
 
-from coursebuild.report.machine import to_annotations, to_json, to_junit, to_sarif
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import to_text
@@ -24,16 +23,18 @@ FORMATS: tuple[Format, ...] = ("text", "json", "junit", "sarif", "github")
 
 def render_report(report: Report, form: Format, style: Style) -> str:
     """The report in one of the formats, ending in a newline (or empty)."""
+    if form == "text":
+        return to_text(report, style)
+    from coursebuild.report import machine
+
     match form:
-        case "text":
-            return to_text(report, style)
         case "json":
-            return to_json(report)
+            return machine.to_json(report)
         case "junit":
-            return to_junit(report)
+            return machine.to_junit(report)
         case "sarif":
-            return to_sarif(report)
+            return machine.to_sarif(report)
         case "github":
-            return to_annotations(report)
+            return machine.to_annotations(report)
         case _:
             assert_never(form)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from coursebuild.rules import RULES, Rule
+from coursebuild.values import dataclass
 
 _LINES = 16
 """How much of a file an example shows."""

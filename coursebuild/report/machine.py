@@ -74,6 +74,7 @@ def to_json(report: Report) -> str:
         "lessons": s.lessons,
         "scripts": s.scripts,
         "ran": s.ran,
+        "cached": s.cached,
         "skipped": s.skipped,
         "errors": s.errors,
         "warnings": s.warnings,

@@ -11,11 +11,11 @@ Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`.
 from __future__ import annotations
 
 import unicodedata
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.report.values import LabLine, Report, ScriptLine, plural, summary_line
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 _TAB = 4
 

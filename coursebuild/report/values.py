@@ -5,9 +5,8 @@ Entry point: `Report`; `summary_line(report)` is its last line as text.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.values import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +57,8 @@ class Summary:
     warnings: int
     silenced: int
     seconds: float
+    cached: int = 0
+    """Of `ran`: those whose result is remembered, so that they were not run again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,9 @@ def plural(count: int, noun: str) -> str:
 def summary_line(report: Report) -> str:
     """One line: what was checked and what was found."""
     s = report.summary
-    parts = [plural(s.lessons, "lesson"), f"{plural(s.ran, 'script')} run"]
+    parts = [plural(s.lessons, "lesson"), f"{plural(s.ran - s.cached, 'script')} run"]
+    if s.cached:
+        parts.append(f"{s.cached} cached")
     if report.labs:
         parts.append(f"{plural(len(report.labs), 'lab')} tried")
     if s.skipped:

@@ -14,13 +14,13 @@ import enum
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from coursebuild.model import Comparison
 from coursebuild.scripts.ellipsis import blocks_match
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.scripts.traced import Side
+from coursebuild.values import dataclass
 
 _ALIKE = 6
 _WORD = re.compile(r"[^\W\d]+")

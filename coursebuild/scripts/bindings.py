@@ -16,14 +16,14 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
-from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.scripts.printed import PrintedLine, lines_of_run, printed_lines
 from coursebuild.scripts.shown import Shown, text_places
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 _FAILED = (
     Outcome.FAILED,
@@ -188,13 +188,12 @@ def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -
             help="write it as it is printed, or take `{out}` away",
         )
     windows = shown.windows(lines)
-    label, help_text = "", ""
+    label, better = "", ""
     if windows:
         nearest = min(windows, key=shown.distance)
         several = len(nearest.numbers) > 1
         label = f"the nearest printed value{'s are' if several else ' is'} {nearest.text}"
-        better = shown.rewritten(binding.text, nearest)
-        help_text = f"write `{better}`" if better else ""
+        better = shown.rewritten(binding.text, nearest) or ""
     elif len(shown.numbers) > 1 and any(line.numbers for line in lines):
         label = f"no printed line has {len(shown.numbers)} numbers one after the other"
     else:
@@ -204,7 +203,8 @@ def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -
         binding.text_span,
         f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown",
         label=label,
-        help=help_text,
+        help=f"write `{better}`" if better else "",
+        edits=[Edit(binding.text_span, better)] if better else [],
     )
 
 

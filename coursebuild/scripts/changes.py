@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from coursebuild.results import Change, DriftKind
 from coursebuild.scripts.lines import LineMatcher
@@ -27,6 +26,7 @@ from coursebuild.scripts.numbers import (
 )
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 _PART = re.compile(r"\s+|\w+|[^\w\s]")
 _SPACE, _NUMBER = 1, 4

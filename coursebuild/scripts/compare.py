@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from coursebuild.model import (
     Comparison,
@@ -34,6 +33,7 @@ from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.tables import compare_table
 from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass
 
 
 def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:

@@ -7,10 +7,10 @@ even where their characters differ; lines that a `...` stands for are left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from coursebuild.scripts.align import Step, StepKind
 from coursebuild.scripts.traced import Side
+from coursebuild.values import dataclass
 
 _CONTEXT = 2
 _LINES = 40

@@ -13,10 +13,10 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from coursebuild.model import Mode
 from coursebuild.scripts.lines import LineMatcher
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Course, Document, Lesson, Page, Script, document_blocks
 from coursebuild.results import ScriptJob
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

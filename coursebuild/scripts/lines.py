@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 
 from coursebuild.model import Comparison, Mode
 from coursebuild.scripts.numbers import Number, scan, within_half_unit, within_tolerance
+from coursebuild.values import dataclass, replace
 
 MARK = "\x00"
 ELLIPSIS = "..."

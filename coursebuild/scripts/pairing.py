@@ -14,7 +14,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+
+from coursebuild.values import dataclass
 
 Weight = Callable[[int, int], int]
 

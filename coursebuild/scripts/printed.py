@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from coursebuild.model import Recording, Table
 from coursebuild.scripts.numbers import Number, scan
 from coursebuild.scripts.tables import RowCell, table_rows
 from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass
 
 Locate = Callable[[int, int], Span]
 

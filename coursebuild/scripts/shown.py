@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from decimal import Decimal
 
 from coursebuild.scripts.celltext import plain
@@ -19,6 +18,7 @@ from coursebuild.scripts.numbers import (
     within_half_unit,
 )
 from coursebuild.scripts.printed import PrintedLine
+from coursebuild.values import dataclass
 
 
 def shows(shown: Number, printed: Number) -> bool:

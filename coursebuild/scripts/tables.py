@@ -13,7 +13,6 @@ Entry points: `compare_table`, `table_rows`, `match_rows`, `rows_match`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from coursebuild.model import Cell, Comparison, Filter, Recording, Table
 from coursebuild.results import Change, DriftKind, Verdict
@@ -33,6 +32,7 @@ from coursebuild.scripts.numbers import Number, relative_error
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.scripts.traced import Side, Traced
 from coursebuild.source import Span
+from coursebuild.values import dataclass
 
 _ALIKE = 6
 _CELLS = 40_000

@@ -15,10 +15,10 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 from coursebuild.model import Filter
+from coursebuild.values import dataclass
 
 _LINE_END = re.compile(r"\r\n?|\n")
 

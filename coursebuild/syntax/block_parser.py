@@ -13,7 +13,6 @@ Besides:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -38,6 +37,7 @@ from mdit_py_plugins.footnote.index import footnote_def
 from coursebuild.source import Excerpt
 from coursebuild.syntax.math import math_block
 from coursebuild.syntax.spans import BlockState, Placed, Row
+from coursebuild.values import dataclass, field
 
 MAX_NESTING = 60
 """Containers inside each other; a list with its item counts as two."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Parsed, diagnose, did_you_mean
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import trimmed
+from coursebuild.values import dataclass
 
 _HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"

@@ -16,7 +16,6 @@ import functools
 import operator
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import msgspec.inspect as inspect
@@ -49,6 +48,7 @@ from coursebuild.syntax.wording import (
     array_of,
     tuple_of,
 )
+from coursebuild.values import dataclass
 
 S = TypeVar("S", bound=Struct)
 

@@ -7,7 +7,6 @@ code), `near_kind` (a kind that looks misspelt).
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from markdown_it.common.utils import unescapeAll
 
@@ -16,6 +15,7 @@ from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.info import kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
+from coursebuild.values import dataclass
 
 OURS = ("io", "lab", "mjcf", "python", "quiz", "text")
 

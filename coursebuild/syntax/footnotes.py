@@ -7,12 +7,12 @@ regard to case.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from itertools import islice
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Block, Footnote, FootnoteRef
 from coursebuild.source import Span
+from coursebuild.values import dataclass, field
 
 
 @dataclass(slots=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Image, Inline, plain_text, walk_inlines
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass, field
 
 _CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
 _ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import joined
+from coursebuild.values import dataclass
 
 _WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
 _SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")

@@ -111,6 +111,13 @@ def _link(state: StateInline, silent: bool) -> bool:
 
 
 _STOP = re.compile(r"[\n\\`*_~\[\]<&$]|!\[")
+
+
+def may_be_marked(text: str) -> bool:
+    """Whether a text may be more than one token."""
+    return _STOP.search(text) is not None
+
+
 _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "\n": (newline,),
     "\\": (escape,),

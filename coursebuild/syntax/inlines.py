@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
@@ -39,10 +38,12 @@ from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.footnotes import Notes
 from coursebuild.syntax.html import Balance, tags
+from coursebuild.syntax.inline_parser import may_be_marked
 from coursebuild.syntax.markdown import definition_label, inline_tokens
 from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
 from coursebuild.syntax.spans import Placed, Placer, locate
 from coursebuild.syntax.targets import check_scheme, classify
+from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
@@ -79,7 +80,12 @@ class InlineReader:
 
     def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
         """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
-        return _Pass(self, content, mentions).read()
+        text = content.text
+        if may_be_marked(text):
+            return _Pass(self, content, mentions).read()
+        run = [Item(text, 0, len(text))] if text else []
+        make = with_mentions if mentions and may_mention(text) else plain
+        return tuple(make(run, Placer(content)))
 
 
 class _Pass:

@@ -13,7 +13,6 @@ Entry point: `parse_json(body, place)`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from typing import NoReturn
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
@@ -32,6 +31,7 @@ from coursebuild.syntax.nodes import (
     StringNode,
 )
 from coursebuild.syntax.wording import short
+from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 64
 """How deep objects and arrays may nest: far more than a person writes, far less than the

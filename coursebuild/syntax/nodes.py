@@ -10,10 +10,10 @@ it is asked for. Nodes compare by identity: two equal numbers at two places are 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from coursebuild.source import Excerpt, Span
+from coursebuild.values import dataclass, field
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,12 +6,12 @@ Entry point: `Prose.read(texts, parser)`.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Block, Inline
 from coursebuild.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.syntax.texts import TextParser
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ quizzes and labs are read where they stand.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TypeVar
 
 from coursebuild.diagnostics import Diagnostic, Parsed
@@ -15,6 +14,7 @@ from coursebuild.source import Source
 from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.footnotes import Notes
 from coursebuild.syntax.headings import Anchors
+from coursebuild.values import dataclass, field
 
 T = TypeVar("T")
 

@@ -13,7 +13,6 @@ import operator
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 
 from msgspec import Struct
 
@@ -38,6 +37,7 @@ from coursebuild.syntax.wording import (
     type_help,
     wrong_type,
 )
+from coursebuild.values import dataclass, field
 
 
 class _Failed:

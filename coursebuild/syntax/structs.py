@@ -10,7 +10,6 @@ meant for is missing is not said again.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from msgspec import Struct
 
@@ -18,6 +17,7 @@ from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.syntax.nodes import Node, ObjectNode, StringNode
 from coursebuild.syntax.shapes import FAILED, Run, Shape
 from coursebuild.syntax.wording import STRING, named, quoted
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ text is TOML, and what its values are, is for `tomllib` to say.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from coursebuild.diagnostics import Diagnostic
@@ -19,6 +18,7 @@ from coursebuild.source import Excerpt
 from coursebuild.syntax.nodes import StringNode
 from coursebuild.syntax.toml_fault import FaultError, advice, check_scalar
 from coursebuild.syntax.toml_string import read_string
+from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 64
 """How deep tables and arrays may nest."""

@@ -7,7 +7,6 @@ Entry points: `Takes` (the types that a field takes) and its constants, `Words` 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import assert_never
 
 from coursebuild.syntax.nodes import (
@@ -21,6 +20,7 @@ from coursebuild.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
+from coursebuild.values import dataclass
 
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 

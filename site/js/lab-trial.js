@@ -13,11 +13,13 @@ import loadMujoco from '@mujoco/mujoco'
 import { createEngine } from './lab/core/engine.js'
 import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
+import { Guard } from './lab/trial/guard.js'
 import { runTrial } from './lab/trial/trial.js'
 
 const buffers = new Map()
 const printed = []
 let engine = null
+let guard = null
 let failure = 'the engine has not been started'
 
 globalThis.reserve = (name, size) => {
@@ -45,7 +47,8 @@ globalThis.trial = (json) => {
   const request = JSON.parse(json)
   const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : fromBase64(request.mjb)
   printed.length = 0
-  const reply = runTrial(engine, request, bytes, () => performance.now())
+  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
+  const reply = runTrial(engine, request, bytes, () => performance.now(), guard)
   return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
 }
 

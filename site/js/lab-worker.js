@@ -4,12 +4,13 @@
 
 import loadMujoco from '@mujoco/mujoco'
 import { Host } from './lab/worker/host.js'
+import { createLater } from './lab/worker/later.js'
 
 const host = new Host({
   loadMujoco,
   post: (message, transfer) => self.postMessage(message, transfer),
   now: () => performance.now(),
-  later: (action, ms) => setTimeout(action, ms),
+  later: createLater(),
   importModule: (url) => import(url),
   async fetchBytes(url) {
     const response = await get(url)

@@ -1,59 +1,96 @@
-// The preview's page script: loads the page again after a build, and shows what is wrong over the last good page.
-// Served by `coursebuild serve` only; a published site does not have it.
+/**
+ * The preview's part of a page: brings what the author saved into it, and shows what is wrong.
+ *
+ * Served by `coursebuild serve` only; a published site does not have it. It runs before the page's other scripts, while the page is
+ * still what the server sent.
+ */
 
-const state = { version: null, overlay: null };
+import { connect } from './preview/connection.js'
+import { needsLoad, takeHead } from './preview/head.js'
+import { Marks } from './preview/marks.js'
+import { Panel } from './preview/panel.js'
+import { holdPlace } from './preview/place.js'
+import { Twin } from './preview/twin.js'
 
-function reload() {
-  // The browser keeps the scroll position of a page that is loaded again by itself.
-  window.location.reload();
+const own = document.currentScript
+const page = own.dataset.page
+const parse = (text) => new DOMParser().parseFromString(text, 'text/html')
+const stateOf = (next) => next.querySelector('script[data-state]')?.dataset.state ?? ''
+
+let state = own.dataset.state // of the page that is shown
+let wanted = state
+let taking = false
+let tool = null
+let token = ''
+let latest = null // news
+let head = document.cloneNode(true)
+const twin = new Twin(document.body)
+const panel = new Panel()
+const marks = new Marks(accept)
+
+/** Bring the page to the state that the server has, as often as that is another one by then. */
+async function take() {
+  if (taking) return
+  taking = true
+  try {
+    while (wanted !== state && wanted !== '') {
+      const response = await fetch(location.href, { cache: 'no-store' })
+      const next = parse(await response.text())
+      const fresh = stateOf(next)
+      if (state === '' || needsLoad(head, next)) return location.reload()
+      if (fresh === '') break // it is gone again; that will be told
+      change(next)
+      state = fresh
+      if (wanted !== fresh) await new Promise((again) => setTimeout(again, 20))
+    }
+  } catch {
+    // The server has gone; what is new is told when it is back.
+  } finally {
+    taking = false
+  }
 }
 
-function clear() {
-  state.overlay?.remove();
-  state.overlay = null;
+function change(next) {
+  const keep = holdPlace()
+  takeHead(next)
+  const changed = twin.update(next.body)
+  head = next
+  document.dispatchEvent(new CustomEvent('coursebuild:changed', { detail: changed }))
+  if (latest !== null) marks.show(latest)
+  keep()
 }
 
-function show(text) {
-  clear();
-  const overlay = document.createElement("section");
-  overlay.setAttribute("role", "alert");
-  overlay.setAttribute("aria-label", "Problems");
-  const pre = document.createElement("pre");
-  pre.textContent = text;
-  const close = document.createElement("button");
-  close.type = "button";
-  close.textContent = "Close";
-  close.addEventListener("click", clear);
-  // Set one by one: the page's policy allows no style attribute in its markup.
-  Object.assign(overlay.style, {
-    position: "fixed",
-    inset: "auto 1rem 1rem",
-    maxHeight: "60vh",
-    overflow: "auto",
-    zIndex: "1000",
-    padding: "1rem",
-    background: "#2b0f0f",
-    color: "#fff",
-    borderRadius: "6px",
-    boxShadow: "0 4px 24px rgb(0 0 0 / 40%)",
-  });
-  Object.assign(pre.style, {
-    margin: "0 0 .75rem",
-    font: "13px/1.45 ui-monospace, monospace",
-    whiteSpace: "pre-wrap",
-    background: "none",
-    color: "inherit",
-  });
-  overlay.append(pre, close);
-  document.body.append(overlay);
-  state.overlay = overlay;
+async function accept(id) {
+  try {
+    const response = await fetch('/.coursebuild/accept', {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', 'X-Coursebuild-Token': token },
+      body: JSON.stringify({ page, id }),
+    })
+    return (await response.json()).message
+  } catch {
+    return 'the preview does not answer'
+  }
 }
 
-const events = new EventSource("/.coursebuild/events");
-events.addEventListener("hello", (event) => {
-  // After a pause (a laptop that slept, a server that was started again) the page may be older than the site.
-  if (state.version !== null && state.version !== event.data) reload();
-  state.version = event.data;
-});
-events.addEventListener("reload", reload);
-events.addEventListener("problems", (event) => show(JSON.parse(event.data)));
+connect(page, {
+  hello(told) {
+    if (tool !== null && tool !== told.tool) location.reload() // another version of the preview itself
+    tool = told.tool
+    token = told.token
+    panel.state({ lost: false })
+  },
+  page(now) {
+    wanted = now
+    panel.state({ gone: now === '' && state !== '' })
+    take()
+  },
+  news(told) {
+    latest = told
+    panel.show(told)
+    const keep = holdPlace()
+    marks.show(told)
+    keep()
+  },
+  lost: () => panel.state({ lost: true }),
+})

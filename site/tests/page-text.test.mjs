@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
+import { deflateRawSync } from 'node:zlib'
 import { fillScript, pythonLiteral } from '../js/lab/page/export.js'
 import { placeOf } from '../js/lab/page/notices.js'
 import {
@@ -13,7 +14,7 @@ import {
   formatTime,
   superscript,
 } from '../js/lab/page/numbers.js'
-import { readLink, writeLink } from '../js/lab/page/share.js'
+import { LONGEST, readLink, writeLink } from '../js/lab/page/share.js'
 import { spread } from '../js/lab/page/spread.js'
 import { fill } from '../js/lab/page/words.js'
 
@@ -95,28 +96,61 @@ test('texts take values by name', () => {
   assert.equal(fill('at {t} s, {x}: {t}', { t: '1.20' }), 'at 1.20 s, {x}: 1.20')
 })
 
-test('a state comes back from a link bit for bit, whatever its values', () => {
+test('a state comes back from a link bit for bit, whatever its values', async () => {
   const physics = new Float64Array([0, -0, NaN, 1 / 3, -1e-310, Infinity])
-  const state = { values: [null, 0.1, 'ä?&#', true], steps: 1234, time: 2.468, physics }
-  const link = writeLink('4.2-lab-1', state)
-  assert.match(link, /^#lab=4\.2-lab-1&s=[\w-]+$/)
-  const { id, state: back } = readLink(link)
+  new DataView(physics.buffer).setBigUint64(16, 0x7ff0_0000_0a0a_0001n, true) // a NaN of another kind, with line ends in it
+  const state = { values: [null, 0.1, 'ä?&#\n', true], steps: 1234, time: 2.468, physics }
+  const { link, whole } = await writeLink('4.2-lab-1', state)
+  assert.match(link, /^#lab=4\.2-lab-1&z=[\w-]+$/)
+  assert.equal(whole, true)
+  const { id, state: back } = await readLink(link)
   assert.equal(id, '4.2-lab-1')
   assert.deepEqual([back.values, back.steps, back.time], [state.values, 1234, 2.468])
   assert.deepEqual(new Uint8Array(back.physics.buffer), new Uint8Array(physics.buffer))
 })
 
-test('a state too long for a link keeps its controls', () => {
-  const { state } = readLink(writeLink('a', { values: [1], steps: 5, time: 1, physics: new Float64Array(1000) }))
-  assert.deepEqual(state, { values: [1], steps: 5, time: 1, physics: null })
+test('a state of a thousand numbers has room in a link, one of ten thousand keeps its controls', async () => {
+  const numbers = (length) => Float64Array.from({ length }, (_, i) => Math.sin(1 + i))
+  for (const [length, fits] of [[1200, true], [10_000, false]]) {
+    const physics = numbers(length)
+    const { link, whole } = await writeLink('a', { values: [1], steps: 5, time: 1, physics })
+    assert.equal(whole, fits, String(length))
+    assert.ok(link.length < LONGEST + 20)
+    assert.deepEqual((await readLink(link)).state, { values: [1], steps: 5, time: 1, physics: fits ? physics : null })
+  }
+  const resting = await writeLink('a', { values: [], steps: 0, time: 0, physics: new Float64Array(100_000) })
+  assert.ok(resting.whole && resting.link.length < 2000, 'zeros take no room')
 })
 
-test('links that are not of a lab, or broken, give no state', () => {
-  assert.equal(readLink(''), null)
-  assert.equal(readLink('#section-2'), null)
-  for (const text of ['%', 'AAAA', 'e30', 'bnVsbA', btoa('{"v":3}')])
-    assert.deepEqual(readLink(`#lab=x&s=${text}`), { id: 'x', state: null })
-  assert.deepEqual(readLink('#lab=x'), { id: 'x', state: null })
+test('a browser that cannot deflate makes links too', async (t) => {
+  const { CompressionStream } = globalThis
+  t.after(() => (globalThis.CompressionStream = CompressionStream))
+  delete globalThis.CompressionStream
+  const state = { values: ['x'], steps: 2, time: 0.5, physics: new Float64Array([1.5, -0]) }
+  const { link } = await writeLink('a', state)
+  assert.match(link, /^#lab=a&s=[\w-]+$/)
+  assert.deepEqual((await readLink(link)).state, state)
+})
+
+test('links that are not of a lab, or broken, give no state', async () => {
+  assert.equal(await readLink(''), null)
+  assert.equal(await readLink('#section-2'), null)
+  for (const text of ['%', 'AAAA', 'e30', 'bnVsbA', btoa('{"v":3}'), btoa('{"v":[]}\nseven b'), 'é']) {
+    assert.deepEqual(await readLink(`#lab=x&s=${text}`), { id: 'x', state: null }, text)
+    assert.deepEqual(await readLink(`#lab=x&z=${text}`), { id: 'x', state: null }, text)
+  }
+  assert.deepEqual(await readLink('#lab=x'), { id: 'x', state: null })
+})
+
+test('a link that unfolds to very much gives no state', async () => {
+  const bytes = deflateRawSync(Buffer.concat([Buffer.from('{"v":[]}\n'), Buffer.alloc(16 << 20)]))
+  assert.deepEqual(await readLink(`#lab=x&z=${bytes.toString('base64url')}`), { id: 'x', state: null })
+})
+
+test('older links, with the physics in the JSON, are read', async () => {
+  const text = btoa(JSON.stringify({ v: [3], n: 7, t: 0.25, p: btoa(String.fromCharCode(...new Uint8Array(new Float64Array([2, 3]).buffer))) }))
+  const { state } = await readLink(`#lab=x&s=${text.replaceAll('=', '')}`)
+  assert.deepEqual(state, { values: [3], steps: 7, time: 0.25, physics: new Float64Array([2, 3]) })
 })
 
 test('an entry is named as its author finds it', () => {

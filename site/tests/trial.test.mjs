@@ -4,6 +4,7 @@ import assert from 'node:assert/strict'
 import { before, test } from 'node:test'
 import { fromBase64, toBase64 } from '../js/lab/trial/base64.js'
 import { crc32 } from '../js/lab/trial/parity.js'
+import { Guard } from '../js/lab/trial/guard.js'
 import { runTrial } from '../js/lab/trial/trial.js'
 import { FALLING, PENDULUM, compile, config, control, newEngine, plot } from './helpers.mjs'
 
@@ -28,7 +29,8 @@ function attempt(xml, data, pieces = {}, request = {}) {
   ]
   const code = `({${members.join(', ')}})`
   let clock = 0
-  return runTrial(engine, { config: config(data), code, ...request }, compile(engine, xml), () => (clock += 0.01))
+  const { guard = null, ...rest } = request
+  return runTrial(engine, { config: config(data), code, ...rest }, compile(engine, xml), () => (clock += 0.01), guard)
 }
 
 const set = (target) => `{set: (${HEAD.slice(1, -1)}, value) => { (${target}) = value }}`
@@ -166,14 +168,95 @@ test('warnings and divergence', () => {
   assert.ok(blown.main.seconds < 0.2)
 })
 
+test('a state that is no number can be drawn, even in the first picture that has something to draw', () => {
+  const blow = 'if (data.time > 0.05) data.qvel[0] = 1e200'
+  const reply = attempt(PENDULUM, { overlays: ['frames'] }, { controller: blow, setup: 'data.qpos[0] = NaN' }, { seconds: 0.1 })
+  assert.deepEqual(reply.failures.map(({ kind }) => kind), ['diverged'])
+})
+
 test('a trial that takes too long says so', () => {
   const reply = attempt(FALLING, {}, {}, { seconds: 1000, wall: 0.005 })
   assert.deepEqual(told(reply).map(([, kind]) => kind), ['timeout'])
 })
 
-test('a reset that does not lead back is noticed', () => {
-  const reply = attempt(FALLING, {}, { setup: 'data.qvel[0] = Math.random()' }, { seconds: 0.1 })
-  assert.match(reply.main.resetDiffers, /^number 8 of the state is 0\.\d+ after a reset, and was 0\.\d+$/)
+test('a reset that does not lead back is noticed, with the entry that would have to set the number', () => {
+  const differs = (data, pieces) => {
+    const reply = attempt(FALLING, data, pieces, { seconds: 0.1 })
+    assert.deepEqual(told(reply), [])
+    return reply.main.resetDiffers
+  }
+  const slider = (fields) => control({ label: 's', min: 0, max: 1, value: 0.5, ...fields })
+  assert.deepEqual(differs({}, { setup: 'data.qvel[0] = Math.random()' }), { what: 'qvel[0]', entry: ['setup'] })
+  assert.deepEqual(differs({}, { setup: 'ctx.n = (ctx.n ?? 0) + 1; data.qpos[2] = ctx.n' }), { what: 'qpos[2]', entry: ['setup'] })
+  const two = [slider(), slider()]
+  assert.deepEqual(differs({ controls: two }, { controls: [set('model.opt.gravity[2]'), set('data.qvel[1]')] }), {
+    what: 'qvel[1]',
+    entry: ['controls', 1],
+  })
+  const initial = '{set: ({ctx, data}, value) => { data.xfrc_applied[8] = value + (ctx.n = (ctx.n ?? 0) + 1) }}'
+  assert.deepEqual(differs({ controls: [slider({ init: true })] }, { controls: [initial] }), {
+    what: 'xfrc_applied[8]',
+    entry: ['controls', 0],
+  })
+  assert.deepEqual(differs({}, { controller: 'model.qpos0[2] = 2' }), { what: 'qpos[2]', entry: [] })
+  assert.deepEqual(differs({}, { controller: 'ctx.late = 3', setup: 'data.time = ctx.late ?? 0' }), { what: 'time', entry: ['setup'] })
+})
+
+test('a reset leads back where it should', () => {
+  for (const [data, pieces] of [
+    [{ seed: 3 }, { setup: 'data.qvel[0] = lib.random()', controller: 'data.xfrc_applied[6] = lib.random()' }],
+    [{ controls: [control({ label: 's', min: 0, max: 1, value: 0.5, init: true })] }, { controls: [set('data.qvel[1]')] }],
+    [{ controls: [control({ label: 's', min: 1, max: 3, value: 2 })] }, { controls: [set('model.body_mass[1]')] }],
+    [{ controls: [control({ label: 's', min: 1, max: 3, value: 2, param: 'p' })] }, { controls: ['{set: ({ctx}, value) => { ctx.p = value }}'], setup: 'data.qvel[1] = ctx.p' }],
+  ]) {
+    const { main } = attempt(FALLING, data, pieces, { seconds: 0.1 })
+    assert.equal(main.resetDiffers, null, JSON.stringify([data, pieces]))
+  }
+})
+
+const SHARED = [['JSON', JSON, false], ['Math', Math, false], ['Array', Array, false], ['Error', Error, false]]
+
+test('what a lab changes of that which all share is told at its entry, and put back', () => {
+  const button = control({ label: 'b', type: 'button' })
+  const slider = control({ label: 's', min: 0, max: 1, value: 0.5 })
+  for (const [data, pieces, entry, names] of [
+    [{}, { setup: 'Math.sin = () => 0' }, 'setup', '`Math.sin`'],
+    [{}, { setup: 'mj.mj_step = () => {}' }, 'setup', '`mj.mj_step`'],
+    [{}, { setup: 'JSON.stringify = null' }, 'setup', '`JSON.stringify`'],
+    [{}, { setup: 'delete Array.prototype.map; null.x' }, 'setup', '`Array.prototype.map`'],
+    [{}, { controller: 'if (data.time > 0.05) Array.prototype.last = 3' }, 'controller', '`Array.prototype.last`'],
+    [{ controls: [button] }, { controls: [run('Object.setPrototypeOf(Math, null); mj.mj_step = 3')] }, 'controls.0.run', '`Math.__proto__`, `mj.mj_step`'],
+    [{ controls: [slider] }, { controls: ['{set: (_, value) => { if (value === 1) Math.max = Math.min }}'] }, 'controls.0', '`Math.max`'],
+    [{ readouts: READOUT }, { readouts: ['(Math[Symbol.iterator] = 1)'] }, 'readouts.0.expr', '`Math[Symbol(Symbol.iterator)]`'],
+    [{ plots: [plot(1)] }, { plots: [['(mj.MjData.prototype.x = 1)']] }, 'plots.0.traces.0.expr', '`mj.MjData.prototype.x`'],
+    [{ expect: [{ after: null, t: 0, min: 0, max: 9 }] }, { expect: ['(Object.defineProperty(Math, "PI", {}), Error.stackTraceLimit = 3)'] }, 'expect.0.expr', '`Error.stackTraceLimit`'],
+  ]) {
+    const guard = new Guard([...SHARED, ['mj', engine.mj, true]])
+    const { sin, max } = Math
+    const limit = Error.stackTraceLimit
+    const reply = attempt(FALLING, data, pieces, { seconds: 0.1, guard })
+    const what = JSON.stringify([data, pieces])
+    assert.deepEqual(told(reply), [[entry, 'shared', names, null]], what)
+    assert.deepEqual(guard.changes(), [], what)
+    assert.deepEqual([Math.sin, Math.max, typeof [].map, Error.stackTraceLimit], [sin, max, 'function', limit])
+  }
+})
+
+test('a lab that keeps to itself changes nothing of what all share', () => {
+  const guard = new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
+  const reply = attempt(
+    PENDULUM,
+    { key: 'up', seed: 1, readouts: READOUT, plots: [plot(1)], overlays: ['frames'], controls: [control({ label: 'b', type: 'button' })] },
+    {
+      setup: 'ctx.list = [3, 1].sort().map((x) => x); class A extends Error {}; A.prototype.x = 1; new A().name = "b"',
+      readouts: ['`${new Map([[1, 2]]).get(1)}${/a(b)/.test("ab")}${RegExp.$1}`'],
+      plots: [['[...new Set([1, 2])].length + new mj.MjVFS().delete() ?? 0']],
+      controls: [run('ctx.big = new mj.DoubleBuffer(1 << 22); ctx.big.delete()')],
+    },
+    { seconds: 0.1, guard },
+  )
+  assert.deepEqual(guard.changes(), [])
+  assert.deepEqual(told(reply).filter(([, kind]) => kind === 'shared'), [])
 })
 
 test('a model that does not load', () => {

@@ -2,114 +2,39 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import re
 import time
-from collections.abc import Callable
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
 
 import mujoco
 import numpy as np
 import pytest
 from coursekit import Folder
 from labcourse import PAGE
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route
+from labpage import (
+    ALL,
+    AUTO,
+    MOUNT,
+    SWING,
+    TWINS,
+    changed,
+    comes,
+    floats,
+    lab,
+    parsed,
+    reach,
+    readout,
+    shows,
+    state_of,
+    time_of,
+    until,
+    watched,
+)
+from playwright.sync_api import Browser, BrowserContext, Page, Route
 
 pytestmark = pytest.mark.browser
 
 AXE = Path(__file__).parents[2] / "site" / "node_modules" / "axe-core" / "axe.min.js"
-SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
-
-
-def watched(context: BrowserContext) -> tuple[Page, list[str]]:
-    """A page, and what it says to the console."""
-    page, said = context.new_page(), list[str]()
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
-    return page, said
-
-
-def until(page: Page, true: str, argument: object = None, tries: int = 400) -> None:
-    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
-    for _ in range(tries):
-        if page.evaluate(true, argument):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never true: {true}")
-
-
-def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
-    """A lab of the page, in the window and started."""
-    found = page.locator(".lab").nth(number)
-    found.scroll_into_view_if_needed()
-    if state is not None:
-        reach(page, number, state)
-    return found
-
-
-def reach(page: Page, number: int, state: str) -> None:
-    until(
-        page,
-        "([n, state]) => document.querySelectorAll('.lab')[n].dataset.state === state",
-        [number, state],
-    )
-
-
-def readout(found: Locator, label: str) -> str:
-    row = found.locator(".lab-live .lab-readouts > div").filter(has_text=label)
-    return row.locator("dd").inner_text().strip().replace("−", "-")
-
-
-def shows(found: Locator, label: str, text: str) -> None:
-    """A readout comes to show a text; a page draws when it gets to it."""
-    comes(found.page, lambda: readout(found, label) == text)
-
-
-def comes(page: Page, true: Callable[[], bool]) -> None:
-    """Wait for something; how long it takes on a machine is no matter."""
-    for _ in range(400):
-        if true():
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError("it never comes")
-
-
-def changed(page: Page, view: Locator, before: bytes) -> bytes:
-    """The picture once it is another one."""
-    for _ in range(100):
-        now = view.screenshot()
-        if now != before:
-            return now
-        page.wait_for_timeout(100)
-    raise AssertionError("the picture stays as it is")
-
-
-def time_of(found: Locator) -> float:
-    return float(found.locator(".lab-time").inner_text().removesuffix("s").strip())
-
-
-def state_of(page: Page, found: Locator) -> dict[str, object]:
-    """What the link of a lab's state holds."""
-    before = page.evaluate("() => location.href")
-    found.get_by_role("button", name="Copy link").click()
-    for _ in range(100):
-        if page.evaluate("() => location.href") != before:
-            break
-        page.wait_for_timeout(20)
-    return parsed(page.evaluate("() => location.href"))
-
-
-def parsed(address: str) -> dict[str, object]:
-    fields = parse_qs(urlsplit(address).fragment)
-    state: dict[str, object] = json.loads(base64.urlsafe_b64decode(fields["s"][0] + "=="))
-    return state
-
-
-def floats(state: dict[str, object]) -> np.ndarray:
-    return np.frombuffer(base64.b64decode(str(state["p"])), dtype="<f8")
 
 
 def native(course: Folder, steps: int, angle: float, gravity: float = -9.8) -> np.ndarray:
@@ -167,14 +92,25 @@ def test_time_never_runs_ahead_and_lateness_is_told(context: BrowserContext, bas
     reach(page, SWING, "playing")
     page.wait_for_timeout(500)
     clock = "() => [performance.now() / 1000, document.querySelector('.lab-time').textContent]"
-    begun, first = page.evaluate(clock)
-    page.wait_for_timeout(2000)
-    ended, last = page.evaluate(clock)
-    simulated = float(last.split()[0]) - float(first.split()[0])
-    elapsed = ended - begun
-    assert 0 < simulated < elapsed + 0.2
-    # How fast a machine is decides nothing here; that it could not keep up must be said.
-    assert simulated > 0.8 * elapsed or "×" in page.inner_text(".lab-late")
+
+    def window() -> tuple[float, float, str]:
+        begun, first = page.evaluate(clock)
+        page.wait_for_timeout(2000)
+        ended, last = page.evaluate(clock)
+        late = page.inner_text(".lab-late")
+        return float(last.split()[0]) - float(first.split()[0]), ended - begun, late
+
+    # On a machine under load a number may be shown late, so that from there on more seems to have
+    # passed than has; a clock that runs ahead does so in every window.
+    found = []
+    for _ in range(6):
+        simulated, elapsed, late = window()
+        found.append((simulated, elapsed, late))
+        # How fast a machine is decides nothing here; that it could not keep up must be said.
+        if 0 < simulated < elapsed + 0.2 and (simulated > 0.8 * elapsed or "×" in late):
+            break
+    else:
+        raise AssertionError(found)
 
 
 def test_controls_do_what_they_say(context: BrowserContext, base: str, course: Folder) -> None:
@@ -223,6 +159,45 @@ def test_a_link_leads_back_to_the_state(context: BrowserContext, base: str) -> N
     there, here = state_of(page, swing), state_of(other, again)
     assert there["n"] == here["n"] == int(str(state["n"])) + 1
     assert floats(there)[:3].tobytes() == floats(here)[:3].tobytes()
+    assert said == []
+
+
+def test_a_link_to_a_state_of_very_many_numbers(context: BrowserContext, base: str) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    found = lab(page, ALL)
+    found.get_by_role("button", name="Play").click()
+    comes(page, lambda: time_of(found) > 0.3)
+    found.get_by_role("button", name="Pause").click()
+    reach(page, ALL, "paused")
+    state = state_of(page, found)
+    assert floats(state).size > 500
+    assert "controls only" not in found.locator(".lab-message").inner_text()
+    other = context.new_page()
+    other.goto(page.evaluate("() => location.href"))
+    again = lab(other, ALL)
+    comes(other, lambda: time_of(again) > 0)
+    back = state_of(other, again)
+    assert (back["n"], back["t"]) == (state["n"], state["t"])
+    assert floats(back).tobytes() == floats(state).tobytes()
+    assert said == []
+
+
+def test_a_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    page.evaluate(MOUNT, SWING)
+    page.evaluate(
+        """async () => {
+          const physics = Float64Array.from({ length: 9000 }, Math.random)
+          await window.made.share({ values: [3, 0.5, null], steps: 7, time: 1, physics })
+        }"""
+    )
+    message = page.locator("#tried .lab-message")
+    assert "lab.live.link_controls" in message.inner_text()
+    assert "lab-is-warning" in (message.get_attribute("class") or "")
+    state = parsed(page.evaluate("() => location.href"))
+    assert (state["v"], state["physics"]) == ([3, 0.5, None], b"")
     assert said == []
 
 
@@ -438,41 +413,3 @@ def test_a_running_lab_has_no_accessibility_fault(context: BrowserContext, base:
     session.send("Runtime.evaluate", {"expression": AXE.read_text(encoding="utf-8")})
     faults = page.evaluate("async () => (await axe.run('.lab')).violations.map((v) => v.id)")
     assert faults == []
-
-
-def test_mounting_and_disposing_leaves_nothing(context: BrowserContext, base: str) -> None:
-    page, _ = watched(context)
-    page.goto(base + PAGE)
-    lab(page)
-    session = context.new_cdp_session(page)
-    session.send("Performance.enable")
-    again = """async (times) => {
-      const place = document.querySelectorAll('.lab')[2]
-      const script = new URL(place.dataset.script, document.baseURI).href
-      const { mountLab } = await import(script)
-      for (let i = 0; i < times; i++) {
-        const made = await mountLab(place, (key) => key)
-        await new Promise((done) => setTimeout(done, 60))
-        made.dispose()
-      }
-    }"""
-
-    def listeners() -> tuple[int, int]:
-        """Listeners and nodes that stay: what a browser frees late is given time."""
-        counts = []
-        for _ in range(8):
-            session.send("HeapProfiler.collectGarbage")
-            page.wait_for_timeout(150)
-            found = session.send("Performance.getMetrics")["metrics"]
-            values = {metric["name"]: metric["value"] for metric in found}
-            counts.append((int(values["JSEventListeners"]), int(values["Nodes"])))
-        return min(counts)
-
-    page.evaluate(again, 10)
-    before = listeners()
-    page.evaluate(again, 190)
-    after = listeners()
-    # A lab has dozens of listeners and hundreds of nodes: one of either left behind by each mount
-    # would be 190 more.
-    assert after[0] <= before[0] + 40, (before, after)
-    assert after[1] <= before[1] + 180, (before, after)

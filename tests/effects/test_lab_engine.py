@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -136,12 +135,45 @@ def told_kinds(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
     return [(f["entry"], f["kind"], f.get("message", "")) for f in reply["failures"]]
 
 
-def test_code_that_breaks_what_all_share(bench: Bench) -> None:
-    first = bench.trial(make_lab(setup="JSON.stringify = null"))
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        ("JSON.stringify = null", "`JSON.stringify`"),
+        ("Array.prototype.first = () => 0; null.x", "`Array.prototype.first`"),
+        ("Float64Array.prototype.__proto__.set = () => {}", None),
+        ("globalThis.count = 1", "`count`"),
+        ("[][Symbol.iterator]().__proto__.next = null", "`the iterators of arrays.next`"),
+        ("Object.freeze(Math)", None),
+        ("Reflect.ownKeys = Map.prototype.get = Map.prototype.has = null", None),
+        ("mj.mj_step = () => {}", "`mj.mj_step`"),
+        ("globalThis.trial = null", "`trial`"),
+    ],
+)
+def test_code_that_changes_what_all_share(bench: Bench, code: str, names: str | None) -> None:
+    first = bench.trial(make_lab(setup=code))
     ((entry, kind, message),) = told(first)
-    assert (entry, kind) == ((), "engine")
-    assert re.match("the trial broke: .*TypeError: ", message)
-    assert told(bench.trial(make_lab())) == []
+    assert (entry, kind) == (("setup",), "shared")
+    assert names is None or message == names
+    ordinary = make_lab(
+        setup="data.qvel.set([1], 0)",
+        readouts=[{"label": "r", "expr": "`${typeof count} ${data.qvel[0]}`"}],
+    )
+    reply = bench.trial(ordinary)
+    assert told(reply) == []
+    assert reply["main"]["pictures"][0]["readouts"] == ["undefined 1"]
+
+
+def test_a_lab_that_keeps_to_itself_keeps_the_engine(bench: Bench) -> None:
+    lab = make_lab(
+        setup="ctx.list = [3, 1].sort(); ctx.big = new mj.DoubleBuffer(1 << 22); ctx.big.delete()",
+        readouts=[{"label": "r", "expr": "`${/a(b)/.test('ab')} ${new Map([[1, 2]]).get(1)}`"}],
+        overlays=["frames", "contacts"],
+    )
+    assert told(bench.trial(lab)) == []
+    isolate = bench.browser._isolate
+    assert told(bench.trial(lab)) == []
+    assert isolate is not None
+    assert bench.browser._isolate is isolate
 
 
 def test_a_model_that_the_engine_does_not_take(bench: Bench) -> None:

@@ -15,6 +15,7 @@ from coursebuild.effects.mjcf import (
     compile_models,
     compile_texts,
     error_line,
+    model_files,
     readable_error,
 )
 from coursebuild.model import MjcfModel
@@ -130,9 +131,44 @@ class TestFacts:
     def test_a_text_finds_what_is_in_models(self, root: Path) -> None:
         result = text(root, MAIN)
         assert result.facts is not None, result.error
-        assert (result.facts.geoms, result.facts.includes) == (2, ())
+        assert result.facts.geoms == 2
+        assert result.facts.includes == (
+            "models/child.xml",
+            "models/parts/asset.xml",
+            "models/parts/mesh.obj",
+            "models/parts/skin.png",
+        )
         assert names(root) == ["models"]
         assert names(root / "models") == ["child.xml", "parts"]
+
+    def test_what_a_text_pulls_in_from_elsewhere(self, root: Path, tmp_path: Path) -> None:
+        """From beside `models/`, by an absolute path, and from outside of the course."""
+        part = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+        (root / "beside").mkdir()
+        (root / "beside/part.xml").write_text(part)
+        far = tmp_path / "far.xml"
+        far.write_text(part)
+        (root.parent / "above.xml").write_text(part)
+        for written, told in (
+            ("../beside/part.xml", "beside/part.xml"),
+            (str(far), str(far)),
+            ("../../above.xml", str(root.parent / "above.xml")),
+        ):
+            found = text(root, f'<mujoco><include file="{written}"/></mujoco>').facts
+            assert found is not None and found.includes == (told,)
+
+    def test_what_is_looked_for_and_not_there(self, root: Path) -> None:
+        asset = '<asset><hfield name="h" file="h.png"/></asset>'
+        xml = f'<mujoco><include file="none.xml"/>{asset}</mujoco>'
+        assert text(root, xml).error
+        assert model_files(root, "models/a.xml", xml) == ("models/h.png", "models/none.xml")
+
+    def test_a_link_is_a_part_by_its_own_name(self, root: Path) -> None:
+        """It may lead elsewhere the next time."""
+        (root / "models/link.xml").symlink_to("child.xml")
+        (result,) = compile_models(root, [model(root, "m", MAIN.replace("child.xml", "link.xml"))])
+        assert result.facts is not None, result.error
+        assert "models/link.xml" in result.facts.includes
 
     def test_a_model_is_compiled_as_it_was_read(self, root: Path) -> None:
         read = model(root, "m", "<mujoco/>")

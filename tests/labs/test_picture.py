@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import struct
 import warnings
-import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from coursebuild.labs.picture import Camera, Solid, draw, png
+from coursebuild.labs.light import Lamp, Light, Material, material_of
+from coursebuild.labs.picture import Camera, Solid, draw
+from coursebuild.labs.png import png
 from coursebuild.labs.shapes import Kind, mesh_surface, surface
+from coursebuild.labs.textures import Dress, texture_of
 
 FRONT = Camera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
 """Looks along +y: x is to the right, z is up."""
@@ -30,12 +31,11 @@ def solid(
     size: tuple[float, ...] = (0.5, 0.5, 0.5),
     rgba: tuple[float, float, float, float] = RED,
     rotation: NDArray[np.float64] | None = None,
-    checker: float = 0.0,
 ) -> Solid:
     shape = surface(kind, size)
     assert shape is not None
     turn = np.eye(3) if rotation is None else rotation
-    return Solid(shape, np.array(at, dtype=float), turn, rgba, checker)
+    return Solid(shape, np.array(at, dtype=float), turn, rgba)
 
 
 def covered(pixels: Pixels) -> NDArray[np.bool_]:
@@ -132,8 +132,8 @@ class TestTransparency:
 
     def test_alone_it_covers_partly(self) -> None:
         pixels = draw((solid(size=(0.5, 0.001, 0.5), rgba=(1, 0, 0, 0.5)),), FRONT, SIZE)
-        # Two sheets, the front and the back, each half.
-        assert int(pixels[30, 40, 3]) == pytest.approx(255 * 0.75, abs=2)
+        # Of what is closed only the outside is seen.
+        assert int(pixels[30, 40, 3]) == pytest.approx(255 * 0.5, abs=2)
         assert colour_at(pixels, 40, 30) == "red"
 
     def test_the_order_does_not_matter(self) -> None:
@@ -164,15 +164,184 @@ def test_colours_stay_in_range() -> None:
     assert (pixels[30, 40, 0], pixels[30, 40, 1]) == (255, 0)
 
 
-def test_a_pattern_has_its_width() -> None:
+def checkered(half: float, repeat: tuple[float, float], uniform: bool) -> Dress:
+    """A texture of 2 × 2 squares on a plane."""
+    squares = np.kron([[255, 0], [0, 255]], np.ones((8, 8))).astype(np.uint8)
+    given = {"type": 0, "width": 16, "height": 16, "channels": 1, "data": squares.ravel()}
+    texture = texture_of(given)
+    assert texture is not None
+    return Dress(texture, "plane", (half, half, 1.0), repeat, uniform)
+
+
+@pytest.mark.parametrize(
+    ("repeat", "uniform", "wide"),
+    [((3, 3), False, 1.0), ((1, 1), True, 1.0), ((2, 2), True, 0.5), ((1, 1), False, 3.0)],
+)
+def test_a_pattern_has_its_width(repeat: tuple[float, float], uniform: bool, wide: float) -> None:
+    """A uniform texture is there so often in two metres, another so often on the whole plane."""
     camera = Camera(0, -90, 10, (0, 0, 0))
-    floor = replace(solid("plane", size=(3, 3, 1), rgba=(1, 1, 1, 1)), checker=1.0)
+    floor = solid("plane", size=(3, 3, 1), rgba=(1, 1, 1, 1))
+    dress = checkered(3, repeat, uniform)
+    floor = replace(floor, dress=dress, plane=True, material=Material(specular=0.0))
     row = draw((floor,), camera, (200, 200))[110, :, 0].astype(int)
     bright = row[30:170] > (row[30:170].max() + row[30:170].min()) / 2
     changes = np.nonzero(np.diff(bright))[0]
     # A metre at 10 m, where 200 samples are 2·tan(22.5°)·10 m.
-    assert np.abs(np.diff(changes) - 200 / (20 * math.tan(math.radians(22.5)))).max() <= 1
-    assert len(changes) == 5
+    metre = 200 / (20 * math.tan(math.radians(22.5)))
+    assert np.abs(np.diff(changes) - wide * metre).max(initial=0) <= 1
+    assert len(changes) == round(6 / wide) - 1
+
+
+def test_a_pattern_far_away_is_its_mean_colour() -> None:
+    """And not a noise of squares that happen to be hit."""
+    floor = solid("plane", size=(300, 300, 1), rgba=(1, 1, 1, 1))
+    floor = replace(floor, dress=checkered(300, (600, 600), uniform=False), plane=True)
+    pixels = draw((floor,), Camera(90, -60, 300, (0, 0, 0)), SIZE)[..., 0]
+    assert np.ptp(pixels[20:40].astype(int)) < 25
+
+
+LAMP = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 0.0, -1.0))),), 1.0)
+"""From above, and nothing else."""
+DULL = Material(specular=0.0)
+
+
+def brightness(
+    made: Solid, light: Light, camera: Camera = FRONT, at: tuple[int, int] = (30, 40)
+) -> int:
+    return int(draw((made,), camera, SIZE, light)[at][0])
+
+
+class TestLight:
+    WHITE = (1.0, 1.0, 1.0, 1.0)
+
+    def floor(self, material: Material = DULL, **fields: object) -> Solid:
+        made = solid("plane", size=(3, 3, 1), rgba=(0.5, 0.5, 0.5, 1.0))
+        return replace(made, plane=True, material=material, **fields)  # type: ignore[arg-type]
+
+    def test_a_lamp_lights_by_its_angle(self) -> None:
+        down = Camera(0, -90, 4, (0, 0, 0))
+        for angle in (0.0, 0.6, 1.2):
+            towards = np.array((math.sin(angle), 0.0, -math.cos(angle)))
+            light = Light(np.zeros(3), (Lamp(np.ones(3), towards),), 1.0)
+            found = brightness(self.floor(), light, down)
+            assert found == pytest.approx(127.5 * math.cos(angle), abs=2)
+
+    def test_a_cone_ends(self) -> None:
+        down = Camera(0, -90, 4, (0, 0, 0))
+        narrow = Lamp(np.ones(3), np.array((0.0, 0.0, -1.0)), np.array((0.0, 0.0, 1.0)), (0.9, 0.9))
+        light = Light(np.zeros(3), (narrow,), 1.0)
+        row = draw((self.floor(),), down, SIZE, light)[30, :, 0]
+        reach = np.flatnonzero(row)
+        # At 1 m below the lamp the cone is tan(acos 0.9) wide; the picture is 60 pixels high.
+        wide = 2 * math.tan(math.acos(0.9)) * 60 / (8 * math.tan(math.radians(22.5)))
+        assert reach.max() - reach.min() + 1 == pytest.approx(wide, abs=2)
+
+    def test_from_below_a_plane_is_lit_as_above_and_half_there(self) -> None:
+        """As MuJoCo's renderer draws it."""
+        up = Camera(0, 90, 4, (0, 0, 0))
+        pixels = draw((self.floor(),), up, SIZE, LAMP)
+        assert pixels[30, 40].tolist() == pytest.approx([128, 128, 128, 128], abs=2)
+
+    def test_a_surface_that_sends_out_light_is_seen_in_the_dark(self) -> None:
+        dark = Light(np.zeros(3), (), 1.0)
+        assert brightness(solid(rgba=self.WHITE), dark) == 0
+        glowing = replace(solid(rgba=self.WHITE), material=Material(emission=0.5))
+        assert brightness(glowing, dark) == pytest.approx(128, abs=2)
+
+    def test_a_rough_surface_has_a_wide_dim_highlight(self) -> None:
+        ahead = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
+        found = []
+        for roughness in (0.3, 0.8):
+            scene = {"materials": [plain(roughness=roughness)]}
+            ball = replace(
+                solid("sphere", size=(1.0,), rgba=(0.0, 0.0, 0.0, 1.0)),
+                material=material_of(scene, 0),
+            )
+            found.append(draw((ball,), FRONT, SIZE, ahead)[30, 40:58, 0].astype(int))
+        assert found[0][0] > 3 * found[1][0] > 0
+        assert found[0][6] < found[1][6], "off the middle it is the other way round"
+
+    def test_a_metal_colours_its_highlight(self) -> None:
+        ahead = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
+        shown = {}
+        for metallic in (0.0, 1.0):
+            scene = {"materials": [plain(metallic=metallic, roughness=0.4)]}
+            ball = solid("sphere", size=(1.0,), rgba=(0.6, 0.3, 0.0, 1.0))
+            ball = replace(ball, material=material_of(scene, 0))
+            shown[metallic] = draw((ball,), FRONT, SIZE, ahead)[30, 40].astype(int)
+        assert shown[0.0][2] > 10 and shown[1.0][2] == 0, "white on paint, none of blue on gold"
+        assert shown[1.0][0] > shown[0.0][0]
+
+
+def plain(**fields: float) -> dict[str, float]:
+    """A material as a trial records it."""
+    unset = {"emission": 0.0, "specular": 0.5, "shininess": 0.5, "reflectance": 0.0}
+    return {**unset, "metallic": -1.0, "roughness": -1.0, **fields}
+
+
+class TestMirror:
+    """Looking along +y and down at a dark floor, a red ball over it."""
+
+    CAMERA = Camera(90, -30, 5, (0, 0, 0))
+    BALL = solid("sphere", at=(0, 0, 1), size=(0.4,), rgba=RED)
+
+    def floor(self, reflectance: float, alpha: float = 1.0, **fields: object) -> Solid:
+        made = solid("plane", size=(4, 4, 1), rgba=(0, 0, 0, alpha))
+        given = {"plane": True, "mirror": 0.0, **fields}
+        material = Material(specular=0.0, reflectance=reflectance)
+        return replace(made, material=material, **given)  # type: ignore[arg-type]
+
+    def reds(self, *solids: Solid, camera: Camera = CAMERA) -> NDArray[np.int64]:
+        """Red in each row, in the middle column."""
+        return draw(solids, camera, (80, 60))[:, 40, 0].astype(int)
+
+    def test_a_floor_shows_what_is_above_it_where_its_image_is(self) -> None:
+        image = replace(self.BALL, position=np.array((0.0, 0.0, -1.0)))
+        shown = self.reds(self.floor(0.5), self.BALL)
+        there = np.flatnonzero(self.reds(image))
+        ball = np.flatnonzero(self.reds(self.BALL))
+        lit = np.flatnonzero(shown)
+        assert set(lit) == set(there) | set(ball)
+        weak = [row for row in there if row not in ball]
+        assert shown[weak].max() == pytest.approx(0.5 * self.reds(self.BALL).max(), rel=0.35)
+
+    def test_what_is_below_is_not_mirrored(self) -> None:
+        under = replace(self.BALL, position=np.array((0.0, 0.0, -1.0)))
+        assert not self.reds(self.floor(0.5), under).any()
+
+    def test_without_reflectance_or_seen_through_it_does_not_reflect(self) -> None:
+        ball = set(np.flatnonzero(self.reds(self.BALL)))
+        for floor in (self.floor(0.0), self.floor(0.5, 0.9), self.floor(0.5, mirror=None)):
+            assert set(np.flatnonzero(self.reds(floor, self.BALL))) == ball
+
+    def test_only_the_first_reflects(self) -> None:
+        other = replace(self.floor(0.5), position=np.array((0.0, 0.0, 0.001)))
+        ball = set(np.flatnonzero(self.reds(self.BALL)))
+        assert set(np.flatnonzero(self.reds(self.floor(0.5), other, self.BALL))) == ball
+
+    def test_of_a_box_only_the_upper_face(self) -> None:
+        box = solid("box", at=(0, 0, -0.5), size=(1.5, 1.5, 0.5), rgba=(0, 0, 0, 1))
+        shiny = replace(box, material=Material(specular=0.0, reflectance=0.5), mirror=0.5)
+        above = self.reds(shiny, self.BALL)
+        assert above.astype(bool).sum() > self.reds(self.BALL).astype(bool).sum() + 5
+        aside = replace(self.BALL, position=np.array((0.0, -2.0, -0.6)))
+        assert set(np.flatnonzero(self.reds(shiny, aside))) == set(np.flatnonzero(self.reds(aside)))
+
+
+def test_a_sky_is_behind_everything() -> None:
+    """+z above: MuJoCo's faces are right, left, up, down, front, back of one who looks along +y."""
+    colours = [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 0), (0, 255, 255), (255, 0, 255)]
+    data = np.repeat(np.array(colours, np.uint8), 16, axis=0).ravel()
+    given = {"type": 2, "width": 4, "height": 24, "channels": 3, "data": data}
+    texture = texture_of(given)
+    seen = {}
+    for name, azimuth, elevation in (("up", 0, 90), ("down", 0, -90), ("x", 0, 0), ("y", 90, 0)):
+        camera = Camera(azimuth, elevation, 4, (0, 0, 0))
+        pixels = draw((solid(size=(0.1, 0.1, 0.1)),), camera, SIZE, background=texture)
+        assert (pixels[..., 3] == 255).all()
+        seen[name] = tuple(int(v) for v in pixels[30, 15, :3])
+    assert seen["up"] == (0, 0, 255) and seen["down"] == (255, 255, 0)
+    assert seen["x"] != seen["y"]
 
 
 def test_the_same_each_time() -> None:
@@ -251,38 +420,3 @@ def test_any_camera(
     )
     pixels = draw(solids, camera, (24, 18))
     assert pixels.dtype == np.uint8 and pixels.shape == (18, 24, 4)
-
-
-class TestPng:
-    def decoded(self, data: bytes) -> Pixels:
-        """By hand: the chunks, the checksums and the filters of PNG."""
-        assert data[:8] == b"\x89PNG\r\n\x1a\n"
-        at, chunks = 8, []
-        while at < len(data):
-            (length,) = struct.unpack(">I", data[at : at + 4])
-            name, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
-            assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(
-                name + body
-            )
-            chunks.append((name, body))
-            at += 12 + length
-        assert [name for name, _ in chunks] == [b"IHDR", b"IDAT", b"IEND"]
-        width, height, depth, colour, *rest = struct.unpack(">IIBBBBB", chunks[0][1])
-        assert (depth, colour, rest) == (8, 6, [0, 0, 0])
-        raw = np.frombuffer(zlib.decompress(chunks[1][1]), np.uint8).reshape(height, -1)
-        assert raw.shape[1] == 4 * width + 1
-        rows = np.zeros((height, 4 * width), np.uint8)
-        for i, (kind, *row) in enumerate(raw):
-            assert kind in (0, 2)
-            rows[i] = np.array(row, np.uint8) + (rows[i - 1] if kind == 2 and i else 0)
-        return rows.reshape(height, width, 4)
-
-    @pytest.mark.parametrize("size", [(1, 1), (7, 3), (64, 48)])
-    def test_it_is_read_back_as_it_was(self, size: tuple[int, int]) -> None:
-        random = np.random.default_rng(0)
-        pixels = random.integers(0, 256, (size[1], size[0], 4), dtype=np.uint8)
-        assert np.array_equal(self.decoded(png(pixels)), pixels)
-
-    def test_a_drawing(self) -> None:
-        pixels = draw((solid("sphere", size=(0.5,)),), FRONT, SIZE)
-        assert np.array_equal(self.decoded(png(pixels)), pixels)

@@ -8,7 +8,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from coursebuild.labs.shapes import Kind, Surface, mesh_surface, surface
+from coursebuild.labs.shapes import (
+    Kind,
+    Surface,
+    mesh_surface,
+    ropes,
+    sharpened,
+    smooth_surface,
+    surface,
+)
 
 ROUND = 0.03
 """How much smaller a round thing is for being made of triangles."""
@@ -147,3 +155,45 @@ def test_what_has_no_surface() -> None:
     given = mesh_surface(np.eye(3), np.array([(0, 1, 2)]))
     for kind in ("mesh", "sdf", "hfield"):
         assert surface(kind, (1.0, 1.0, 1.0), given) is given
+
+
+def test_ropes_have_their_radius_and_round_ends() -> None:
+    points = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 2.0)])
+    rope = ropes(points, np.array([(0, 1), (1, 2)]), 0.1)
+    assert rope.vertices.min(axis=0) == pytest.approx((-0.1, -0.1, -0.1), rel=0.05)
+    assert rope.vertices.max(axis=0) == pytest.approx((1.1, 0.1, 2.1), rel=0.05)
+    ends = points[[0, 1]], points[[1, 2]]
+    for vertex, normal in zip(rope.vertices, rope.normals, strict=True):
+        nearest = []
+        for a, b in zip(*ends, strict=True):
+            along = np.clip((vertex - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+            nearest.append(np.linalg.norm(vertex - a - along * (b - a)))
+        assert min(nearest) <= 0.1 + 1e-12
+        assert np.linalg.norm(normal) == pytest.approx(1)
+    _, across = triangles(rope)
+    facing = np.einsum("ij,ij->i", across, rope.normals[rope.faces].mean(axis=1))
+    assert (facing >= -1e-15).all(), "counter-clockwise from outside"
+
+
+def test_a_rope_whose_ends_meet_is_a_ball() -> None:
+    rope = ropes(np.zeros((2, 3)), np.array([(0, 1)]), 0.2)
+    assert np.isfinite(rope.vertices).all()
+    assert np.linalg.norm(rope.vertices, axis=1).max() == pytest.approx(0.2)
+
+
+def test_a_smooth_surface_has_the_mean_normal_of_its_faces() -> None:
+    ridge = np.array([(0.0, -1, 0), (0, 1, 0), (-1, 0, -1), (1, 0, -1)])
+    found = smooth_surface(ridge, np.array([(0, 1, 2), (1, 0, 3)]))
+    assert found.normals[0] == pytest.approx((0, 0, 1))
+    assert found.normals[3] == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5)))
+
+
+@pytest.mark.parametrize(
+    ("turned", "sharp"), [(0.3, False), (0.6, False), (0.7, True), (1.5, True)]
+)
+def test_an_edge_is_sharp_where_the_face_is_turned_far(turned: float, sharp: bool) -> None:
+    corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(turned), math.sin(turned))]])
+    up = np.tile((0.0, 0.0, 1.0), (1, 3, 1))
+    expected = (0, -math.sin(turned), math.cos(turned)) if sharp else (0, 0, 1)
+    assert sharpened(corners, up)[0, 1] == pytest.approx(expected)
+    assert np.array_equal(sharpened(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"

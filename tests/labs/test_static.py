@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from labkit import Bench, make_lab
 
+from coursebuild.labs.light import light_of
 from coursebuild.labs.picture import Solid
 from coursebuild.labs.reply import unpacked
-from coursebuild.labs.static import _shown, draw_picture, scene_solids, static_form
+from coursebuild.labs.scenery import scene_solids
+from coursebuild.labs.static import _shown, draw_picture, static_form
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 EVERYTHING = """
@@ -76,10 +78,13 @@ def test_all_geoms_have_their_shape_and_place(everything: tuple[Any, dict[str, A
     visible = [g for g in scene["geoms"] if g["group"] <= 2]
     assert Counter(g["type"] for g in visible) == Counter([0, 1, 2, 3, 4, 5, 6, 7, 7, 2, 2])
     plane, hills, ball, capsule, ellipsoid, cylinder, box, first, second = found[:9]
-    assert plane.checker == pytest.approx(0.125), "half of a quarter metre"
+    assert plane.plane and plane.mirror == 0 and box.mirror == pytest.approx(0.3)
+    assert plane.dress is not None and (plane.dress.repeat, plane.dress.uniform) == ((4, 4), True)
+    assert plane.dress.texture.levels[0].shape == (1, 8, 8, 3)
+    assert np.ptp(plane.dress.texture.levels[0], axis=(0, 1, 2)).tolist() == [1, 1, 0]
     assert hills.position == pytest.approx((0, 6, 0))
     reach = [np.ptp(s.surface.vertices, axis=0) for s in (hills, ball, capsule, cylinder, box)]
-    assert reach[0] == pytest.approx((4, 2, 0.5))
+    assert reach[0] == pytest.approx((4, 2, 0.6)), "with what is below 0"
     assert reach[1] == pytest.approx((0.2, 0.2, 0.2), rel=0.01)
     assert reach[2] == pytest.approx((0.2, 0.2, 0.8), rel=0.01)
     assert reach[3] == pytest.approx((0.2, 0.2, 0.6), rel=0.01)
@@ -138,6 +143,79 @@ def test_a_flex_and_a_skin_are_drawn(bench: Bench) -> None:
     cloth = [s for s in solids(main) if s.rgba[2] == 1.0 and len(s.surface.faces) >= 18]
     assert len(cloth) == 1
     assert np.ptp(cloth[0].surface.vertices, axis=0)[:2] == pytest.approx((0.3, 0.3), abs=1e-6)
+
+
+def test_a_flex_of_lines_has_its_radius(bench: Bench) -> None:
+    xml = """<mujoco><asset><material name="m" rgba="0 0.5 1 1"/></asset><worldbody>
+      <flexcomp name="rope" type="grid" count="5 1 1" spacing=".1 .1 .1" radius=".02" dim="1"
+        pos="0 0 1" mass="1" material="m"><edge equality="true"/></flexcomp></worldbody></mujoco>"""
+    _, main = main_of(bench, xml=xml)
+    (rope,) = [s for s in solids(main) if s.open]
+    assert rope.rgba == (0, 0.5, 1, 1), "of its material"
+    assert np.ptp(rope.surface.vertices, axis=0) == pytest.approx((0.44, 0.04, 0.04), rel=0.05)
+
+
+SHINY = """<mujoco>
+  <visual><headlight ambient="0.1 0.2 0.3" diffuse="0.4 0.4 0.4" specular="0.2 0.2 0.2"/></visual>
+  <asset>
+    <texture name="big" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="1024"
+      height="600"/>
+    <texture name="faces" type="cube" builtin="flat" rgb1="1 0 0" rgb2="0 0 1" width="200"
+      height="1200"/>
+    <texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2="0 0 0" width="64" height="384"/>
+    <material name="tiles" texture="big" reflectance="0.25"/>
+    <material name="box" texture="faces" metallic="0.5" roughness="0.5"/>
+    <material name="old" specular="0.75" shininess="0.25" emission="0.125"/>
+  </asset>
+  <worldbody>
+    <light type="spot" pos="0 0 3" dir="0 0 -2" cutoff="30" exponent="16" diffuse="0.6 0.5 0.4"
+      ambient="0.05 0 0" specular="0.4 0.4 0.4"/>
+    <light type="spot" pos="1 0 3" cutoff="120"/>
+    <light type="directional" dir="1 0 -1" active="false"/>
+    <geom type="plane" size="0 0 1" material="tiles" pos="0 0 -1"/>
+    <geom type="box" size="0.3 0.3 0.3" material="box"/>
+    <geom size="0.2" pos="1 0 0" material="old"/>
+  </worldbody>
+</mujoco>"""
+
+
+def test_materials_are_recorded_and_textures_made_small(bench: Bench) -> None:
+    _, main = main_of(bench, xml=SHINY)
+    sizes = [(t["width"], t["height"]) for t in main["scene"]["textures"]]
+    assert sizes == [(256, 256), (64, 384), (64, 384)]
+    floor, box, ball = solids(main)[:3]
+    assert floor.material.reflectance == 0.25 and not floor.material.physical
+    assert floor.dress is not None and floor.dress.endless
+    squares = floor.dress.texture.levels[0][0]
+    assert squares[:100, :100].min() == 1 and squares[:100, 200:].max() == 0, "still squares"
+    assert box.material.physical and box.material.metallic == 0.5
+    assert box.material.shininess == pytest.approx(2 / 0.5**4 - 2)
+    assert box.dress is not None and box.dress.texture.levels[0].shape == (6, 64, 64, 3)
+    assert (ball.material.shininess, ball.material.specular) == (32, 0.75)
+    assert ball.material.emission == 0.125 and ball.dress is None
+
+
+def test_the_light_is_that_of_the_model(bench: Bench) -> None:
+    _, main = main_of(bench, xml=SHINY)
+    scene, frame = unpacked(main["scene"]), unpacked(main["pictures"][0]["frame"])
+    forward = np.array((0.0, 1.0, 0.0))
+    light = light_of(scene, frame, forward)
+    spot, wide, head = light.lamps
+    assert spot.colour == pytest.approx((0.6, 0.5, 0.4)), "the directional one is off"
+    assert spot.position == pytest.approx((0, 0, 3)) and spot.direction == pytest.approx((0, 0, -1))
+    half, inner = math.cos(math.radians(30)), math.cos(math.radians(15))
+    assert spot.cone == pytest.approx((half, inner))
+    assert wide.position == pytest.approx((1, 0, 3)) and wide.cone is None, "to all sides"
+    assert (head.position, head.direction.tolist()) == (None, [0, 1, 0])
+    assert light.ambient == pytest.approx((0.15, 0.2, 0.3))
+
+
+def test_an_endless_plane_is_around_what_the_camera_looks_at(bench: Bench) -> None:
+    camera = {"azimuth": 90, "elevation": -20, "target": [50, 7, 0], "distance": 3}
+    _, main = main_of(bench, xml=SHINY, camera=camera)
+    floor = solids(main)[0]
+    assert floor.surface.vertices.mean(axis=0) == pytest.approx((50, 7, 0))
+    assert floor.position == pytest.approx((0, 0, -1)), "so that its squares stay where they are"
 
 
 def test_an_orthographic_camera(bench: Bench) -> None:

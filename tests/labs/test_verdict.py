@@ -14,6 +14,7 @@ from coursebuild.labs.verdict import (
     code_diagnostic,
     entry_span,
     parity_diagnostics,
+    reset_diagnostics,
     trial_diagnostics,
 )
 from coursebuild.model import Lab, Quiz, document_blocks
@@ -268,3 +269,26 @@ def test_a_reply_with_holes_is_read() -> None:
     assert trial.tried == ("start",)
     assert trial.steps_per_second is None
     assert trial.failures == (Failure((), "throws", "something that has no text", None, ""),)
+
+
+RESETS = [
+    (("controls", 0), '"model.body_mass[1]"', "the control `mass` is not applied again; give it"),
+    (("setup",), '"ctx.a = 1"', "chance from `lib.random()`"),
+    ((), "```lab simlab", "chance from `lib.random()`"),
+]
+
+
+@pytest.mark.parametrize(("entry", "place", "help"), RESETS)
+def test_a_reset_that_leads_elsewhere(entry: tuple[str | int, ...], place: str, help: str) -> None:
+    lab = make_lab(LINES)
+    main = {"resetDiffers": {"what": "qvel[0]", "entry": list(entry)}}
+    (found,) = reset_diagnostics(lab, Trial("3", (), (), main, None))
+    assert found.rule == "lab-reset"
+    assert found.message == "a reset does not lead back to the start: `qvel[0]` differs"
+    assert found.span.text.startswith(place)
+    assert (found.help or "").startswith(help)
+
+
+@pytest.mark.parametrize("main", [None, {"resetDiffers": None}])
+def test_a_reset_that_leads_back_is_no_matter(main: dict[str, None] | None) -> None:
+    assert list(reset_diagnostics(make_lab(LINES), Trial("3", (), (), main, None))) == []

@@ -360,7 +360,7 @@ def test_the_stages_of_a_build(make: Make) -> None:
     folder.write("models/m.xml", "<mujoco/>")
     done = folder.main("build")
     said = done.err.splitlines()
-    assert said[:3] == ["compiling models", "typesetting formulas", "rendering"]
+    assert said[:3] == ["reading lessons and pages", "compiling models", "drawing pages"]
     assert said[-1] == "publishing"
     assert re.search("^published [0-9]+ files in public$", done.out, re.MULTILINE)
 

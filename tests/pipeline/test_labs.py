@@ -112,6 +112,9 @@ MISTAKES = [
     ("engines that differ", "lab-parity",
      '‸{"model": "ball",\n'
      '"controller": "model.opt.gravity[0] = sim.time > 0.5 && sim.time < 1 ? 2 : 0"}'),
+    ("a built-in that is another's too", "lab-shared",
+     '{"model": "ball", "controls": [{"type": "button", "label": "b",\n'
+     '"run": ‸"Math.sin = Math.cos"}]}'),
     ("a lab with its own model", "lab-throws",
      '{"xml": "<mujoco><worldbody><geom size=\'1\'/></worldbody></mujoco>",\n'
      '"readouts": [{"label": "r", "expr": ‸"null.x"}]}'),
@@ -217,6 +220,20 @@ def test_a_lab_in_which_everything_holds(make: Make) -> None:
         re.MULTILINE,
     )
     assert "1 lab tried" in text
+
+
+def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(make: Make) -> None:
+    lab = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
+    folder = course(make, "## A\n\n" + fence(lab))
+    for cached in (False, True):
+        report = checked(folder, status=0)
+        (found,) = report["diagnostics"]
+        assert (found["rule"], found["severity"], found["line"]) == ("lab-reset", "warning", 5)
+        assert [(made["status"], made["cached"]) for made in report["labs"]] == [("ok", cached)]
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    (page,) = (folder.root / "public/lessons").glob("1.2-*.html")
+    assert '<div class="lab-static">' in page.read_text(encoding="utf-8")
 
 
 def test_a_lab_of_a_quiz_is_tried_at_its_place(make: Make) -> None:
@@ -346,7 +363,7 @@ class TestKept:
         slow = '{"model": "ball", "verify": {"seconds": 20}}'
         folder = course(make, "## A\n\n" + fence(slow))
         with monkeypatch.context() as hasty:
-            hasty.setattr(pipeline_labs, "_WALL", 0.01)
+            hasty.setattr(pipeline_labs, "WALL", 0.01)
             assert checked(folder, status=1)["diagnostics"][0]["rule"] == "lab-timeout"
         assert self.cached(folder) == [False]
 

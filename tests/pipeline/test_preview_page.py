@@ -1,17 +1,30 @@
-"""The preview in a real browser: it loads again by itself, and shows what is wrong."""
+"""The preview in a real browser: only what differs is replaced, and what is wrong is shown."""
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 
 import pytest
-from coursekit import GOOD, Folder
-from playwright.sync_api import Browser, expect, sync_playwright
-from test_serving import serving
+from coursekit import GOOD, ROOT, Folder
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from test_serving import Preview, serving
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser
+FILLER = "".join(f"Paragraph {n}.\n\n" for n in range(80))
+QUIZ = {
+    "id": "q",
+    "title": "Quiz",
+    "questions": [{"kind": "numeric", "q": "How many?", "answer": 1, "hints": ["Count."]}],
+}
+RICH = (
+    GOOD
+    + f"## Quiz\n\n```quiz\n{json.dumps(QUIZ)}\n```\n\n"
+    + "Text with $x^2$ and *emphasis*.\n\n"
+    + FILLER
+)
 
 
 @pytest.fixture(scope="module")
@@ -24,45 +37,303 @@ def browser() -> Iterator[Browser]:
         started.close()
 
 
-def test_a_page_follows_the_author(make: Make, browser: Browser) -> None:
-    filler = "".join(f"Paragraph {n}.\n\n" for n in range(80))
-    folder = make(GOOD + filler)
+class Open:
+    """A page of a preview, and what its console said."""
+
+    def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
+        self.context = browser.new_context(**options)  # type: ignore[arg-type]
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(30_000)
+        self.said: list[str] = []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
+        # A page that is loaded again loses this.
+        self.page.evaluate("window.same = true")
+
+    def __enter__(self) -> Open:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+    def unbroken(self) -> None:
+        """It is still the same document, and nothing went wrong in it."""
+        assert self.page.evaluate("window.same")
+        assert self.said == []
+
+
+def see(locator: Locator) -> None:
+    expect(locator).to_be_visible(timeout=30_000)
+
+
+def texts(page: Page, text: str) -> None:
+    expect(page.locator(".prose")).to_contain_text(text, timeout=30_000)
+
+
+LESSON = "lessons/1.1-one.html"
+
+
+def test_what_the_author_did_not_touch_stays_as_it_is(make: Make, browser: Browser) -> None:
+    folder = make(RICH)
     with serving(folder) as preview:
-        preview.heard("ready: ")
-        page = browser.new_page()
-        said: list[str] = []
-        page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.set_default_timeout(30_000)
-        page.goto(f"http://127.0.0.1:{preview.port}/lessons/1.1-one.html")
-        page.evaluate("window.scrollTo(0, 900)")
-        heading = page.locator("h2").first
-        overlay = page.get_by_role("alert", name="Problems")
-        expect(heading).to_contain_text("Hello")
-        expect(overlay).to_have_count(0)
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            hint = page.locator("details.hint")
+            hint.locator("summary").click()
+            page.get_by_role("button", name="Copy").focus()
+            marked = page.locator("h2, .script, .hint, math").evaluate_all(
+                "elements => elements.map((element) => (element.mine = true)).length"
+            )
+            page.evaluate(
+                """() => {
+                  const text = document.querySelector('em').firstChild
+                  getSelection().setBaseAndExtent(text, 1, text, 5)
+                }"""
+            )
+            folder.replace(folder.lesson(), "Paragraph 3.", "Paragraph three, with $y$.")
+            texts(page, "Paragraph three")
+            expect(hint).to_have_attribute("open", "")
+            expect(page.get_by_role("button", name="Copy")).to_be_focused()
+            assert page.evaluate("String(getSelection())") == "mpha"
+            kept = page.locator("h2, .script, .hint, math").evaluate_all(
+                "elements => elements.filter((element) => element.mine).length"
+            )
+            assert kept == marked
+            opened.unbroken()
 
-        folder.replace(folder.lesson(), "## Hello\n", "## Hello again\n")
-        expect(heading).to_contain_text("Hello again", timeout=30_000)
-        page.wait_for_function("window.scrollY === 900")  # the reader stays where they were
 
-        folder.replace(folder.lesson(), "3.14159\n```", "3.14158\n```")
-        expect(overlay).to_be_visible(timeout=30_000)
-        expect(overlay).to_contain_text("error[output-drift]: recorded output differs")
-        expect(overlay).to_contain_text("hello 3.14158")
-        expect(heading).to_contain_text("Hello again")
+def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
+    folder = make(RICH)
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            text = folder.text(folder.lesson())
+            for old, new, shown in (
+                ("## Hello", "## Good morning", "main h2:first-of-type >> text=Good morning"),
+                ("$x^2$", "$z^{17}$", "math >> text=17"),
+                ("*emphasis*", "**strength**", "strong >> text=strength"),
+                ("Paragraph 5.", "- a list\n- of two", "li >> text=of two"),
+                ("Paragraph 7.\n\n", "", "p >> text=Paragraph 8"),
+                ("Paragraph 9.", "```python\nx = 1\n```", ".code >> text=x = 1"),
+                ('"How many?"', '"How few?"', ".question >> text=How few?"),
+                ("Paragraph 11.", '<p style="color: red">Red</p>', "p >> text=Red"),
+            ):
+                text = text.replace(old, new)
+                folder.write(folder.lesson(), text)
+                see(page.locator(shown).first)
+            expect(page.locator("p", has_text="Paragraph 7.")).to_have_count(0)
+            # What scripts make of a page, they make of its new parts as well.
+            see(page.locator(".code").get_by_role("button", name="Copy"))
+            expect(page.locator(".toc a").first).to_contain_text("Good morning")
+            # The living page is the page that is loaded anew.
+            red = page.locator("p", has_text="Red")
+            expect(red).to_have_css("color", "rgb(255, 0, 0)", timeout=30_000)
+            structure = """() => {
+              const page = document.querySelector('main').cloneNode(true)
+              page.querySelectorAll('.copy').forEach((button) => button.remove())
+              for (const element of page.querySelectorAll('*')) {
+                for (const name of ['tabindex', 'data-more', 'aria-current', 'open']) {
+                  element.removeAttribute(name)
+                }
+              }
+              return page.innerHTML
+            }"""
+            living = page.evaluate(structure)
+            opened.unbroken()
+            page.reload()
+            assert page.evaluate(structure) == living
 
-        overlay.get_by_role("button", name="Close").click()
-        expect(overlay).to_have_count(0)
-        folder.replace(folder.lesson(), "hello 3.14158\n```", "hello 3.1415\n```")
-        expect(overlay).to_be_visible(timeout=30_000)
 
-        other = browser.new_page()  # a page that is opened while something is wrong
-        other.goto(f"http://127.0.0.1:{preview.port}/")
-        expect(other.get_by_role("alert", name="Problems")).to_be_visible(timeout=30_000)
+def test_the_reader_stays_where_they_were(make: Make, browser: Browser) -> None:
+    folder = make(RICH)
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            place = page.locator("p", has_text="Paragraph 40.")
+            place.scroll_into_view_if_needed()
+            top = "element => element.getBoundingClientRect().top"
+            before = place.evaluate(top)
+            folder.replace(folder.lesson(), "## Quiz\n", f"{'Much more. ' * 400}\n\n## Quiz\n")
+            texts(page, "Much more.")
+            expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
+            assert abs(place.evaluate(top) - before) < 1
+            folder.replace(folder.lesson(), "Paragraph 12.", "New above.\n\nParagraph 12.")
+            texts(page, "New above.")
+            expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
+            assert abs(place.evaluate(top) - before) < 1
+            opened.unbroken()
 
-        folder.replace(folder.lesson(), "hello 3.1415\n```", "hello 3.14159\n```")
-        expect(overlay).to_have_count(0, timeout=30_000)
-        expect(other.get_by_role("alert", name="Problems")).to_have_count(0, timeout=30_000)
-        assert said == []
-        page.close()
-        other.close()
+
+def test_mistakes_are_shown_and_clear_by_themselves(make: Make, browser: Browser) -> None:
+    folder = make(GOOD, "## Two\n")
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        other = Open(browser, preview, "lessons/1.2-two.html")
+        with other, Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            panel = page.get_by_role("region", name="Problems")
+            expect(panel).to_have_count(0)
+            folder.replace(folder.lesson(), "## Hello\n", "## Never\n\n[x](lesson:9.9)\n")
+            see(panel)
+            expect(panel).to_contain_text("The last good page is shown")
+            expect(panel).to_contain_text("content/lessons/1.1-one.md:3:5")
+            expect(panel).to_contain_text("lesson 9.9 is linked to, and the course map does not")
+            expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")
+            expect(page.locator(".prose h2").first).to_contain_text("Hello")
+            see(other.page.get_by_role("region", name="Problems"))
+            expect(other.page.get_by_role("region", name="Problems")).to_contain_text(
+                "What is wrong with the course"
+            )
+            # It can be put away, by keyboard too, and comes back for another mistake.
+            panel.get_by_role("button", name="Close").click()
+            expect(panel).to_have_count(0)
+            button = page.get_by_role("button", name="1 mistake")
+            expect(button).to_be_focused()
+            expect(button).to_have_attribute("aria-expanded", "false")
+            page.keyboard.press("Enter")
+            see(panel)
+            page.keyboard.press("Escape")
+            expect(panel).to_have_count(0)
+            folder.replace(folder.lesson(), "[x](lesson:9.9)", "[x](lesson:9.9) $\\frac{1$")
+            see(panel)
+            expect(panel).to_contain_text("the formula does not parse")
+            folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
+            expect(panel).to_have_count(0, timeout=30_000)
+            expect(page.locator(".prose h2").first).to_contain_text("Mended")
+            expect(other.page.get_by_role("region", name="Problems")).to_have_count(0)
+            opened.unbroken()
+
+
+def test_a_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:
+    folder = make(GOOD + "About `3.14`{out}.\n")
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            output = page.locator(".output")
+            expect(output.locator(".receipt")).to_have_class("receipt verified")
+            folder.replace(folder.lesson(), 'print("hello", 3.14159)', 'print("hello", 2.71828)')
+            box = output.get_by_role("group", name="Recorded output, and this run")
+            see(box)
+            expect(box.locator("del")).to_have_text("hello 3.14159")
+            expect(box.locator("ins")).to_have_text("hello 2.71828")
+            expect(box.locator("del mark")).to_have_text("3.14159")
+            assert box.locator(".preview-row .preview-sign").all_inner_texts() == ["−", "+"]
+            expect(output.locator("> pre")).to_be_hidden()
+            expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+            page.get_by_role("button", name="Accept this output").click()
+            # Now the number in the prose is the one that does not hold.
+            number = page.get_by_role("group", name="A bound number that does not hold")
+            see(number)
+            expect(number.locator("ins")).to_have_text("2.72")
+            expect(box).to_have_count(0)
+            expect(output.locator(".receipt")).to_have_class("receipt verified")
+            expect(output.locator("samp")).to_contain_text("hello 2.71828")
+            number.get_by_role("button", name="Accept").click()
+            expect(number).to_have_count(0)
+            expect(page.locator(".bound")).to_have_text("2.72")
+            expect(page.locator(".preview-button")).to_be_hidden()
+            opened.unbroken()
+        text = GOOD.replace("3.14159", "2.71828") + "About `2.72`{out}.\n"
+        assert folder.text(folder.lesson()) == text
+
+
+def test_a_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:
+    folder = make(GOOD)
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            slow = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)"
+            folder.replace(folder.lesson(), 'print("hello"', f'{slow}\nprint("hello"')
+            mark = opened.page.locator(".output").get_by_role("status")
+            expect(mark).to_have_text("The script is running.", timeout=30_000)
+            folder.write("go", "")
+            expect(mark).to_have_count(0, timeout=30_000)
+            folder.replace(folder.lesson(), "print(", "raise ValueError('no')\nprint(")
+            expect(mark).to_have_text("The script failed.", timeout=30_000)
+            panel = opened.page.get_by_role("region", name="Problems")
+            expect(panel).to_contain_text("ValueError: no", timeout=30_000)
+            opened.unbroken()
+
+
+def test_a_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
+    lab = {"title": "A lab", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
+    folder = make(GOOD + f"```lab\n{json.dumps(lab)}\n```\n\nAfter it.\n")
+    ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    folder.write("models/ball.xml", ball)
+    with serving(folder) as preview:
+        preview.heard("checked: ", seconds=120)
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            live = page.locator(".lab-live")
+            see(live)
+            live.evaluate("element => (element.mine = true)")
+            folder.replace(folder.lesson(), "## Hello", "New before it.\n\n## Hello")
+            texts(page, "New before it.")
+            folder.replace(folder.lesson(), "After it.", "Later.")
+            texts(page, "Later.")
+            assert live.evaluate("element => element.mine")
+            folder.replace(folder.lesson(), '"A lab"', '"Another lab"')
+            expect(page.locator(".lab-title")).to_contain_text("Another lab", timeout=60_000)
+            expect(live).not_to_have_js_property("mine", True, timeout=60_000)
+            see(page.locator(".lab.lab-on .lab-live"))
+            expect(live).to_have_count(1)
+            assert page.evaluate("window.same")
+
+
+def test_a_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
+    folder = make(GOOD, "## Two\n")
+    map_ = folder.text("content/course.toml")
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, "lessons/1.2-two.html") as opened:
+            page = opened.page
+            folder.write("content/course.toml", map_.replace('"two"', '"zwei"'))
+            (folder.root / folder.lesson(2)).rename(folder.root / "content/lessons/1.2-zwei.md")
+            see(page.locator(".preview-button", has_text="this page is gone"))
+            opened.unbroken()
+            with Open(browser, preview, "lessons/1.2-two.html") as missing:
+                expect(missing.page.locator("main")).to_contain_text("There is no page")
+                font = "getComputedStyle(document.querySelector('h1')).fontFamily"
+                assert "Source Serif" in missing.page.evaluate(font)
+                (folder.root / "content/lessons/1.2-zwei.md").rename(folder.root / folder.lesson(2))
+                folder.write("content/course.toml", map_)
+                expect(missing.page.locator(".prose h2")).to_contain_text("Two", timeout=30_000)
+            expect(page.locator(".preview-button")).to_be_hidden(timeout=30_000)
+
+
+def test_a_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> None:
+    folder = make(GOOD)
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        port = preview.port
+        opened = Open(browser, preview, LESSON)
+    with opened:
+        see(opened.page.locator(".preview-button", has_text="the preview has stopped"))
+        folder.replace(folder.lesson(), "## Hello", "## Back")
+        with serving(folder, "--port", str(port)):
+            expect(opened.page.locator(".prose h2")).to_contain_text("Back", timeout=30_000)
+            expect(opened.page.locator(".preview-button")).to_be_hidden(timeout=30_000)
+            assert opened.page.evaluate("window.same")
+
+
+def test_nothing_of_it_is_hard_to_reach(make: Make, browser: Browser) -> None:
+    """Accessibility, with everything shown at once, light and dark."""
+    axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
+    folder = make(GOOD.replace("3.14159\n```", "3\n```") + "`7`{out}\n", "[x](lesson:9.9)\n")
+    with serving(folder) as preview:
+        preview.heard("link-lesson")
+        for scheme in ("light", "dark"):
+            options = {"color_scheme": scheme, "bypass_csp": True}
+            with Open(browser, preview, LESSON, **options) as opened:
+                page = opened.page
+                see(page.get_by_role("button", name="Accept this output"))
+                see(page.get_by_role("region", name="Problems"))
+                page.evaluate(axe)
+                rules = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
+                found = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
+                assert [(v["id"], v["nodes"][0]["html"]) for v in found["violations"]] == []

@@ -1,8 +1,8 @@
 """What an author sees of each rule: `tests/fixtures/rules/<rule>.md`, compared to the letter.
 
 A case names a smallest course that breaks the rule (see `scratch`) and all diagnostics that the
-tool then prints. `[update]` or `[build]` in a title says which command finds the mistake, where it
-is not `check`. `{package.module.name = value}` in a title gives a constant another value, and
+tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which command finds
+the mistake, where it is not `check`. `{package.module.name = value}` in a title gives a constant another value, and
 `{package.module.name() = value}` a function another result, for what no course can bring about, or
 not in time. `pytest tests/rules --rewrite-fixtures` writes the expected parts and
 `docs/rules.md` anew.
@@ -20,6 +20,7 @@ from unittest.mock import patch
 import pytest
 from scratch import Case, Layout, parts, put, read_cases
 
+from coursebuild.effects.store import Store
 from coursebuild.pipeline.build import build
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.options import Options
@@ -39,7 +40,7 @@ TOLD = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
 
 def command(case: Case) -> str:
     """The command that a case is for."""
-    found = re.search(r"\[(\w+)\]", case.title)
+    found = re.search(r"\[([\w -]+)\]", case.title)
     return found[1] if found else "check"
 
 
@@ -69,6 +70,8 @@ def told_by(case: Case, root: Path) -> str:
     match command(case):
         case "check":
             report = check(options)
+        case "check --no-cache":
+            report = check(replace(options, cache=Store(root, fresh=True)))
         case "update":
             report = update(options)
         case "build":

@@ -163,16 +163,35 @@ def test_a_difference_is_found(engines: tuple[NativeEngine, LabEngine]) -> None:
     assert found["relative"] == 0.0 or found["relative"] > 1e-9
 
 
-def test_the_model_comes_back_as_it_was_but_for_the_reset_of_diverged_states(
+def test_a_model_that_no_lab_has_changed_is_not_sent_back(
     engines: tuple[NativeEngine, LabEngine],
 ) -> None:
     native, browser = engines
     mjb = native.save("models/m.xml", model(ARM, "", ""))
-    first = browser.trial(lab(None, None), mjb, 60.0)["main"]["parity"]["mjb"]
+    first = browser.trial(lab(None, None), mjb, 60.0)["main"]["parity"]
     frozen = native.save(
         "models/m.xml",
         model(ARM).replace("<option />", '<option><flag autoreset="disable"/></option>'),
     )
-    second = browser.trial(lab(None, None), frozen, 60.0)["main"]["parity"]["mjb"]
-    assert first is not None
-    assert second is None
+    second = browser.trial(lab(None, None), frozen, 60.0)["main"]["parity"]
+    assert [(run["mjb"], run["autoreset"]) for run in (first, second)] == [(None, False)] * 2
+    assert native.parity(mjb, first, horizon=500)["relative"] < 1e-9
+    heavier = lab("model.body_mass[1] *= 2", None)
+    assert browser.trial(heavier, mjb, 60.0)["main"]["parity"]["mjb"] is not None
+
+
+def test_a_state_that_blows_up_is_the_same_with_and_without_the_reset(
+    engines: tuple[NativeEngine, LabEngine],
+) -> None:
+    """Every lab switches MuJoCo's own reset off; one that switches it on again is repeated so."""
+    native, browser = engines
+    mjb = native.save("models/m.xml", model(ARM, "", ""))
+    blow = "if (ctx.done !== true && sim.time > 0.05) { ctx.done = true; data.qvel[0] = 1e200 }"
+    on = "model.opt.disableflags &= ~mj.mjtDisableBit.mjDSBL_AUTORESET.value"
+    for setup, autoreset in ((None, False), (on, True)):
+        run = browser.trial(lab(setup, blow), mjb, 60.0)["main"]["parity"]
+        assert (run["mjb"], run["autoreset"]) == (None, autoreset)
+        last = run["steps"]
+        assert native.parity(mjb, run, horizon=last)["first"] is None
+        other = {**run, "autoreset": not autoreset}
+        assert native.parity(mjb, other, horizon=last)["first"] == last

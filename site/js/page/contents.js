@@ -12,12 +12,13 @@ export function currentHeading(tops, line) {
   return low - 1
 }
 
+/** Gives a function that ends it. */
 export function followContents(document) {
   const links = [...document.querySelectorAll('.toc a[href^="#"]')]
   const pairs = links
     .map((link) => ({ link, heading: document.getElementById(decodeURIComponent(link.hash.slice(1))) }))
     .filter(({ heading }) => heading)
-  if (pairs.length === 0) return
+  if (pairs.length === 0) return () => {}
   let marked = null
   let waiting = false
   const mark = () => {
@@ -35,9 +36,14 @@ export function followContents(document) {
     if (!waiting) requestAnimationFrame(mark)
     waiting = true
   }
-  addEventListener('scroll', later, { passive: true })
-  addEventListener('resize', later)
+  const ended = new AbortController()
+  addEventListener('scroll', later, { passive: true, signal: ended.signal })
+  addEventListener('resize', later, { signal: ended.signal })
   mark()
+  return () => {
+    ended.abort()
+    marked?.removeAttribute('aria-current')
+  }
 }
 
 /** At the end of a page the last heading in sight counts, however low it stands. */

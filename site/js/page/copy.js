@@ -1,5 +1,7 @@
 /** Copy buttons on code. Without a script there are none, so that no button does nothing. */
 
+import { within } from './within.js'
+
 const SHOWN_FOR = 2000 // ms
 
 /** The code of a listing: all its parts, folded ones too, but not what it printed. */
@@ -7,9 +9,9 @@ export function codeOf(listing) {
   return [...listing.querySelectorAll('pre > code')].map((code) => code.textContent).join('')
 }
 
-/** Add a button to every element that has `data-copy`. */
-export function addCopyButtons(document, words) {
-  for (const place of document.querySelectorAll('[data-copy]')) {
+/** Add a button to every element of a part of the page that has `data-copy`. */
+export function addCopyButtons(part, words) {
+  for (const place of within(part, '[data-copy]')) {
     const listing = place.closest('.script, .code')
     const button = document.createElement('button')
     button.type = 'button'

@@ -3,6 +3,8 @@
  * scroll, and the stop is taken away; where something is, `data-more` says on which side.
  */
 
+import { within } from './within.js'
+
 /** On which sides of a box there is more to see: `start`, `end`, `both`, or nothing. */
 export function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
   const position = Math.abs(scrollLeft) // negative where text runs from the right
@@ -11,7 +13,7 @@ export function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
   return before && after ? 'both' : before ? 'start' : after ? 'end' : ''
 }
 
-export function markScrolling(document) {
+export function markScrolling(part) {
   const mark = (box) => {
     const sides = hiddenSides(box.scrollLeft, box.clientWidth, box.scrollWidth)
     if (sides) box.dataset.more = sides
@@ -20,7 +22,7 @@ export function markScrolling(document) {
     else box.removeAttribute('tabindex')
   }
   const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => mark(target)))
-  for (const box of document.querySelectorAll('[tabindex="0"]')) {
+  for (const box of within(part, '[tabindex="0"]')) {
     observer.observe(box)
     box.addEventListener('scroll', () => mark(box), { passive: true })
   }

@@ -108,13 +108,10 @@ export class SceneGeoms {
     for (let i = 0; right && i < count; i++) {
       const copy = vector.get(i)
       const at = i * GEOM_WORDS
-      right =
-        copy.type === this.ints[at] &&
-        copy.objid === this.ints[at + 3] &&
-        copy.size[2] === this.floats[at + 12] &&
-        copy.pos[0] === this.floats[at + 13] &&
-        copy.mat[8] === this.floats[at + 24] &&
-        copy.rgba[3] === this.floats[at + 28]
+      const { type, objid, size, pos, mat, rgba } = copy
+      const fields = [[0, type], [3, objid], [12, size[2]], [13, pos[0]], [24, mat[8]], [28, rgba[3]]]
+      // A state that has blown up gives numbers that are none.
+      right = fields.every(([j, x]) => Object.is(x, j < 4 ? this.ints[at + j] : this.floats[at + j]))
       copy.delete()
     }
     vector.delete()

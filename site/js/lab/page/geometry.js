@@ -27,6 +27,7 @@ export const GEOM = Object.freeze({
 
 const ROUND = 40 // segments around
 const QUARTER = 10 // segments from a pole to the equator
+const ROPE = 12 // segments around a line that has a radius, of which a rope has many
 const HEAD_WIDTH = 1.75 // of an arrow, in widths of its shaft
 const HEAD_LENGTH = 3 // in radii of its shaft
 
@@ -69,10 +70,27 @@ const tube = () => unit('tube', () => barrel(true))
 const dome = () => unit('dome', () => sphere(0, Math.PI / 2, QUARTER), null, 1)
 const bowl = () => unit('bowl', () => sphere(Math.PI / 2, Math.PI / 2, QUARTER), null, -1)
 const plane = () => unit('plane', () => new PlaneGeometry(2, 2), fromAbove)
+const turned = () => unit('plane from below', () => inverted(new PlaneGeometry(2, 2)), fromAbove)
 const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND), 0).translate(0, 0, 0.5))
 const edges = () => unit('edges', () => new EdgesGeometry(new BoxGeometry(2, 2, 2)))
 const line = () =>
   unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
+
+/** The same surface, seen from its other side: its normals stay where they are. */
+function inverted(geometry) {
+  const { array } = geometry.index
+  for (let i = 0; i < array.length; i += 3) [array[i], array[i + 1]] = [array[i + 1], array[i]]
+  return geometry
+}
+
+/** A plane's geometry for an eye above or below it. */
+export const planeSeen = (below) => (below ? turned() : plane())
+
+/** Pieces of a rope, of length 2 along z or radius 1. */
+export const ropePieces = () => ({
+  tube: unit('rope', () => standing(new CylinderGeometry(1, 1, 2, ROPE, 1, true), 0)),
+  knot: unit('knot', () => standing(new SphereGeometry(1, ROPE, ROPE / 2), 0)),
+})
 
 /** A part: its geometry, and how `place(size, out)` fills out = [scale x, y, z, shift along z]. */
 const part = (geometry, place, lines = false) => ({ geometry, place, lines })
@@ -172,8 +190,10 @@ export function meshGeometry(mesh) {
     uv[2 * i] = source[t]
     uv[2 * i + 1] = source[t + 1]
   }
+  const places = new BufferAttribute(position, 3)
   return new BufferGeometry()
-    .setAttribute('position', new BufferAttribute(position, 3))
+    .setAttribute('position', places)
+    .setAttribute('direction', places)
     .setAttribute('normal', new BufferAttribute(normal, 3))
     .setAttribute('uv', new BufferAttribute(uv, 2))
 }
@@ -227,6 +247,7 @@ export function hfieldGeometry({ rows, columns, size, data }) {
   const geometry = new BufferGeometry()
     .setAttribute('position', new BufferAttribute(new Float32Array(position), 3))
     .setAttribute('uv', new BufferAttribute(new Float32Array(uv), 2))
+  geometry.setAttribute('direction', geometry.attributes.position)
   geometry.setIndex(index)
   geometry.computeVertexNormals()
   return geometry

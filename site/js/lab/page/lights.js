@@ -16,6 +16,15 @@ const LIGHT = 7 // floats in a frame
 const SPOT = 0 // mjtLightType
 const DIRECTIONAL = 1
 const SHADOW_TEXELS = 1024
+const SHADOW_PASSES = 8 // a picture is drawn so often for shadows at most
+const ALL_AROUND = 6 // of them for a light that shines everywhere
+
+/** The light from all sides, as red, green and blue. */
+export function ambientOf({ lights, visual: { headlight } }) {
+  if (lights.length === 0) return [AMBIENT, AMBIENT, AMBIENT]
+  const all = headlight.active ? [...lights, headlight] : lights
+  return [0, 1, 2].map((i) => all.reduce((sum, light) => sum + light.ambient[i], 0))
+}
 
 export class Lights {
   /** @param {object} description of the lab's scene; @param {import('three').Scene} scene */
@@ -24,7 +33,9 @@ export class Lights {
     this.extent = description.extent
     this.center = description.center
     this.start = description.layout.lights
-    this.ambient = new AmbientLight(0xffffff, FULL * AMBIENT)
+    this.shadows = 0
+    this.ambient = new AmbientLight(0xffffff, FULL)
+    this.ambient.color.setRGB(...ambientOf(description))
     this.head = new DirectionalLight(0xffffff, FULL * FROM_CAMERA)
     this.lights = description.lights.map((light) => this.make(light))
     this.add(this.head)
@@ -44,13 +55,7 @@ export class Lights {
     above.target.updateMatrixWorld()
   }
 
-  own({ lights, visual: { headlight } }) {
-    const sum = [0, 0, 0]
-    const add = (colour) => colour.forEach((x, i) => (sum[i] += x))
-    lights.forEach((light) => add(light.ambient))
-    if (headlight.active) add(headlight.ambient)
-    this.ambient.color.setRGB(...sum)
-    this.ambient.intensity = FULL
+  own({ visual: { headlight } }) {
     this.head.visible = headlight.active
     this.head.color.setRGB(...headlight.diffuse)
     this.head.intensity = FULL
@@ -65,15 +70,20 @@ export class Lights {
           : new PointLight(0xffffff, 1, 0, 0)
     light.color.setRGB(...info.diffuse)
     light.intensity = FULL
-    // Only lights with a beam: the six shadow maps of a point light are not worth their price.
-    if (info.castshadow && light.target) this.shadow(light)
+    if (info.castshadow) this.shadow(light)
     this.add(light)
     return light
   }
 
+  // MuJoCo gives a spot light of any width one shadow map, and a point light no light at all; here both shine, and throw shadows, to
+  // all sides. The first lights have shadows, as many as there are passes for: each pass draws the whole model.
   shadow(light) {
+    const passes = light.isPointLight ? ALL_AROUND : 1
+    if (this.shadows + passes > SHADOW_PASSES) return
+    this.shadows += passes
     light.castShadow = true
-    light.shadow.mapSize.set(SHADOW_TEXELS, SHADOW_TEXELS)
+    const texels = light.isPointLight ? SHADOW_TEXELS / 2 : SHADOW_TEXELS
+    light.shadow.mapSize.set(texels, texels)
     light.shadow.normalBias = 0.004 * this.extent
     const { camera } = light.shadow
     camera.near = 0.01 * this.extent

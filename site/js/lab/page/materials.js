@@ -4,17 +4,24 @@
  * MuJoCo lights as OpenGL's fixed pipeline does, with colours as they are written; three.js with light intensities, in which a
  * surface of colour c returns c/π. Lights are therefore π times as strong here, and specular colours divided by what
  * three.js's highlight has more than OpenGL's.
+ *
+ * `metallic` and `roughness`, which MuJoCo's own renderer knows but does not draw, are unset below 0. Where one of them is set, they take
+ * the place of `specular` and `shininess` (see `finishOf`).
  */
 
 import {
   CubeTexture, DataTexture, DoubleSide, LinearFilter, LinearMipmapLinearFilter, MeshPhongMaterial,
   NoColorSpace, RepeatWrapping, RGBAFormat,
 } from 'three' // prettier-ignore
+import { ambientOf } from './lights.js'
 
 const SPECULAR = 0.5 // of a geom without a material
 const SHININESS = 0.5
 const WITHOUT_LIGHTS = 0.5 // see lights.js
 const FINE = 4 // anisotropy
+const DIELECTRIC = 0.04 // what a surface that is no metal reflects of light from straight ahead
+const ROOM = 0.5 // of a metal's light is that of the room that it mirrors, lit as a matte surface is
+const SHARPEST = 1024 // exponent of a highlight
 const TEXTURE_CUBE = 1
 const TEXTURE_SKY = 2
 
@@ -25,6 +32,7 @@ export class Materials {
     this.textures = new Map()
     this.made = []
     this.gloss = gloss(scene)
+    this.ambient = ambientOf(scene)
   }
 
   /**
@@ -34,11 +42,10 @@ export class Materials {
    */
   make(id, { doubleSided = false } = {}) {
     const info = this.scene.materials[id]
-    const shininess = Math.max(1, 128 * (info?.shininess ?? SHININESS))
-    const specular = (8 / (shininess + 2)) * (info?.specular ?? SPECULAR) * this.gloss
+    const { shininess, specular, metallic } = finishOf(info, this.gloss)
     const material = new MeshPhongMaterial({ shininess })
     material.specular.setScalar(specular)
-    material.userData.emission = info?.emission ?? 0
+    Object.assign(material.userData, { emission: info?.emission ?? 0, metallic, specular })
     if (doubleSided) material.side = DoubleSide
     this.made.push(material)
     return material
@@ -49,8 +56,18 @@ export class Materials {
     const old = material.userData
     if (old.r === r && old.g === g && old.b === b && old.a === a && old.emission === emission) return
     Object.assign(old, { r, g, b, a, emission })
-    material.color.setRGB(r, g, b)
+    const { metallic, specular } = old
+    const matte = 1 - (1 - ROOM) * metallic
+    material.color.setRGB(r, g, b).multiplyScalar(matte)
     material.emissive.setRGB(r, g, b).multiplyScalar(emission)
+    if (metallic > 0) {
+      // A metal has no colour but in what it mirrors: lights, what comes from all sides, and a room that is not there. Without the
+      // last it would be black wherever no light is mirrored.
+      const mirrored = (colour, i) => specular * (1 - metallic) + metallic * colour[i]
+      const all = [r, g, b]
+      material.specular.setRGB(mirrored(all, 0), mirrored(all, 1), mirrored(all, 2))
+      material.emissive.setRGB(...all.map((x, i) => x * (emission + (1 - matte) * this.ambient[i])))
+    }
     const through = a < 1
     if (material.transparent !== through) {
       material.transparent = through
@@ -75,6 +92,8 @@ export class Materials {
     const map = this.flat(info.texture).clone()
     map.needsUpdate = true
     material.map = map
+    // OpenGL's textures colour all of the light, and so what a surface sends out by itself.
+    if (info.emission > 0 || info.metallic > 0) material.emissiveMap = map
     this.made.push(map)
     const [u, v] = info.texrepeat
     if (wrapped) {
@@ -120,6 +139,25 @@ export class Materials {
 
   dispose() {
     for (const thing of [...this.made, ...this.textures.values()]) thing.dispose()
+  }
+}
+
+/**
+ * How a material of MuJoCo takes light: exponent and strength of three.js's highlight, and how much it is of metal.
+ *
+ * A surface that is rough on a small scale, with slopes of spread `roughness`², has about the highlight of the exponent 2/roughness⁴ - 2.
+ *
+ * @param {object | undefined} info @param {number} gloss how much weaker highlights are because of their lights
+ */
+export function finishOf(info, gloss) {
+  const { shininess = SHININESS, specular = SPECULAR, metallic = -1, roughness = -1 } = info ?? {}
+  const exponent = Math.max(1, 128 * shininess)
+  if (metallic < 0 && roughness < 0) return { shininess: exponent, specular: (8 / (exponent + 2)) * specular * gloss, metallic: 0 }
+  const rough = 2 / Math.max(roughness, 1e-3) ** 4 - 2
+  return {
+    shininess: roughness < 0 ? exponent : Math.min(SHARPEST, Math.max(1, rough)),
+    specular: DIELECTRIC,
+    metallic: Math.min(1, Math.max(0, metallic)),
   }
 }
 
@@ -170,8 +208,12 @@ function wrapCube(material, texture, uniform) {
       .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = direction * labSize;')
     shader.fragmentShader = shader.fragmentShader
       .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform samplerCube labCube;')
-      .replace('#include <map_fragment>', 'diffuseColor *= textureCube(labCube, vLabDirection);')
+      .replace(
+        '#include <map_fragment>',
+        'vec4 labTexel = textureCube(labCube, vLabDirection);\ndiffuseColor *= labTexel;\ntotalEmissiveRadiance *= labTexel.rgb;',
+      )
   }
+  material.userData.shader = 'lab-cube'
   material.customProgramCacheKey = () => 'lab-cube'
   return (now) => {
     if (uniform) size.value = [now[0], now[1], now[2]]

@@ -88,6 +88,11 @@ export class Hands {
     this.actions.pull({ body: hit.body, point: hit.point, target: hit.point })
   }
 
+  /** Whether a finger that goes up or down belongs to the page; the style says so. */
+  scrolls() {
+    return getComputedStyle(this.view.element).touchAction !== 'none'
+  }
+
   keepTouch(event) {
     if (event.cancelable && (this.pulled !== null || event.touches.length > 1)) event.preventDefault()
   }
@@ -100,6 +105,8 @@ export class Hands {
     if (this.resting?.pointer === event.pointerId) {
       if (Math.hypot(dx, dy) < SLOP) return
       this.rouse()
+      // The page is about to scroll, which the browser tells a little later.
+      if (Math.abs(dy) > Math.abs(dx) && this.scrolls()) return void this.pointers.delete(event.pointerId)
     }
     if (this.pulled?.pointer === event.pointerId) {
       const target = this.view.atDepth(event.clientX, event.clientY, this.pulled.point)

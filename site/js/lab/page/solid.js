@@ -1,9 +1,10 @@
 /** One geom in the picture: its parts, material and texture, placed anew for every frame. */
 
 import { LineBasicMaterial, LineSegments, Mesh } from 'three'
-import { GEOM, shape } from './geometry.js'
+import { GEOM, planeSeen, shape } from './geometry.js'
 
 const FAR = 40 // an endless plane reaches so many extents of the model
+const FROM_BELOW = 0.5 // MuJoCo shows what is above a plane through it: so much of it is left
 
 export class Solid {
   /**
@@ -13,7 +14,9 @@ export class Solid {
    */
   constructor(parent, materials, { type, material = -1, geometry = null, model = true, wrapped = false, extent = 1 }) {
     Object.assign(this, { materials, type, model })
-    this.endless = type === GEOM.PLANE
+    this.plane = type === GEOM.PLANE
+    this.below = false
+    this.shown = true
     this.far = FAR * extent
     this.parts = shape(type, model, geometry)
     this.material = materials.make(material)
@@ -22,8 +25,8 @@ export class Solid {
     this.meshes = this.parts.map((part) => {
       const mesh = part.lines ? new LineSegments(part.geometry, this.lineMaterial()) : new Mesh(part.geometry, this.material)
       mesh.matrixAutoUpdate = false
-      mesh.frustumCulled = !this.endless
-      mesh.castShadow = !part.lines && type !== GEOM.PLANE
+      mesh.frustumCulled = !this.plane
+      mesh.castShadow = !part.lines && !this.plane
       mesh.receiveShadow = !part.lines
       parent.add(mesh)
       return mesh
@@ -42,19 +45,30 @@ export class Solid {
    *
    * @param {Float32Array} f @param {number} at where position (3) and matrix (9, by rows) begin
    * @param {number} size where the size (3) begins @param {number} colour where the colour (4) begins
-   * @param {number[]} target what the camera looks at: the middle of an endless plane
+   * @param {{eye: number[], target: number[]}} sight where the camera is and what it looks at, which is the middle of an endless plane
    */
-  update(f, at, size, colour, target, emission = this.material.userData.emission) {
-    const alpha = f[colour + 3]
+  update(f, at, size, colour, sight, emission = this.material.userData.emission) {
+    let alpha = f[colour + 3]
     this.show(alpha > 0)
     if (alpha <= 0) return
+    if (this.plane && this.turn(f, at, sight.eye)) alpha *= FROM_BELOW
     this.materials.paint(this.material, f[colour], f[colour + 1], f[colour + 2], alpha, emission)
     if (this.lines !== null) this.lines.color.setRGB(f[colour], f[colour + 1], f[colour + 2])
-    if (this.endless && (f[size] <= 0 || f[size + 1] <= 0)) this.unroll(f, at, size, target)
+    if (this.plane && (f[size] <= 0 || f[size + 1] <= 0)) this.unroll(f, at, size, sight.target)
     else {
       this.resize(f[size], f[size + 1], f[size + 2])
       this.place(f, at, f[at], f[at + 1], f[at + 2])
     }
+  }
+
+  /** Show that side of a plane on which the eye is, lit as its upper side is, as MuJoCo's are; gives whether it is the lower one. */
+  turn(f, at, eye) {
+    const height = f[at + 5] * (eye[0] - f[at]) + f[at + 8] * (eye[1] - f[at + 1]) + f[at + 11] * (eye[2] - f[at + 2])
+    if (height < 0 !== this.below) {
+      this.below = height < 0
+      this.meshes[0].geometry = planeSeen(this.below)
+    }
+    return this.below
   }
 
   resize(a, b, c) {
@@ -103,6 +117,7 @@ export class Solid {
   }
 
   show(visible) {
+    this.shown = visible
     for (const mesh of this.meshes) mesh.visible = visible
   }
 

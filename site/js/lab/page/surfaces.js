@@ -1,8 +1,9 @@
 /** What bends: skins, flexes and the trail of a site, whose points come with every frame. */
 
 import {
-  BufferAttribute, BufferGeometry, DynamicDrawUsage, Line, LineBasicMaterial, LineSegments, Mesh, Sphere, Vector3,
+  BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedMesh, Line, LineBasicMaterial, Mesh, Sphere, Vector3,
 } from 'three' // prettier-ignore
+import { ropePieces } from './geometry.js'
 
 const EVERYWHERE = new Sphere(new Vector3(), Infinity)
 const SHOWN_GROUPS = 3
@@ -45,44 +46,97 @@ export class Skin {
   }
 }
 
-/** A flex: lines, or a surface whose normals follow from its points. */
+/** A flex: a surface whose normals follow from its points, or the ropes of one of dimension 1. */
 export class Flex {
   constructor(parent, materials, info, layout) {
     this.at = layout.flex + 3 * info.start
     this.count = info.count
-    this.geometry = new BufferGeometry()
-    this.position = dynamic(new Float32Array(3 * info.count), 3)
-    this.geometry.setAttribute('position', this.position)
-    this.geometry.setIndex(Array.from(info.elements))
-    this.geometry.boundingSphere = EVERYWHERE
-    const colour = colourOf(info, materials)
-    this.flatLines = info.dim === 1
-    if (this.flatLines) {
-      this.lineMaterial = new LineBasicMaterial()
-      this.lineMaterial.color.setRGB(...colour.slice(0, 3))
-      this.mesh = new LineSegments(this.geometry, this.lineMaterial)
-    } else {
-      const material = materials.make(info.material, { doubleSided: true })
-      material.flatShading = info.flat
-      materials.paint(material, ...colour)
-      this.mesh = new Mesh(this.geometry, material)
+    const material = materials.make(info.material, { doubleSided: info.dim > 1 })
+    material.flatShading = info.dim > 1 && info.flat
+    materials.paint(material, ...colourOf(info, materials))
+    this.part = info.dim === 1 ? new Ropes(material, info) : new Cloth(material, info)
+    for (const mesh of this.part.meshes) {
+      mesh.visible = info.group < SHOWN_GROUPS
+      mesh.castShadow = mesh.receiveShadow = true
+      mesh.frustumCulled = false
+      parent.add(mesh)
     }
-    this.mesh.visible = info.group < SHOWN_GROUPS
-    this.mesh.castShadow = this.mesh.receiveShadow = true
-    parent.add(this.mesh)
   }
 
   update(frame) {
-    this.position.array.set(frame.subarray(this.at, this.at + 3 * this.count))
-    this.position.needsUpdate = true
-    if (!this.flatLines) this.geometry.computeVertexNormals()
+    this.part.update(frame.subarray(this.at, this.at + 3 * this.count))
   }
 
   dispose() {
-    this.mesh.removeFromParent()
-    this.geometry.dispose()
-    this.lineMaterial?.dispose()
+    for (const mesh of this.part.meshes) mesh.removeFromParent()
+    this.part.dispose()
   }
+}
+
+class Cloth {
+  constructor(material, { count, elements }) {
+    this.geometry = new BufferGeometry()
+    this.position = dynamic(new Float32Array(3 * count), 3)
+    this.geometry.setAttribute('position', this.position)
+    this.geometry.setIndex(Array.from(elements))
+    this.geometry.boundingSphere = EVERYWHERE
+    this.meshes = [new Mesh(this.geometry, material)]
+  }
+
+  update(points) {
+    this.position.array.set(points)
+    this.position.needsUpdate = true
+    this.geometry.computeVertexNormals()
+  }
+
+  dispose() {
+    this.geometry.dispose()
+  }
+}
+
+/** Lines with the radius of the flex and round ends: a tube for each element, a ball for each vertex. */
+class Ropes {
+  constructor(material, { count, elements, radius }) {
+    const { tube, knot } = ropePieces()
+    this.elements = elements
+    this.radius = radius
+    this.tubes = new InstancedMesh(tube, material, elements.length / 2)
+    this.knots = new InstancedMesh(knot, material, count)
+    this.meshes = [this.tubes, this.knots]
+    for (const { instanceMatrix } of this.meshes) instanceMatrix.setUsage(DynamicDrawUsage)
+  }
+
+  update(points) {
+    const { elements, radius } = this
+    const tubes = this.tubes.instanceMatrix
+    for (let i = 0; 2 * i < elements.length; i++) stretch(tubes.array, 16 * i, points, 3 * elements[2 * i], 3 * elements[2 * i + 1], radius)
+    const knots = this.knots.instanceMatrix
+    for (let i = 0, from = 0; i < knots.count; i++, from += 3) {
+      knots.array.set([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, points[from], points[from + 1], points[from + 2], 1], 16 * i)
+    }
+    tubes.needsUpdate = knots.needsUpdate = true
+  }
+
+  dispose() {
+    for (const mesh of this.meshes) mesh.dispose()
+  }
+}
+
+/**
+ * Write the matrix that lays a tube (along z, from -1 to 1, of radius 1) from one point to another.
+ *
+ * @param {Float32Array} out by columns @param {number} at where it begins there @param {number} a @param {number} b where the points begin
+ */
+export function stretch(out, at, points, a, b, radius) {
+  const half = [0, 1, 2].map((i) => (points[b + i] - points[a + i]) / 2)
+  const length = Math.hypot(...half)
+  const z = length > 0 ? half.map((x) => x / length) : [0, 0, 1]
+  // Any axis will do that is not along the tube.
+  const s = Math.abs(z[2]) < 0.9 ? [-z[1], z[0], 0] : [0, -z[2], z[1]]
+  const n = radius / Math.hypot(...s)
+  const x = s.map((value) => n * value)
+  const y = [0, 1, 2].map((i) => z[(i + 1) % 3] * x[(i + 2) % 3] - z[(i + 2) % 3] * x[(i + 1) % 3])
+  out.set([...x, 0, ...y, 0, ...half, 0, ...[0, 1, 2].map((i) => (points[a + i] + points[b + i]) / 2), 1], at)
 }
 
 /** The path of a site. */

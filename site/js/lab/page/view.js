@@ -94,6 +94,11 @@ export class View {
     return true
   }
 
+  /** Draw the reflection that the picture needs; gives whether there is one. */
+  reflect(stage) {
+    return this.world.mirror?.draw(stage, this.scene, this.lens, this.width, this.height) ?? false
+  }
+
   /** Take the stage's canvas. */
   hold(canvas) {
     canvas.setAttribute('role', 'img')

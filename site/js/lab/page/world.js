@@ -8,6 +8,7 @@ import { CubeTexture, Matrix4, Raycaster, Scene, Vector2 } from 'three'
 import { GEOM, hfieldGeometry, meshGeometry } from './geometry.js'
 import { Lights } from './lights.js'
 import { Materials } from './materials.js'
+import { Mirror } from './mirror.js'
 import { Solid } from './solid.js'
 import { Flex, Skin, Trail } from './surfaces.js'
 
@@ -32,6 +33,7 @@ export class World {
     this.flexes = description.flexes.map((flex) => new Flex(this.scene, this.materials, flex, description.layout))
     this.trail = description.layout.longestTrail > 0 ? new Trail(this.scene, description.layout) : null
     this.decorations = new Map()
+    this.mirror = this.polished()
     this.setSky()
     this.raycaster = new Raycaster()
   }
@@ -48,6 +50,17 @@ export class World {
     const geometry = type === GEOM.MESH || type === GEOM.SDF ? this.mesh(data) : type === GEOM.HFIELD ? this.hfield(data) : null
     const wrapped = geometry !== null && this.description.meshes[data]?.texcoords != null && type !== GEOM.HFIELD
     return new Solid(this.scene, this.materials, { type, material, geometry, wrapped, extent: this.description.extent })
+  }
+
+  /** What can be mirrored in, or null where the model has nothing that mirrors. */
+  polished() {
+    const { geoms, materials } = this.description
+    const surfaces = geoms.flatMap(({ type, material }, i) => {
+      const reflectance = materials[material]?.reflectance ?? 0
+      const flat = type === GEOM.PLANE || type === GEOM.BOX
+      return flat && reflectance > 0 && this.geoms[i] !== null ? [{ solid: this.geoms[i], reflectance }] : []
+    })
+    return surfaces.length > 0 ? new Mirror(surfaces) : null
   }
 
   mesh(id) {
@@ -67,22 +80,23 @@ export class World {
   /** Move everything to where a frame says it is. */
   update(frame, camera) {
     const { layout } = this.description
-    this.place(this.geoms, frame, layout.geoms, camera.target)
-    this.place(this.sites, frame, layout.sites, camera.target)
+    const sight = { eye: camera.position(), target: camera.target }
+    this.place(this.geoms, frame, layout.geoms, sight)
+    this.place(this.sites, frame, layout.sites, sight)
     this.skins.forEach((skin) => skin.update(frame))
     this.flexes.forEach((flex) => flex.update(frame))
     const points = frame[2]
     this.trail?.update(frame, points)
-    this.decorate(frame, layout.trail + 3 * points, frame[1], camera.target)
-    this.lights.update(frame, camera.position(), camera.axes().forward)
+    this.decorate(frame, layout.trail + 3 * points, frame[1], sight)
+    this.lights.update(frame, sight.eye, camera.axes().forward)
   }
 
-  place(solids, frame, start, target) {
-    for (let i = 0, at = start; i < solids.length; i++, at += ROW) solids[i]?.update(frame, at, at + SIZE, at + COLOUR, target)
+  place(solids, frame, start, sight) {
+    for (let i = 0, at = start; i < solids.length; i++, at += ROW) solids[i]?.update(frame, at, at + SIZE, at + COLOUR, sight)
   }
 
   // Decorations come and go: those of a type are used again, and what is left over is hidden.
-  decorate(frame, start, count, target) {
+  decorate(frame, start, count, sight) {
     const used = new Map()
     for (let i = 0, at = start; i < count; i++, at += DECORATION) {
       const type = frame[at]
@@ -93,7 +107,7 @@ export class World {
       if (next === pool.length) pool.push(this.decoration(type, frame[at + 1]))
       used.set(key, next + 1)
       const solid = pool[next]
-      solid.update(frame, at + 7, at + 4, at + 19, target, frame[at + 23])
+      solid.update(frame, at + 7, at + 4, at + 19, sight, frame[at + 23])
     }
     for (const [key, pool] of this.decorations) for (let i = used.get(key) ?? 0; i < pool.length; i++) pool[i].show(false)
   }
@@ -116,7 +130,8 @@ export class World {
     let best = null
     this.geoms.forEach((solid, i) => {
       const { body } = this.description.geoms[i]
-      if (solid === null) return
+      // What is seen through a plane from below is meant, and not the plane.
+      if (solid === null || solid.below) return
       for (const hit of this.raycaster.intersectObjects(
         solid.meshes.filter((mesh) => mesh.visible),
         false,
@@ -130,6 +145,7 @@ export class World {
   dispose() {
     this.lights.dispose()
     this.materials.dispose()
+    this.mirror?.dispose()
     for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, this.trail]) thing?.dispose()
     for (const solid of [...this.geoms, ...this.sites, ...[...this.decorations.values()].flat()]) solid?.remove()
     this.scene.clear()

@@ -21,7 +21,8 @@ export class ParityRecorder {
     this.lab = lab
     this.before = null
     this.mjb = saveModel(lab)
-    this.asSent = equalBytes(this.mjb, sent)
+    this.autoreset = (lab.option.disableflags & lab.engine.k.disable.AUTORESET) === 0
+    this.asSent = equalBytes(this.mjb, sent) || equalBytes(savedWithReset(lab), sent)
     this.start = lab.physics.read()
     this.width = lab.model.nq + lab.model.nv + lab.model.na
     this.stride = Math.max(1, Math.ceil((steps * this.width) / MOST_NUMBERS))
@@ -58,11 +59,12 @@ export class ParityRecorder {
     if (this.sums.length % this.stride === 0) this.rows.push(...qpos, ...qvel, ...act)
   }
 
-  /** What was recorded. `mjb` is null where the lab has not changed the model that it was given. */
+  /** What was recorded. `mjb` is null where the lab has changed nothing of the model but whether it resets itself: `autoreset`. */
   result() {
     const { writes } = this
     return packed({
       mjb: this.asSent ? null : this.mjb,
+      autoreset: this.autoreset,
       modelChanged: !equalBytes(this.mjb, saveModel(this.lab)),
       complete: this.complete,
       signature: this.lab.physics.signature,
@@ -91,6 +93,16 @@ export function saveModel({ engine, model }) {
   } finally {
     buffer.delete()
   }
+}
+
+/** The same with MuJoCo's own reset of a diverged state, which every lab switches off, on. */
+function savedWithReset(lab) {
+  const { option } = lab
+  const flags = option.disableflags
+  option.disableflags = flags & ~lab.engine.k.disable.AUTORESET
+  const saved = saveModel(lab)
+  option.disableflags = flags
+  return saved
 }
 
 const bits = (view) => new Int32Array(view.buffer, view.byteOffset, 2 * view.length)

@@ -31,7 +31,38 @@ export function record(lab) {
   return { times: picked.map((i) => times[i]), plots }
 }
 
-/** Pictures that are drawn without a GPU show no textures, which can be large. */
-export function withoutTextures(scene) {
-  return { ...scene, textures: scene.textures.map((texture) => ({ ...texture, data: null })) }
+/** The scene with textures as coarse as a picture of a few hundred pixels needs them. */
+export function withSmallTextures(scene) {
+  return { ...scene, textures: scene.textures.map(small) }
+}
+
+const FLAT = 0 // mjtTexture
+const WIDEST = 256 // texels of a flat texture
+const WIDEST_FACE = 64 // of a face of a cube
+
+function small(texture) {
+  const { type, width, height, channels, data } = texture
+  const faces = type !== FLAT && height === 6 * width ? 6 : 1
+  const most = type === FLAT ? WIDEST : WIDEST_FACE
+  const w = Math.min(width, most)
+  const h = faces * Math.min(height / faces, most)
+  if (w === width && h === height) return texture
+  return { ...texture, width: w, height: h, data: thinned(data, [width, height], [w, h], channels) }
+}
+
+/** Rows of texels, each the mean of those that it takes the place of. */
+function thinned(data, [width, height], [w, h], channels) {
+  const target = new Uint8Array(w * h * channels)
+  for (let j = 0, to = 0; j < h; j++) {
+    const [top, bottom] = [j, j + 1].map((k) => Math.floor((k * height) / h))
+    for (let i = 0; i < w; i++) {
+      const [left, right] = [i, i + 1].map((k) => Math.floor((k * width) / w))
+      for (let c = 0; c < channels; c++, to++) {
+        let sum = 0
+        for (let y = top; y < bottom; y++) for (let x = left; x < right; x++) sum += data[(y * width + x) * channels + c]
+        target[to] = Math.round(sum / ((bottom - top) * (right - left)))
+      }
+    }
+  }
+  return target
 }

@@ -16,7 +16,9 @@ import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, readable } from '../core/piece.js'
 import { packed } from './base64.js'
 import { ParityRecorder } from './parity.js'
-import { picture, record, withoutTextures } from './record.js'
+import { picture, record, withSmallTextures } from './record.js'
+import { resetDiffers } from './reset.js'
+import { watchedCode } from './watched.js'
 
 const SECONDS = 5 // of simulated time, unless the lab says otherwise
 const STEPS = 20_000 // at most, unless the lab says for how long
@@ -30,13 +32,15 @@ class OutOfTime extends Error {}
 /** What ended the engine has been told; it cannot be trusted with the rest. */
 class Ended extends Error {}
 
-export function runTrial(engine, request, bytes, now) {
-  return new Trial(engine, request, bytes, now).run()
+/** @param {import('./guard.js').Guard | null} guard of what labs share */
+export function runTrial(engine, request, bytes, now, guard = null) {
+  return new Trial(engine, request, bytes, now, guard).run()
 }
 
 class Trial {
-  constructor(engine, { config, code, seconds = null, wall = 60, parity = true }, bytes, now) {
+  constructor(engine, { config, code, seconds = null, wall = 60, parity = true }, bytes, now, guard) {
     this.engine = engine
+    this.guard = guard
     this.config = config
     this.bytes = bytes
     this.now = now
@@ -97,8 +101,10 @@ class Trial {
       lab.start()
       this.state(lab)
       result = action(lab)
+      this.shared(action)
     } catch (error) {
       if (error instanceof OutOfTime || error instanceof Ended) throw error
+      this.shared(action) // which may be why
       this.failed(error, lab?.time ?? null)
     } finally {
       lab?.dispose()
@@ -117,6 +123,36 @@ class Trial {
     if (this.told.has(key)) return
     this.told.add(key)
     this.failures.push({ entry, kind, message, at, during: this.during ?? null })
+  }
+
+  /** See whether the lab has changed what is not its own; then what is tried next would tell nothing. */
+  shared(action) {
+    const names = this.guard?.changes() ?? []
+    if (names.length === 0) return
+    this.guard.repair()
+    this.failures = this.failures.filter(({ during }) => during !== this.during) // which come of it
+    this.fail(this.guilty(action), 'shared', names.map((name) => `\`${name}\``).join(', '), null)
+    throw new Ended()
+  }
+
+  /** The entry whose code does it, if it does it again. */
+  guilty(action) {
+    const { code, failures, told, during } = this
+    const watched = watchedCode(code, this.guard)
+    Object.assign(this, { code: watched.code, failures: [], told: new Set() })
+    let lab = null
+    try {
+      lab = new Lab(this.engine, this.bytes, this.config, this.code)
+      lab.start()
+      action(lab)
+    } catch {
+      // It ends there.
+    } finally {
+      this.guard.repair()
+      lab?.dispose()
+      Object.assign(this, { code, failures, told, during })
+    }
+    return watched.entry() ?? during.entry
   }
 
   /** Note what the lab itself says: divergence, warnings. */
@@ -216,20 +252,12 @@ class Trial {
       steps: lab.steps,
       stopped,
       timestep,
-      scene: packed(withoutTextures(lab.scene())),
+      scene: packed(withSmallTextures(lab.scene())),
       pictures,
       plots: record(lab),
       parity,
-      resetDiffers: this.resetDiffers(lab, atStart),
+      resetDiffers: resetDiffers(lab, atStart),
     }
-  }
-
-  /** Whether a reset leads back to where the lab started; it does not when lab code uses chance of its own. */
-  resetDiffers(lab, before) {
-    lab.reset()
-    const after = lab.state().physics
-    const i = after.findIndex((x, j) => !Object.is(x, before[j]))
-    return i < 0 ? null : `number ${i} of the state is ${after[i]} after a reset, and was ${before[i]}`
   }
 
   // --- controls and claims

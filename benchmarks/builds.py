@@ -1,0 +1,111 @@
+"""Measure coursebuild and its peers side by side, in one run.
+
+Run: python benchmarks/builds.py [--peers BIN] [--node NODE_MODULES] [--sizes 80,800] [--docs]
+
+1. The same course is written for each peer that is installed (`benchmarks/README.md` says how they
+   are), at each size.
+2. In rounds over all of them: a cold build, one with nothing changed, one with a lesson edited.
+   Then the memory of a cold build, and from a save to the page in the live preview.
+3. In rounds: the scripts of a course of MuJoCo scripts, run in all ways.
+4. The tables are printed; --json and --docs keep them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(HERE))
+
+from benchmarks.measure.building import make_site, measure_builds  # noqa: E402
+from benchmarks.measure.process import CommandError  # noqa: E402
+from benchmarks.measure.report import describe, markdown, put_into  # noqa: E402
+from benchmarks.measure.running import jcache_version, measure_scripts  # noqa: E402
+from benchmarks.measure.serving import measure_serving  # noqa: E402
+from benchmarks.measure.tools import Places, all_tools  # noqa: E402
+
+DOCS = HERE / "docs" / "benchmarks.md"
+PARTS = ("builds", "serve", "scripts")
+
+
+def arguments_of() -> argparse.Namespace:
+    """What was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--peers", type=Path, help="`bin` of an environment with peers.txt")
+    parser.add_argument("--node", type=Path, help="`node_modules` with package.json's packages")
+    parser.add_argument("--sizes", default="80,800", help="numbers of lessons")
+    parser.add_argument("--rounds", default="7,3", help="rounds at each size")
+    parser.add_argument("--scripts", type=int, default=20, help="number of MuJoCo scripts")
+    parser.add_argument("--parts", default=",".join(PARTS), help=f"of {', '.join(PARTS)}")
+    parser.add_argument("--tools", default="", help="keys of the tools; default: all there are")
+    parser.add_argument("--work", type=Path, help="a folder for the courses; default: a new one")
+    parser.add_argument("--json", type=Path, help="write all figures to this file")
+    parser.add_argument("--docs", action="store_true", help=f"put the tables into {DOCS.name}")
+    return parser.parse_args()
+
+
+def say(text: str) -> None:
+    """Tell how far it is."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def main() -> None:
+    """Measure, print, keep."""
+    arguments = arguments_of()
+    peers = arguments.peers.resolve() if arguments.peers else None
+    node = arguments.node.resolve() if arguments.node else None
+    work = arguments.work.resolve() if arguments.work else Path(tempfile.mkdtemp(prefix="bench-"))
+    work.mkdir(parents=True, exist_ok=True)
+    try:
+        text = measured(arguments, Places(peers, node), work)
+    except CommandError as fault:
+        sys.exit(str(fault))
+    finally:
+        if arguments.work is None:
+            shutil.rmtree(work, ignore_errors=True)
+    print(text)
+    if arguments.docs:
+        put_into(DOCS, text)
+
+
+def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
+    """All that was asked for, as text."""
+    wanted = arguments.tools.split(",") if arguments.tools else None
+    tools = [t for t in all_tools(places) if wanted is None or t.key in wanted]
+    report = describe(tools, jcache_version(places))
+    there = [tool for tool in tools if tool.version is not None]
+    parts = arguments.parts.split(",")
+    sizes = [int(size) for size in arguments.sizes.split(",")]
+    rounds = [int(number) for number in arguments.rounds.split(",")]
+    for i, size in enumerate(sizes):
+        turns = rounds[min(i, len(rounds) - 1)]
+        sites = []
+        if "builds" in parts:
+            sites = measure_builds(there, size, turns, work, places, say)
+        if "serve" in parts:
+            known = {site.tool.key for site in sites}
+            more = [t for t in there if t.serve is not None and t.key not in known]
+            sites += [make_site(tool, size, work, places) for tool in more]
+            measure_serving(sites, min(turns, 2), 5, say)
+        report.add_sites(sites, size)
+        keep(arguments, report.as_json())
+    if "scripts" in parts:
+        report.add_scripts(measure_scripts(arguments.scripts, rounds[0], work, places, say))
+    keep(arguments, report.as_json())
+    return markdown(report)
+
+
+def keep(arguments: argparse.Namespace, figures: dict[str, object]) -> None:
+    """Write what there is so far, so that a run that is broken off is not lost."""
+    if arguments.json is not None:
+        text = json.dumps(figures, indent=1, ensure_ascii=False)
+        arguments.json.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,243 @@
+"""The pieces of one lesson, about 15 kB of them.
+
+Entry point: `make_lesson`. A lesson has five sections, 25 formulas or a few more, ten of them
+displayed, four callouts, a script with its output, tables, a list, a quiz and links to its
+neighbours.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.generate.document import (
+    Callout,
+    Choice,
+    Display,
+    Heading,
+    InOut,
+    Lesson,
+    Number,
+    Open,
+    Piece,
+    Printed,
+    Prose,
+    Question,
+    Quiz,
+    Script,
+)
+from benchmarks.generate.scripts import duration_of, make_script, step_counts
+from benchmarks.generate.topics import Fill, Topic, all_topics, pick, topic_of
+
+LEVEL_SIZE = 10
+"""Lessons in a level."""
+COSTS = """| method | evaluations a step | order | error when the step is halved |
+| --- | --- | --- | --- |
+| Euler | 1 | 1 | a half |
+| Heun | 2 | 2 | a quarter |
+| midpoint | 2 | 2 | a quarter |
+| Runge–Kutta | 4 | 4 | a sixteenth |"""
+
+
+@functools.cache
+def shared() -> dict[str, Any]:
+    """What every lesson says, in variants."""
+    return tomllib.loads(Path(__file__).with_name("methods.toml").read_text(encoding="utf-8"))
+
+
+def lesson_id(number: int) -> str:
+    """The id of a lesson, from its number."""
+    return f"{number // LEVEL_SIZE + 1}.{number % LEVEL_SIZE + 1}"
+
+
+def lesson_slug(number: int) -> str:
+    """The slug of a lesson, from its number."""
+    topics = all_topics()
+    return f"{topics[number % len(topics)]['slug']}-{number // len(topics) + 1}"
+
+
+def lesson_name(number: int) -> str:
+    """The name of a lesson's file, without the ending."""
+    return f"{lesson_id(number)}-{lesson_slug(number)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """Chooses and fills the texts of one lesson."""
+
+    number: int
+    topic: Topic
+    values: dict[str, str]
+
+    def say(self, what: str) -> str:
+        """One variant of a text that all lessons share."""
+        variants = shared()[what]
+        return self.fill(variants[pick(self.number, what, len(variants))])
+
+    def fill(self, text: str) -> str:
+        """The text with the numbers of the run in it."""
+        return Fill(text).substitute(self.values)
+
+    def prose(self, what: str) -> Prose:
+        """The same as a paragraph."""
+        return Prose(self.say(what))
+
+    def general(self, index: int) -> Display:
+        """A displayed formula that all lessons share, but for its numbers."""
+        return Display(self.fill(shared()["displays"][index]))
+
+    def own(self, name: str) -> Display:
+        """A displayed formula of the topic."""
+        return Display(self.topic.text("formulas", name))
+
+
+def make_lesson(number: int, count: int, scripts: str = "python") -> Lesson:
+    """A lesson of a course that has `count` of them; it depends on nothing else."""
+    topic = topic_of(number)
+    steps = step_counts(number, 30)
+    far = (number + len(all_topics())) % count
+    writer = Writer(
+        number,
+        topic,
+        {
+            "T": duration_of(number),
+            "N": str(steps[0]),
+            "N2": str(steps[1]),
+            "N4": str(steps[2]),
+            "before": lesson_id(max(number - 1, 0)),
+            "after": lesson_id(min(number + 1, count - 1)),
+            "far": lesson_id(far),
+        },
+    )
+    title = f"{topic.raw('title')}, case {number // len(all_topics()) + 1}"
+    script = make_script(number, topic, topic.raw("title"), scripts)
+    return Lesson(
+        number,
+        lesson_id(number),
+        lesson_slug(number),
+        title,
+        topic.raw("summary"),
+        (lesson_id(number - 1),) if number % LEVEL_SIZE else (),
+        (
+            *concept(writer),
+            *mathematics(writer),
+            *implementation(writer, script),
+            *end(writer, script),
+        ),
+    )
+
+
+def concept(writer: Writer) -> tuple[Piece, ...]:
+    """The problem and its numbers."""
+    first, second = writer.topic.texts("text", "intro")
+    rows = "\n".join(f"| {name} | {value} |" for name, value in writer.topic.values.items())
+    return (
+        Heading(2, "Core concept"),
+        Prose(first),
+        writer.own("equation"),
+        Prose(second),
+        writer.prose("intro"),
+        Prose(f"| constant | value |\n| --- | --- |\n{rows}\n| duration | {writer.values['T']} |"),
+        Callout("established", "What is compared", False, (writer.prose("established"),)),
+    )
+
+
+def mathematics(writer: Writer) -> tuple[Piece, ...]:
+    """The solution, and what is known about the methods."""
+    topic = writer.topic
+    derivation = (Prose("Separate what depends on the time:"), writer.own("derivation"))
+    limit = (Prose("A case that can be checked by hand is"), writer.own("special"))
+    second = 2 + 6 * pick(writer.number, "second formula", 2)
+    return (
+        Heading(2, "Mathematics"),
+        Heading(3, "The solution in closed form"),
+        *map(Prose, topic.texts("text", "model")),
+        writer.own("solution"),
+        Callout("derivation", "Where it comes from", True, (*derivation, *limit)),
+        Prose("One more identity holds for every solution, and each method can be held to it:"),
+        writer.own("balance"),
+        Heading(3, "Four methods"),
+        writer.prose("steps"),
+        writer.general(0),
+        writer.prose("heun"),
+        writer.prose("rk4"),
+        writer.general((1, 8)[pick(writer.number, "tableau", 2)]),
+        Heading(3, "Errors and orders"),
+        writer.prose("local"),
+        writer.general((3, 4, 9)[pick(writer.number, "bound", 3)]),
+        writer.prose("whole"),
+        writer.prose("order"),
+        writer.general(5),
+        writer.prose("region"),
+        writer.general((6, second)[pick(writer.number, "last formula", 2)]),
+        Heading(3, "Cost"),
+        Prose(COSTS),
+        writer.prose("cost"),
+    )
+
+
+def implementation(writer: Writer, script: Script) -> tuple[Piece, ...]:
+    """The script, its output, and what it shows."""
+    found = script.output.splitlines()
+    first = next(word for line in found for word in line.split() if is_decimal(word))
+    shown = f"The first number that the script prints is `{first}`{{out}}."
+    return (
+        Heading(2, "Implementation"),
+        InOut(*shared()["io"]),
+        Callout("implementation", "How it is built", False, (writer.prose("implementation"),)),
+        script,
+        Prose(f"{shown} {writer.topic.text('text', 'close')}"),
+        writer.prose("units"),
+        writer.prose("reading"),
+        writer.prose("discuss"),
+        Callout("warning", "Before you trust a step", False, (writer.prose("warning"),)),
+    )
+
+
+def is_decimal(word: str) -> bool:
+    """Whether a word of the output is a number with a decimal point."""
+    return word.removeprefix("-").replace(".", "", 1).isdigit() and "." in word
+
+
+def end(writer: Writer, script: Script) -> tuple[Piece, ...]:
+    """A summary, the quiz, and where to go from here."""
+    points = shared()["points"]
+    first = pick(writer.number, "points", len(points))
+    chosen = [points[(first + i) % len(points)] for i in range(4)]
+    return (
+        Heading(2, "Summary"),
+        Prose("\n".join(f"- {point}" for point in chosen)),
+        Prose(f"**To try.** {writer.say('try')}"),
+        Heading(2, "Check"),
+        Quiz(questions(writer, script.output.splitlines()[0])),
+        Heading(2, "Where to go from here"),
+        writer.prose("links"),
+    )
+
+
+def questions(writer: Writer, first_line: str) -> tuple[Question, ...]:
+    """Four questions."""
+    topic = writer.topic
+    numbers = {name: float(value) for name, value in topic.values.items()}
+    answer = eval(topic.raw("quiz", "value"), {"math": math}, numbers)
+    return (
+        Choice(
+            topic.text("quiz", "question"),
+            topic.texts("quiz", "options"),
+            topic.raw("quiz", "answer"),
+            topic.text("quiz", "explain"),
+        ),
+        Number(
+            topic.text("quiz", "number"),
+            float(f"{answer:.4g}"),
+            topic.text("quiz", "number_explain"),
+        ),
+        Open(topic.text("quiz", "open"), topic.text("quiz", "reference")),
+        Printed(
+            "The script is run again without any change. What is its first line?", 1, first_line
+        ),
+    )

@@ -1,0 +1,161 @@
+"""Builds: cold, with nothing changed, with one lesson edited; the most memory of a cold one.
+
+Entry point: `measure_builds`. Rounds go over all tools, so that a slow moment of the machine does
+not fall on one of them. Each build is looked at: pages that are missing, or an edit that is not in
+its page, count as a failure of the tool.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.courses import write_course
+from benchmarks.measure.process import CommandError, peak_memory, timed
+from benchmarks.measure.tools import Places, Tool, environment
+
+COLD, UNCHANGED, EDITED, MEMORY = "cold build", "nothing changed", "one lesson edited", "memory"
+
+
+@dataclass(slots=True)
+class Site:
+    """A course that one tool builds."""
+
+    tool: Tool
+    folder: Path
+    names: list[str]
+    """Of the lessons."""
+    name: str
+    """Of the lesson that is edited."""
+    original: str
+    """Its text."""
+    places: Places
+    edits: int = 0
+    failed: str = ""
+    """What went wrong, if something did: then its figures are incomplete."""
+    found: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def source(self) -> Path:
+        """The file of that lesson."""
+        return self.folder / self.tool.source(self.name)
+
+    def edit(self) -> str:
+        """Add a sentence to the lesson, a new one each time; gives a word of it."""
+        self.edits += 1
+        word = f"revision{self.edits}x"
+        self.source.write_text(f"{self.original}\nOne more sentence: {word}.\n", encoding="utf-8")
+        return word
+
+    def clear(self) -> None:
+        """Remove what a cold build is not to find."""
+        for made in self.tool.made:
+            head, spares, names = made.partition("!")
+            path = self.folder / head
+            if spares and path.is_dir():
+                for child in path.iterdir():
+                    if child.name not in names.split(","):
+                        remove(child)
+            else:
+                remove(path)
+
+    @property
+    def command(self) -> list[str]:
+        """The command for a build."""
+        assert self.tool.build is not None
+        return self.tool.build
+
+    def built(self) -> float:
+        """Build; gives seconds."""
+        return timed(self.command, self.folder, environment(self.places))
+
+    def page(self) -> str:
+        """The built page of the lesson that is edited."""
+        return (self.folder / self.tool.page(self.name)).read_text(encoding="utf-8")
+
+    def note(self, what: str, figure: float) -> None:
+        """Keep a figure."""
+        self.found.setdefault(what, []).append(figure)
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder that may be there."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def make_site(tool: Tool, lessons: int, work: Path, places: Places) -> Site:
+    """Write the tool's course."""
+    folder = work / f"{tool.key}-{lessons}"
+    remove(folder)
+    names = write_course(folder, lessons, tool.flavor)
+    if tool.flavor in ("eleventy", "vitepress"):
+        assert places.node is not None
+        (folder / "node_modules").symlink_to(places.node)
+    name = names[lessons // 2]
+    original = (folder / tool.source(name)).read_text(encoding="utf-8")
+    return Site(tool, folder, names, name, original, places)
+
+
+def measure_builds(
+    tools: list[Tool],
+    lessons: int,
+    rounds: int,
+    work: Path,
+    places: Places,
+    say: Callable[[str], None],
+) -> list[Site]:
+    """All figures of all tools that build."""
+    sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build is not None]
+    for site in sites:
+        say(f"{lessons} lessons, first build: {site.tool.title}")
+        attempt(site, first_build, say)
+    for turn in range(rounds):
+        for site in sites:
+            say(f"{lessons} lessons, round {turn + 1} of {rounds}: {site.tool.title}")
+            attempt(site, one_round, say)
+    for site in sites:
+        if not site.tool.only_incremental:
+            attempt(site, memory, say)
+    return sites
+
+
+def attempt(site: Site, work: Callable[[Site], None], say: Callable[[str], None]) -> None:
+    """Do something with a site; one that fails is told of and left out from there on."""
+    if not site.failed:
+        try:
+            work(site)
+        except CommandError as fault:
+            site.failed = str(fault)
+            say(f"{site.tool.title} FAILED: {fault}")
+
+
+def first_build(site: Site) -> None:
+    """Build once without a look at the clock, and count the pages."""
+    site.built()
+    pages = sum((site.folder / site.tool.page(name)).exists() for name in site.names)
+    if pages != len(site.names):
+        raise CommandError(f"{pages} pages of {len(site.names)} were built")
+
+
+def memory(site: Site) -> None:
+    """Note the most memory of a cold build."""
+    site.clear()
+    site.note(MEMORY, peak_memory(site.command, site.folder, environment(site.places)))
+
+
+def one_round(site: Site) -> None:
+    """A cold build, one with nothing changed, one with a lesson edited."""
+    if not site.tool.only_incremental:
+        site.clear()
+        site.note(COLD, site.built())
+    site.note(UNCHANGED, site.built())
+    word = site.edit()
+    took = site.built()
+    if word not in site.page():
+        raise CommandError("what was edited is not in the built page")
+    site.note(EDITED, took)

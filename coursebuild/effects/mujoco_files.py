@@ -1,0 +1,210 @@
+"""Which files MuJoCo opens for a model, worked out from the text of the model.
+
+Entry point: `ModelFiles`. Checked against the system calls of MuJoCo 3.14.0.
+
+1. Includes are read; a relative one is looked for beside the model that was opened first, then in
+   the folder of the file that includes it, as that was named, again relative to the model's.
+2. Attributes of `compiler`, wherever they stand, say in which folders the assets are.
+3. An asset that the caller hands over as bytes is not looked for: MuJoCo knows those by the last
+   component of their names.
+4. A model named by `<model file="..."/>` is a model of its own.
+
+The text is scanned, not parsed: what is no XML to MuJoCo gives its own file and perhaps too many.
+Only what every Python has loaded is imported, and `re` is passed in.
+"""
+
+from __future__ import annotations
+
+import posix
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+    from types import ModuleType
+    from typing import Any
+
+_MESH = frozenset(("mesh", "hfield", "skin"))
+_CUBE = tuple(f"file{side}" for side in ("right", "left", "up", "down", "front", "back"))
+_DEEPEST = 32
+
+
+class ModelFiles:
+    """Finds the files of models; `note` is told of each, whether it is there or not."""
+
+    def __init__(self, re: ModuleType, note: Callable[[str], None]) -> None:
+        self._note = note
+        self._comments = re.compile(rb"<!--.*?-->", re.DOTALL)
+        self._tags = re.compile(rb"<([A-Za-z_][\w:.-]*)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>")
+        self._attributes = re.compile(rb"([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+
+    def of_path(self, path: str, given: Collection[str] = (), *, assets: bool = True) -> None:
+        """The files of the model in a file, with that file; without assets only its includes."""
+        given = frozenset(_last(name) for name in given)
+        self._model(path, given, assets, 0)
+
+    def of_text(
+        self,
+        text: str | bytes,
+        given: Collection[str] = (),
+        *,
+        assets: bool = True,
+        folder: str = "",
+    ) -> None:
+        """The files of a model that is a text, relative to the working folder or another one."""
+        data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+        given = frozenset(_last(name) for name in given)
+        self._scan(data, folder and f"{folder.rstrip('/')}/", given, assets, 0)
+
+    def of_spec(self, spec: Any, given: Collection[str] = ()) -> None:
+        """The assets of an `MjSpec`, which are read when it is compiled."""
+        given = frozenset(_last(name) for name in (*given, *spec.assets))
+        folder = spec.modelfiledir
+        places = _Places(folder, spec.meshdir, spec.texturedir, strip=bool(spec.strippath))
+        for kind in ("meshes", "hfields", "skins"):
+            for each in getattr(spec, kind):
+                self._asset(places.mesh(each.file), given)
+        for each in spec.textures:
+            for file in (each.file, *each.cubefiles):
+                self._asset(places.texture(file), given)
+
+    def _model(self, path: str, given: frozenset[str], assets: bool, depth: int) -> None:
+        if _last(path) in given:
+            return
+        self._note(path)
+        data = _contents(path)
+        if data is not None:
+            self._scan(data, path[: path.rfind("/") + 1], given, assets, depth)
+
+    def _scan(
+        self, data: bytes, folder: str, given: frozenset[str], assets: bool, depth: int
+    ) -> None:
+        tags = list(self._included(data, folder, "", given, 0))
+        if not assets:
+            return
+        compiler: dict[str, str] = {}
+        for tag, attributes in tags:
+            if tag == "compiler":
+                compiler |= attributes
+        both = compiler.get("assetdir", "")
+        places = _Places(
+            folder,
+            compiler.get("meshdir", both),
+            compiler.get("texturedir", both),
+            strip=compiler.get("strippath") == "true",
+        )
+        for tag, attributes in tags:
+            file = attributes.get("file", "")
+            if tag in _MESH:
+                self._asset(places.mesh(file or attributes.get("filename", "")), given)
+            elif tag == "texture":
+                for name in ("file", *_CUBE):
+                    self._asset(places.texture(attributes.get(name, "")), given)
+            elif tag == "flexcomp":
+                self._asset([*_join(folder, file), *places.mesh(file)], given)
+            elif tag == "model" and file and depth < _DEEPEST:
+                found = self._asset([*_join("", file), *_join(folder, file)], given)
+                if found:
+                    self._model(found, given, assets, depth + 1)
+
+    def _included(
+        self, data: bytes, folder: str, here: str, given: frozenset[str], depth: int
+    ) -> Iterator[tuple[str, dict[str, str]]]:
+        """Every tag of a text and of what it includes, with its attributes."""
+        for tag in self._tags.finditer(self._comments.sub(b"", data)):
+            name = _decode(tag[1])
+            attributes = {
+                _decode(key): _entities(_decode(one or two))
+                for key, one, two in self._attributes.findall(tag[2])
+            }
+            if name != "include":
+                yield name, attributes
+                continue
+            file = attributes.get("file", "")
+            candidates = _join(folder, file)
+            if here and file:
+                candidates += _join(folder, here + file)
+                candidates += _join(folder, here + here.lstrip("/") + file)
+            path = self._asset(candidates, given)
+            if path and depth < _DEEPEST and (inner := _contents(path)) is not None:
+                below = path[: path.rfind("/") + 1]
+                yield from self._included(inner, folder, below, given, depth + 1)
+
+    def _asset(self, candidates: list[str], given: frozenset[str]) -> str:
+        """Note a file, which is the first of these that is there; it, or nothing."""
+        if candidates and _last(candidates[0]) in given:
+            return ""
+        for candidate in candidates:
+            self._note(candidate)
+            try:
+                posix.stat(candidate)
+            except (OSError, ValueError):
+                continue
+            return candidate
+        return ""
+
+
+class _Places:
+    """Where the assets of a model are looked for."""
+
+    def __init__(self, folder: str, meshes: str, textures: str, *, strip: bool) -> None:
+        self._folder = folder
+        self._meshes = meshes
+        self._textures = textures
+        self._strip = strip
+
+    def mesh(self, file: str) -> list[str]:
+        """Where a mesh, height field or skin is; empty where there is no name."""
+        return self._in(self._meshes, file)
+
+    def texture(self, file: str) -> list[str]:
+        """Where a texture is; empty where there is no name."""
+        return self._in(self._textures, file)
+
+    def _in(self, folder: str, file: str) -> list[str]:
+        if not file:
+            return []
+        if self._strip:
+            file = _last(file)
+        if folder and not folder.endswith("/"):
+            folder += "/"
+        return _join(self._folder, folder + file if not file.startswith("/") else file)
+
+
+def _join(folder: str, file: str) -> list[str]:
+    if not file:
+        return []
+    if not folder or file.startswith("/"):
+        return [file]
+    return [folder + file if folder.endswith("/") else f"{folder}/{file}"]
+
+
+def _last(path: str) -> str:
+    return path.replace("\\", "/").rpartition("/")[2]
+
+
+def _contents(path: str) -> bytes | None:
+    try:
+        fd = posix.open(path, posix.O_RDONLY | posix.O_CLOEXEC)
+    except (OSError, ValueError):
+        return None
+    try:
+        parts = []
+        while part := posix.read(fd, 1 << 20):
+            parts.append(part)
+        return b"".join(parts)
+    except OSError:
+        return None
+    finally:
+        posix.close(fd)
+
+
+def _decode(data: bytes) -> str:
+    return data.decode("utf-8", "surrogateescape")
+
+
+def _entities(text: str) -> str:
+    if "&" not in text:
+        return text
+    for name, letter in (("lt", "<"), ("gt", ">"), ("quot", '"'), ("apos", "'"), ("amp", "&")):
+        text = text.replace(f"&{name};", letter)
+    return text

@@ -1,0 +1,267 @@
+"""Results shared between machines: a folder, or any place that fsspec knows (`s3://…`).
+
+Entry point: `shared_cache(where)`; `SharedCache` is what the store uses.
+
+1. What it holds is the store's entries under the same names; the store verifies them.
+2. It is read when it is asked, and written behind the work by threads of its own.
+3. A place that cannot be reached, or takes too long, is told of once and left alone for a while:
+   it costs time, and is never an error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path, PurePosixPath
+from typing import Any, Protocol, TypeVar
+from urllib.parse import unquote, urlsplit
+
+from coursebuild.effects.errors import EffectError, reason
+
+_VERSION = "coursebuild-1"
+"""A folder in the shared place; to be changed with what entries look like."""
+_TIMEOUT = 15.0
+"""Seconds that a request may take."""
+_FLUSH = 60.0
+"""Seconds that a command waits at its end for what is still to be sent."""
+_PAUSE = 120.0
+"""Seconds for which a place that failed is left alone."""
+_WRITERS = 4
+
+T = TypeVar("T")
+
+
+class Place(Protocol):
+    """Where files can be put. Paths are POSIX and relative; whatever is raised means trouble."""
+
+    def read(self, path: str) -> bytes | None:
+        """A file's bytes; `None` if there is none."""
+        ...
+
+    def write(self, path: str, data: bytes) -> None:
+        """Make or replace a file."""
+        ...
+
+    def names(self, folder: str) -> list[str]:
+        """The names in a folder; none if there is none."""
+        ...
+
+
+class FolderPlace:
+    """A folder, perhaps of a network's file system."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, path: str) -> bytes | None:
+        """See `Place`."""
+        try:
+            return (self.folder / path).read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            if not self.folder.is_dir():
+                self.folder.mkdir()  # or say why not; what lies above it must be there
+            return None
+
+    def write(self, path: str, data: bytes) -> None:
+        """See `Place`; whole or not at all."""
+        target = self.folder / path
+        self.folder.mkdir(exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".new-{os.urandom(8).hex()}")
+        try:
+            temporary.write_bytes(data)
+            temporary.replace(target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+
+    def names(self, folder: str) -> list[str]:
+        """See `Place`."""
+        try:
+            found = [path.name for path in (self.folder / folder).iterdir()]
+        except (FileNotFoundError, NotADirectoryError):
+            return []
+        return sorted(name for name in found if not name.startswith("."))
+
+
+class RemotePlace:
+    """A place of fsspec's."""
+
+    def __init__(self, files: Any, top: str) -> None:
+        self.files = files
+        self.top = top.rstrip("/")
+
+    def read(self, path: str) -> bytes | None:
+        """See `Place`."""
+        try:
+            data: bytes = self.files.cat_file(f"{self.top}/{path}")
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        return data
+
+    def write(self, path: str, data: bytes) -> None:
+        """See `Place`."""
+        full = f"{self.top}/{path}"
+        try:
+            self.files.pipe_file(full, data)
+        except FileNotFoundError:  # it has folders
+            self.files.makedirs(full.rpartition("/")[0], exist_ok=True)
+            self.files.pipe_file(full, data)
+
+    def names(self, folder: str) -> list[str]:
+        """See `Place`."""
+        try:
+            found = self.files.ls(f"{self.top}/{folder}", detail=False)
+        except (FileNotFoundError, NotADirectoryError):
+            return []
+        names = (PurePosixPath(str(path)).name for path in found)
+        return sorted(name for name in names if not name.startswith("."))
+
+
+def shared_cache(where: str) -> SharedCache:
+    """The cache at a folder or an URL; nothing is read yet.
+
+    Raises:
+        EffectError: this installation cannot reach such a place at all.
+    """
+    scheme, separator, _ = where.partition("://")
+    if not separator:
+        return SharedCache(where, FolderPlace(Path(where).expanduser().absolute()))
+    if scheme == "file":
+        return SharedCache(where, FolderPlace(Path(unquote(urlsplit(where).path))))
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise EffectError(
+            f"the cache {where} needs the package fsspec",
+            help="run `pip install 'coursebuild[cache]'`",
+        ) from None
+    try:
+        files, top = url_to_fs(where, use_listings_cache=False)
+    except ImportError as error:
+        raise EffectError(f"the cache {where} needs a package: {_words(error)}") from None
+    except ValueError as error:
+        raise EffectError(f"there is no place like {where}: {_words(error)}") from None
+    return SharedCache(where, RemotePlace(files, top))
+
+
+class SharedCache:
+    """What the store asks, whatever becomes of the place."""
+
+    def __init__(self, where: str, place: Place, timeout: float = _TIMEOUT) -> None:
+        self.where = where
+        self.place = place
+        self.timeout = timeout
+        self.trouble = ""
+        """What was wrong with it first."""
+        self._down_until = -1.0
+        self._queue: queue.Queue[tuple[str, bytes]] = queue.Queue()
+        self._writers = 0
+        self._lock = threading.Lock()
+        self._unsent = 0
+        self._sent = threading.Condition()
+        self._tell: Callable[[str], None] | None = None
+
+    def listen(self, tell: Callable[[str], None]) -> None:
+        """Be told, once, when the place cannot be used."""
+        self._tell = tell
+        if self.trouble:
+            tell(self.trouble)
+
+    def read(self, name: str) -> bytes | None:
+        """An entry; `None` where there is none or it cannot be had."""
+        return self._ask(lambda: self.place.read(f"{_VERSION}/{name}"), None)
+
+    def names(self, folder: str) -> list[str]:
+        """The names of the entries in a group."""
+        return self._ask(lambda: self.place.names(f"{_VERSION}/{folder}"), [])
+
+    def write(self, name: str, entry: bytes) -> None:
+        """Send an entry when there is time."""
+        if self._is_down():
+            return
+        with self._sent:
+            self._unsent += 1
+        self._queue.put((name, entry))
+        with self._lock:
+            if self._writers < _WRITERS:
+                self._writers += 1
+                threading.Thread(target=self._send, name="shared cache", daemon=True).start()
+
+    def flush(self, seconds: float = _FLUSH) -> None:
+        """Wait until all is sent, but not for ever."""
+        until = time.monotonic() + seconds
+        with self._sent:
+            while self._unsent and not self._is_down():
+                left = until - time.monotonic()
+                if left <= 0:
+                    self._fail(f"{self._unsent} results could not be sent in {seconds:g} s")
+                    return
+                self._sent.wait(min(left, 0.5))
+
+    def _send(self) -> None:
+        """Send what waits, and end: idle threads would keep this process from being forked."""
+        while True:
+            with self._lock:  # so that nothing is put in and left
+                try:
+                    name, entry = self._queue.get_nowait()
+                except queue.Empty:
+                    self._writers -= 1
+                    return
+            try:
+                if not self._is_down():
+                    self.place.write(f"{_VERSION}/{name}", entry)
+            except Exception as error:  # libraries of clouds raise what they like
+                self._fail(_words(error))
+            finally:
+                with self._sent:
+                    self._unsent -= 1
+                    self._sent.notify_all()
+
+    def _ask(self, function: Callable[[], T], otherwise: T) -> T:
+        """What the function gives in time; a call that hangs is left behind."""
+        if self._is_down():
+            return otherwise
+        result: list[T] = []
+        trouble: list[Exception] = []
+
+        def work() -> None:
+            try:
+                result.append(function())
+            except Exception as error:
+                trouble.append(error)
+
+        thread = threading.Thread(target=work, name="shared cache", daemon=True)
+        thread.start()
+        thread.join(self.timeout)
+        if result:
+            return result[0]
+        self._fail(_words(trouble[0]) if trouble else f"no answer within {self.timeout:g} s")
+        return otherwise
+
+    def _is_down(self) -> bool:
+        return time.monotonic() < self._down_until
+
+    def _fail(self, why: str) -> None:
+        with self._lock:
+            first = not self.trouble
+            self._down_until = time.monotonic() + _PAUSE
+            if first:
+                self.trouble = f"the shared cache {self.where} cannot be used: {why}"
+        if first and self._tell is not None:
+            self._tell(self.trouble)
+
+
+def _words(error: Exception) -> str:
+    """An error as the end of a sentence: one line, lower case, no full stop."""
+    if isinstance(error, OSError) and error.errno:
+        return reason(error)
+    text = " ".join(str(error).split()).rstrip(".")
+    if not text:
+        return type(error).__name__
+    return text if text[:2].isupper() else text[:1].lower() + text[1:]

@@ -1,0 +1,80 @@
+"""What watches a script that has an interpreter of its own.
+
+Entry point: `start`, called by `warm/sitecustomize` while that Python starts. Nothing that is not
+in every Python from its start may stay in `sys.modules`.
+"""
+
+from __future__ import annotations
+
+import posix
+import sys
+
+from coursebuild.effects import mujoco_tracing, tracing
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+    from types import ModuleType
+    from typing import Any
+
+
+def start(notes: str, tool: str, bare: frozenset[str]) -> None:
+    """Watch this process.
+
+    Args:
+        notes: the folder where the notes are written.
+        tool: the entry of the search path where this tool was imported from.
+        bare: names of the modules that were there before.
+    """
+    sys.path.remove(tool)
+    temporary = posix.environ[b"TMPDIR"].decode("utf-8", "surrogateescape")
+    tracer = tracing.Tracer(
+        posix.getcwd(), temporary, tracing.installed_folders(), notes, sink=None
+    )
+    mujoco_tracing.tracer = tracer
+    sys.meta_path.insert(0, _Waiting())
+    for name in [name for name in sys.modules if name not in bare]:
+        if name != "sitecustomize":
+            del sys.modules[name]
+    tracer.install()
+
+
+class _Waiting:
+    """Wraps MuJoCo when it has been imported."""
+
+    def find_spec(
+        self, name: str, path: Any = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """The spec that the other finders find."""
+        if name != "mujoco":
+            return None
+        sys.meta_path.remove(self)
+        for finder in sys.meta_path:
+            spec = finder.find_spec(name, path, target)
+            if spec is not None:
+                if spec.loader is not None:
+                    spec.loader = _Loader(spec.loader)  # type: ignore[assignment]
+                return spec
+        return None
+
+
+class _Loader:
+    """Loads as another loader does, and wraps what was loaded."""
+
+    def __init__(self, real: Any) -> None:
+        self._real = real
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._real, name)
+
+    def create_module(self, spec: ModuleSpec) -> Any:
+        """A new module."""
+        return self._real.create_module(spec)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Fill it."""
+        module.__loader__ = self._real
+        if module.__spec__ is not None:
+            module.__spec__.loader = self._real
+        self._real.exec_module(module)
+        mujoco_tracing.wrap(module, sys.modules["re"])

@@ -1,0 +1,53 @@
+"""Which tool this is: a name for its code, its templates and what it bundles.
+
+Entry points: `tool_digest()`; `engine_digest()`, of what typesets formulas.
+
+The files' sizes and times tell one tool from another, so that none of them need be read. A tool
+that was installed anew makes everything once more, though it may be the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+
+from coursebuild.effects.resources import assets_dir, templates_dir
+
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
+
+
+@functools.cache
+def tool_digest() -> str:
+    """A hash over everything that the tool consists of, and the Python that runs it."""
+    return _digest(_PACKAGE, str(templates_dir()), str(assets_dir()))
+
+
+@functools.cache
+def engine_digest() -> str:
+    """A hash over what makes MathML of TeX."""
+    return _digest(str(assets_dir() / "temml"), os.path.join(_PACKAGE, "effects"))  # noqa: PTH118
+
+
+def _digest(*folders: str) -> str:
+    digest = hashlib.sha256(sys.version.encode())
+    for folder in folders:
+        for line in _lines(folder, ""):
+            digest.update(line.encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()
+
+
+def _lines(folder: str, inner: str) -> Iterator[str]:
+    """A line for each file, sorted, without the place of the folder."""
+    with os.scandir(folder) as entries:
+        found = sorted(entries, key=lambda entry: entry.name)
+    for entry in found:
+        name = f"{inner}/{entry.name}"
+        if entry.is_dir():
+            if entry.name != "__pycache__":
+                yield from _lines(entry.path, name)
+        elif not entry.name.endswith((".pyc", "~")):
+            status = entry.stat()
+            yield f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0"

@@ -1,0 +1,407 @@
+"""What a script looks at while it runs, noted in its own process as it happens.
+
+Entry point: `Tracer`, whose `install` adds an audit hook; `mujoco_tracing` tells it of the files
+that MuJoCo opens without Python's knowing.
+
+1. Events of Python's audit system say which files are opened, folders listed, modules imported and
+   programs started. Whatever lies in Python or an installed package is passed over at once.
+2. The rest becomes short records, each only once, in memory that is shared with the supervisor:
+   they are there however the script ends. A process that the script forks appends its records to a
+   file.
+
+A record is a letter and what it is about, in bytes:
+
+- `r` and a path: a file was read, or was to be and was not there
+- `l` and a path: a folder was listed
+- `m` and a name: a module was imported that is not Python's own, nor of the project
+- `n`, a folder, a tab and a name: a module that had been imported before scripts were, and all that
+  it imports, would have been found in this folder first
+- `o` and words: why there may be more
+
+This file is imported in a script's own process too, where nothing may stay behind, so it imports
+nothing but what every Python has loaded.
+"""
+
+from __future__ import annotations
+
+import posix
+import sys
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from types import FrameType
+    from typing import Protocol
+
+    class Sink(Protocol):
+        """Takes whole records, in one call each."""
+
+        def write(self, data: bytes, /) -> object:
+            """Add a record; a ValueError says that there is no more room."""
+            ...
+
+
+_WRITING = posix.O_WRONLY | posix.O_RDWR | posix.O_CREAT | posix.O_TRUNC | posix.O_APPEND
+_SYSTEM = ("/dev/", "/proc/", "/sys/")
+_BOOTSTRAP = "<frozen importlib._bootstrap>"
+_BOOTSTRAP_EXTERNAL = "<frozen importlib._bootstrap_external>"
+_READS_UNSEEN = frozenset(
+    "cv2 duckdb h5py lxml netCDF4 open3d osgeo polars pyarrow pybullet pydrake rasterio soundfile"
+    " tables tensorflow torch vtk vtkmodules".split()
+)
+"""Packages that open files in native code, which no audit event tells of."""
+_STARTS = frozenset(("multiprocessing.popen_spawn_posix", "multiprocessing.popen_forkserver"))
+"""Modules that are imported when programs are to be started, which no audit event tells of."""
+
+_CHANGES = {
+    "mkdir": ((0, 2),),
+    "remove": ((0, 1),),
+    "rmdir": ((0, 1),),
+    "chmod": ((0, 2),),
+    "chown": ((0, 3),),
+    "utime": ((0, 3),),
+    "truncate": ((0, 0),),
+    "symlink": ((1, 2),),
+    "link": ((1, 3),),
+    "rename": ((0, 2), (1, 3)),
+}
+"""Of events that change files, the positions of a path and of the folder that it is relative to."""
+_RELATIVE_OPENERS = frozenset(("_rmtree_safe_fd", "_rmtree_safe_fd_step", "_fwalk", "fwalk"))
+"""Functions of Python's own that open a folder by its name in another that they have open."""
+
+PROGRAMS = "it starts other programs"
+WRITES = "it writes files of the project"
+WRITES_OUTSIDE = "it writes files outside its temporary folder"
+NETWORK = "it uses the network"
+NATIVE = "it loads native code of the project"
+DATABASE = "it opens a database"
+LISTS_OUTSIDE = "it lists folders outside the project"
+TOO_MUCH = "it opens too many files to keep track of"
+
+
+class Tracer:
+    """Takes notes for one script.
+
+    `root` and `temporary` are absolute; `installed` are the folders of Python and its packages.
+    Records go to the sink; without one, and from processes that the script forks, to files in
+    `overflow`.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        temporary: str,
+        installed: Iterable[str],
+        overflow: str,
+        sink: Sink | None,
+    ) -> None:
+        self.root = root.rstrip("/") + "/"
+        self.temporary = temporary.rstrip("/") + "/"
+        cache = posix.environ.get(b"HOME", b"/nowhere").decode("utf-8", "surrogateescape")
+        self._installed = tuple(f"{folder.rstrip('/')}/" for folder in installed)
+        self._inside = tuple(f for f in self._installed if f.startswith(self.root))
+        self._around = tuple(f for f in self._installed if self.root.startswith(f))
+        self._ignored = (
+            *_SYSTEM,
+            self.temporary,
+            overflow,
+            f"{cache}/.cache/",
+            *(f for f in self._installed if f not in self._around),
+        )
+        self._sink = sink
+        self._overflow = overflow
+        self._pid = posix.getpid()
+        self._busy = False
+        self._seen: set[object] = set()
+        self._written: set[str] = set()
+        self._noted: set[str] = set()
+        self._builtin = frozenset(sys.builtin_module_names)
+        self._standard = sys.stdlib_module_names
+        self._is_frozen = sys.modules["_imp"].is_frozen
+        self.at_end: Callable[[], None] | None = None
+        """Is called when the interpreter has ended, but for giving back its memory."""
+
+    def install(self) -> None:
+        """Begin."""
+        handlers: dict[str, Callable[[tuple[object, ...]], None]] = {
+            "open": self._open,
+            "import": self._import,
+            "os.listdir": self._list,
+            "os.scandir": self._list,
+            "os.chdir": lambda args: self._seen.clear(),
+            "ctypes.dlopen": self._load,
+            "sqlite3.connect": self._connect,
+            "socket.connect": self._network,
+            "socket.bind": self._network,
+            "socket.sendto": self._network,
+            "socket.sendmsg": self._network,
+            "socket.getaddrinfo": self._network,
+            "socket.gethostbyname": self._network,
+            "socket.gethostbyaddr": self._network,
+            "cpython.PyInterpreterState_Clear": lambda args: self.at_end and self.at_end(),
+        }
+        for name in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "pty.spawn"):
+            handlers[name] = self._program
+        for name, paths in _CHANGES.items():
+            handlers[f"os.{name}"] = self._changer(paths)
+        find = handlers.get
+
+        def hook(event: str, args: tuple[object, ...]) -> None:
+            handler = find(event)
+            if handler is not None:
+                try:  # noqa: SIM105 (contextlib may not be loaded)
+                    handler(args)
+                except Exception:  # a script's own call must not fail for this
+                    pass
+
+        sys.addaudithook(hook)
+
+    def read(self, path: object) -> None:
+        """A file was opened for reading, or an attempt was made."""
+        at = self._relevant(path)
+        if at is not None and at not in self._written:
+            self._note(f"r{at}")
+
+    def imported(self, name: str, path: Sequence[object] | None) -> None:
+        """A module was looked for: it depends on what stands, or does not, in earlier folders."""
+        top, dot, _ = name.rpartition(".")
+        if dot:
+            package = sys.modules.get(top)
+            folders: Iterable[object] = getattr(package, "__path__", ())
+        elif name in self._builtin or self._is_frozen(name):
+            return
+        else:
+            folders = sys.path if path is None else path
+        last = name.rpartition(".")[2]
+        for folder in list(folders):
+            at = self._project_folder(folder)
+            if at is None:
+                continue
+            for candidate in (f"{at}/{last}/__init__.py", f"{at}/{last}.py"):
+                self._note(f"r{candidate}")
+                if _exists(candidate):
+                    return
+        if not dot and name not in self._standard:
+            self._note(f"m{name}")
+            if name in _READS_UNSEEN:
+                self.opaque(f"{name}, which it imports, opens files in native code")
+
+    def restored(self, name: str) -> None:
+        """A module that had been imported before was given to the script, with all its imports."""
+        for folder in list(sys.path):
+            at = self._project_folder(folder)
+            if at is not None:
+                self._note(f"n{at}\t{name}")
+        self._note(f"n\t{name}")
+
+    def write(self, path: object) -> None:
+        """A file was written, made, changed or removed."""
+        at = self._relevant(path)
+        if at is None:
+            return
+        self._written.add(at)
+        if not self.by_import():
+            self.opaque(WRITES if at.startswith(self.root) else WRITES_OUTSIDE)
+
+    def library(self, path: object) -> None:
+        """Native code was loaded from a file, or from all in a folder."""
+        at = self._relevant(path)
+        if at is not None and not self.by_import():
+            self._note(f"r{at}")
+            if at.startswith(self.root):
+                self.opaque(NATIVE)
+
+    def opaque(self, why: str) -> None:
+        """There may be more than is noted."""
+        self._note(f"o{why}")
+
+    def by_import(self) -> bool:
+        """Whether what happens is done by a package while it is imported, not by the script."""
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None:
+            name = frame.f_code.co_filename
+            if name == _BOOTSTRAP:
+                return True
+            if name.startswith(self.root) and not name.startswith(self._inside or ("\0",)):
+                return False
+            frame = frame.f_back
+        return False
+
+    # --- events
+
+    def _open(self, args: tuple[object, ...]) -> None:
+        path, mode, flags = args
+        if (path, flags) in self._seen:
+            return
+        if mode is None and sys._getframe(2).f_code.co_name in _RELATIVE_OPENERS:
+            return  # relative to a folder that the event does not name; that folder is known
+        self._seen.add((path, flags))
+        if isinstance(flags, int) and flags & _WRITING:
+            if flags & posix.O_RDWR and not flags & posix.O_TRUNC:
+                self.read(path)
+            self.write(path)
+        else:
+            self.read(path)
+
+    def _import(self, args: tuple[object, ...]) -> None:
+        name, file, path = args[:3]
+        if file is not None:
+            at = self._relevant(file)
+            if at is not None:
+                self._note(f"r{at}")
+                if at.startswith(self.root):
+                    self.opaque(NATIVE)
+        elif isinstance(name, str):
+            if name in _STARTS:
+                self.opaque(PROGRAMS)
+            self.imported(name, path if isinstance(path, list) else None)
+
+    def _list(self, args: tuple[object, ...]) -> None:
+        code = sys._getframe(2).f_code
+        if code.co_filename == _BOOTSTRAP_EXTERNAL:
+            return  # it looks for a module
+        path = args[0] if args[0] is not None else "."
+        at = self._relevant(_of_descriptor(path) if isinstance(path, int) else path)
+        if at is None:
+            return
+        if at == self.root[:-1] or at.startswith(self.root):
+            self._note(f"l{at}")
+        elif not self.by_import():
+            self.opaque(LISTS_OUTSIDE)
+
+    def _changer(self, paths: tuple[tuple[int, int], ...]) -> Callable[[tuple[object, ...]], None]:
+        def change(args: tuple[object, ...]) -> None:
+            for path, folder in paths:
+                self.write(_below(args[folder] if folder else -1, args[path]))
+
+        return change
+
+    def _program(self, args: tuple[object, ...]) -> None:
+        if not self.by_import():
+            self.opaque(PROGRAMS)
+
+    def _network(self, args: tuple[object, ...]) -> None:
+        address = args[1] if len(args) > 1 else None
+        if isinstance(address, bytes):
+            address = address.decode("utf-8", "surrogateescape")
+        # A socket in its own folder, or with a name that the system made up, is for its children.
+        if isinstance(address, str) and address.startswith((self.temporary, "\0")):
+            return
+        if not self.by_import():
+            self.opaque(NETWORK)
+
+    def _load(self, args: tuple[object, ...]) -> None:
+        name = args[0]
+        if isinstance(name, str) and "/" in name:
+            self.library(name)
+
+    def _connect(self, args: tuple[object, ...]) -> None:
+        if args[0] not in (":memory:", b":memory:", "") and self._relevant(args[0]) is not None:
+            self.opaque(DATABASE)
+
+    # --- paths
+
+    def _relevant(self, path: object) -> str | None:
+        """The absolute path of something whose content may matter; `None` where it does not."""
+        if isinstance(path, bytes):
+            path = path.decode("utf-8", "surrogateescape")
+        if not isinstance(path, str):
+            return None  # a descriptor, whose file was opened before
+        if path.startswith(self._ignored) and "/.." not in path:
+            return None
+        if not path.startswith("/"):
+            path = f"{posix.getcwd()}/{path}"
+        at = _normal(path)
+        if at.startswith(self._ignored) or at == self.temporary[:-1]:
+            return None
+        if self._around and not at.startswith(self.root) and at.startswith(self._installed):
+            return None
+        return at
+
+    def _project_folder(self, folder: object) -> str | None:
+        if not isinstance(folder, str):
+            return None
+        at = self._relevant(folder or ".")
+        if at is not None and f"{at}/".startswith(self.root):
+            return at
+        return None
+
+    def _note(self, record: str) -> None:
+        if record in self._noted:
+            return
+        self._noted.add(record)
+        data = record.encode("utf-8", "surrogateescape") + b"\0"
+        if self._sink is not None and posix.getpid() == self._pid:
+            try:
+                self._sink.write(data)
+            except ValueError:
+                self._spill(f"o{TOO_MUCH}\0".encode())
+        else:
+            self._spill(data)
+
+    def _spill(self, data: bytes) -> None:
+        if self._busy:  # this is its own opening of a file, which is an event as well
+            return
+        self._busy = True
+        try:
+            try:  # noqa: SIM105
+                posix.mkdir(self._overflow)
+            except FileExistsError:
+                pass
+            flags = posix.O_WRONLY | posix.O_CREAT | posix.O_APPEND | posix.O_CLOEXEC
+            fd = posix.open(f"{self._overflow}/{posix.getpid()}", flags, 0o600)
+            try:
+                posix.write(fd, data)
+            finally:
+                posix.close(fd)
+        finally:
+            self._busy = False
+
+
+def _normal(path: str) -> str:
+    """An absolute path without `.`, `..` and repeated slashes."""
+    if "/." not in path and "//" not in path and not path.endswith("/"):
+        return path
+    parts: list[str] = []
+    for part in path.split("/"):
+        if part == "..":
+            if parts:
+                parts.pop()
+        elif part not in ("", "."):
+            parts.append(part)
+    return "/" + "/".join(parts)
+
+
+def _below(folder: object, path: object) -> object:
+    """A path that may be relative to a folder given as a descriptor."""
+    if isinstance(path, bytes):
+        path = path.decode("utf-8", "surrogateescape")
+    if not isinstance(folder, int) or folder < 0 or not isinstance(path, str) or path[:1] == "/":
+        return path
+    return f"{_of_descriptor(folder)}/{path}"
+
+
+def _of_descriptor(fd: int) -> str:
+    """The path of a file that is open, where the system tells."""
+    try:
+        return posix.readlink(f"/proc/self/fd/{fd}")
+    except OSError:
+        return "/dev/fd/unknown"
+
+
+def _exists(path: str) -> bool:
+    try:
+        posix.stat(path)
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def installed_folders() -> list[str]:
+    """The folders of Python's own modules and of installed packages, also as they really are."""
+    site = sys.modules["site"]
+    os = sys.modules["os"]
+    found = {os.path.dirname(os.__file__), *site.getsitepackages()}
+    if site.ENABLE_USER_SITE:
+        found.add(site.getusersitepackages())
+    return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})

@@ -1,0 +1,102 @@
+"""What the rest of a course must know of a document, without its prose.
+
+Entry point: `skeleton(document)`, a document of the same type whose walk (`document_blocks`,
+`document_inlines`) meets, in the same order, everything that somebody other than the document's own
+page looks at, or for which that page looks up something elsewhere: headings with their anchors,
+scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, callouts, links, pictures, raw HTML.
+
+1. Containers are opened, since nobody outside the page asks what stands in what.
+2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
+3. Formulas are left out, but for those of recorded tables: that they parse is found out where the
+   whole document is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import assert_never
+
+from coursebuild.model.blocks import (
+    Block,
+    BlockQuote,
+    Callout,
+    CodeBlock,
+    Document,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Io,
+    ListBlock,
+    MathBlock,
+    Mjcf,
+    Paragraph,
+    PlainCode,
+    Recording,
+    Script,
+    Table,
+    ThematicBreak,
+)
+from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInline
+from coursebuild.model.interactive import Lab, OutputQuestion, Quiz
+from coursebuild.model.walk import block_inlines, document_blocks, walk_inlines
+from coursebuild.source import Span
+from coursebuild.values import replace
+
+_KEPT = (Link, Image, NumberBinding, RawInline)
+
+
+def skeleton(document: Document) -> Document:
+    """The document without what only its own page shows."""
+    recorded: set[int] = set()
+    kept: list[Block] = []
+    for block in document_blocks(document):
+        if isinstance(block, Recording):
+            recorded.add(id(block.body))
+        if id(block) not in recorded:  # a recorded table stays in its recording
+            kept += _bones(block)
+    return Document(document.source, tuple(kept), ())
+
+
+def _bones(block: Block) -> Iterator[Block]:
+    """What stays of a block, without the blocks in it, which come by themselves."""
+    match block:
+        case Heading():
+            yield replace(block, children=_inlines(block))
+        case Script() | Mjcf() | HtmlBlock():
+            yield block
+        case Recording():
+            yield replace(block, caption=_inlines(block))
+        case Lab():
+            yield replace(block, note=())
+        case Quiz():
+            yield replace(block, questions=tuple(_questions(block)))
+            yield from _text(block.span, _inlines(block))
+        case Callout():
+            yield replace(block, title=_inlines(block), blocks=())
+        case Paragraph() | HtmlFlow() | Io() | Table():
+            yield from _text(block.span, _inlines(block))
+        case BlockQuote() | ListBlock() | CodeBlock() | PlainCode() | ThematicBreak() | MathBlock():
+            pass
+        case _:
+            assert_never(block)
+
+
+def _text(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:
+    if inlines:
+        yield Paragraph(span, inlines)
+
+
+def _inlines(block: Block) -> tuple[Inline, ...]:
+    """The inlines of a block that stay, one after the other: none is in another."""
+    return tuple(
+        replace(inline, children=()) if isinstance(inline, Link) else inline
+        for inline in walk_inlines(block_inlines(block))
+        if isinstance(inline, _KEPT)
+    )
+
+
+def _questions(quiz: Quiz) -> Iterator[OutputQuestion]:
+    """The questions whose answer a script gives."""
+    for question in quiz.questions:
+        if isinstance(question, OutputQuestion):
+            yield replace(question, text=(), explain=(), hints=())

@@ -1,0 +1,178 @@
+"""MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
+
+Entry points: `compiled`, `simulate`.
+
+1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
+2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
+   the state before the step, so it is computed again, on other data, from the state sampled.
+3. Steps between two looks are made in one call.
+"""
+
+from __future__ import annotations
+
+import copy
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from coursebuild.physics.detector import Judgement, deepest_contact, judge, observe
+from coursebuild.physics.problem import Array, Integrator, Motion, Problem, whole_number
+from coursebuild.values import dataclass
+
+_CODE = {
+    Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
+    Integrator.EULER_EXPLICIT: mujoco.mjtIntegrator.mjINT_EULER,
+    Integrator.IMPLICIT: mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    Integrator.IMPLICITFAST: mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    Integrator.RK4: mujoco.mjtIntegrator.mjINT_RK4,
+    Integrator.DISCRETE: mujoco.mjtIntegrator.mjINT_DISCRETE,
+}
+
+
+@lru_cache(maxsize=64)
+def _original(mjcf: str) -> Any:
+    return mujoco.MjModel.from_xml_string(mjcf)
+
+
+def compiled(mjcf: str, integrator: Integrator, timestep: float) -> Any:
+    """A `mjModel` of its own with this integrator and timestep (s), and automatic reset off.
+
+    Raises:
+        ValueError: the MJCF is wrong.
+    """
+    model = copy.copy(_original(mjcf))
+    model.opt.integrator = int(_CODE[integrator])
+    model.opt.timestep = timestep
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if integrator is Integrator.EULER_EXPLICIT:
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    return model
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A simulation, looked at n times."""
+
+    times: Array
+    """(n,) s."""
+    qpos: Array
+    """(n, nq)."""
+    qvel: Array
+    """(n, nv)."""
+    energy: Array
+    """(n + 1, 2) J: potential and kinetic, first those of the beginning."""
+    momentum: Array
+    """(n + 1, 3) kg m²/s: angular, of everything about its centre of mass, in the world's frame."""
+    penetration: float
+    """Deepest contact at those times, m."""
+    judgement: Judgement
+
+
+def simulate(problem: Problem, integrator: Integrator, timestep: float) -> Run:
+    """Run the problem's scenario.
+
+    Raises:
+        ValueError: the timestep (s) does not divide the interval of the looks.
+    """
+    return simulate_model(problem, compiled(problem.mjcf, integrator, timestep))
+
+
+def simulate_model(problem: Problem, model: Any) -> Run:
+    """Run the problem's scenario with a model whose options were set otherwise.
+
+    Raises:
+        ValueError: its timestep does not divide the interval of the looks.
+    """
+    scenario = problem.scenario
+    step = float(model.opt.timestep)
+    every = whole_number(scenario.sample, step, "the sampling interval", "the timestep")
+    times = scenario.times
+    data, other = begun(problem, model), mujoco.MjData(model)
+    qpos = np.empty((len(times), model.nq))
+    qvel = np.empty((len(times), model.nv))
+    kept = [invariants(model, other, data.qpos, data.qvel)]
+    depth = deepest_contact(other)
+    holds = held(problem)
+    for index in range(len(times)):
+        if scenario.controls:
+            data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
+        mujoco.mj_step(model, data, every)
+        qpos[index], qvel[index] = data.qpos, data.qvel
+        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+            qpos[index:], qvel[index:] = np.nan, np.nan
+            times_done = index + 1
+            break
+        kept.append(invariants(model, other, data.qpos, data.qvel))
+        depth = max(depth, deepest_contact(other))
+    else:
+        times_done = len(times)
+    seen = observe(
+        model,
+        data,
+        times_done * every * step,
+        qpos=qpos,
+        qvel=qvel,
+        bounds=(problem.position_bound, problem.velocity_bound),
+        penetration=depth,
+        deepest=problem.penetration_bound,
+    )
+    kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
+    table = np.array(kept)
+    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], depth, judge(seen))
+
+
+def begun(problem: Problem, model: Any) -> Any:
+    """`mjData` in the initial state of the problem's scenario."""
+    data = mujoco.MjData(model)
+    scenario = problem.scenario
+    if scenario.qpos:
+        data.qpos[:] = scenario.qpos
+    if scenario.qvel:
+        data.qvel[:] = scenario.qvel
+    if scenario.controls:
+        data.ctrl[:] = scenario.controls[0]
+    return data
+
+
+def held(problem: Problem) -> int:
+    """Looks for which a command holds."""
+    scenario = problem.scenario
+    if not scenario.hold:
+        return 1
+    return whole_number(scenario.hold, scenario.sample, "the hold", "the sampling interval")
+
+
+def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
+    """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
+
+    `other` is data that nothing else uses.
+    """
+    other.qpos[:], other.qvel[:] = qpos, qvel
+    mujoco.mj_fwdPosition(model, other)
+    mujoco.mj_fwdVelocity(model, other)
+    mujoco.mj_energyPos(model, other)
+    mujoco.mj_energyVel(model, other)
+    mujoco.mj_subtreeVel(model, other)
+    return np.concatenate([other.energy, other.subtree_angmom[0]])
+
+
+def motion_of(model: Any, times: Array, qpos: Array, qvel: Array) -> Motion:
+    """Coordinates (n, nq), (n, nv) sorted into positions, attitudes and velocities."""
+    place: list[int] = []
+    turns: list[int] = []
+    for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
+        at = int(start)
+        match mujoco.mjtJoint(int(kind)):
+            case mujoco.mjtJoint.mjJNT_FREE:
+                place += [at, at + 1, at + 2]
+                turns.append(at + 3)
+            case mujoco.mjtJoint.mjJNT_BALL:
+                turns.append(at)
+            case _:
+                place.append(at)
+    attitude = np.empty((len(times), len(turns), 4))
+    for index, at in enumerate(turns):
+        attitude[:, index] = qpos[:, at : at + 4]
+    return Motion(times, qpos[:, place], attitude, qvel)

@@ -1,0 +1,116 @@
+"""A high-order integration for references: Gragg's midpoint rule, extrapolated (Bulirsch–Stoer).
+
+Entry point: `integrate(rate, start, times, tolerance)`.
+
+1. A step of length H is made by the modified midpoint rule with 2, 4, …, 2k substeps; its error has
+   only even powers of the substep, so that Neville's scheme removes them one by one (order 2k).
+2. The difference of the last two columns is the error estimate; H follows it.
+3. The given times are always ends of steps, so that nothing is interpolated.
+
+The state may be of any numbers that numpy adds and multiplies: float64, or `decimal.Decimal` in an
+object array for a reference with more digits.
+
+Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+State = NDArray[Any]
+"""(d,) float64, or objects of `Decimal`."""
+Rate = Callable[[State], State]
+"""dy/dt of an autonomous system."""
+
+COLUMNS = 8
+_SHRINK, _GROW, _SAFETY = 0.2, 2.5, 0.85
+
+
+class NoConvergenceError(ArithmeticError):
+    """The step became too small: the problem is not smooth there."""
+
+
+def integrate(
+    rate: Rate,
+    start: State,
+    times: NDArray[np.float64],
+    tolerance: float = 1e-14,
+    *,
+    columns: int = COLUMNS,
+    first: float = 1e-2,
+) -> State:
+    """The states (n, d) at the times (n,), which rise; `start` (d,) is the state at time 0.
+
+    `tolerance` bounds the estimated error of a step, relative to 1 + |y| in each component;
+    `columns` is half the order; `first` the first step tried, in seconds.
+
+    Raises:
+        NoConvergenceError: no step is small enough.
+    """
+    exact = start.dtype == object
+    y, now, trial = start.copy(), Decimal(0) if exact else 0.0, first
+    carry = np.zeros_like(y) if not exact else None
+    found = []
+    for time in times.tolist():
+        goal: Any = Decimal(time) if exact else time
+        while now < goal:
+            left = float(goal - now)
+            whole = trial >= left * (1 - 1e-12)
+            step: Any = goal - now if whole else (Decimal(trial) if exact else trial)
+            change, error = _extrapolated(rate, y, step, columns)
+            ratio = error / tolerance
+            if not ratio <= 1.0:  # also when it is no number
+                factor = _SAFETY * ratio ** (-1 / (2 * columns - 1)) if ratio < 1e300 else _SHRINK
+                trial = float(step) * max(_SHRINK, min(factor, 0.9))
+                if trial < 1e-12 * first:
+                    raise NoConvergenceError(f"no step is small enough at {float(now):.6g} s")
+                continue
+            if carry is None:
+                y = y + change
+            else:  # Kahan's sum: many small steps must not add up roundings
+                change = change - carry
+                total = y + change
+                carry = (total - y) - change
+                y = total
+            now = goal if whole else now + step
+            grown = float(step) * min(_GROW, _SAFETY * max(ratio, 1e-12) ** (-1 / (2 * columns)))
+            trial = max(trial, grown) if whole else grown
+        found.append(y.copy())
+    return np.array(found)
+
+
+def _extrapolated(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, float]:
+    """The change of y over a step, and its estimated error relative to 1 + |y|."""
+    slope = rate(y)
+    rows: list[State] = []
+    substeps: list[int] = []
+    for j in range(1, columns + 1):
+        n = 2 * j
+        substeps.append(n)
+        new = [_midpoint(rate, y, slope, step, n)]
+        for k in range(1, j):
+            a, b = n * n, substeps[j - 1 - k] ** 2
+            new.append(new[-1] + (new[-1] - rows[k - 1]) * b / (a - b))
+        rows = new
+    size = 1.0 + np.abs(y.astype(float))
+    with np.errstate(invalid="ignore", over="ignore"):
+        error = np.max(np.abs((rows[-1] - rows[-2]).astype(float)) / size)
+    return rows[-1], float(error)
+
+
+def _midpoint(rate: Rate, y: State, slope: State, step: Any, n: int) -> State:
+    """The change of y by Gragg's smoothed midpoint rule with n (even) substeps."""
+    h = step / n
+    before, change = np.zeros_like(y), h * slope
+    if y.dtype == object:
+        before = before + Decimal(0)
+    for _ in range(n - 1):
+        before, change = change, before + 2 * h * rate(y + change)
+    last = h * rate(y + change)
+    smooth: State = (before + change + last) / 2
+    return smooth

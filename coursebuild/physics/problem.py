@@ -1,0 +1,165 @@
+"""What a hard case is: a model, what happens in it, and what exactly would happen.
+
+Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `Figure`, `Integrator`.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coursebuild.values import dataclass
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+class Integrator(enum.Enum):
+    """MuJoCo's integrators, as the attribute `integrator` of `<option>` names them."""
+
+    EULER = "Euler"
+    """Semi-implicit; joint damping is implicit where MuJoCo's `eulerdamp` is on, as it is."""
+    EULER_EXPLICIT = "Euler, eulerdamp off"
+    """Semi-implicit, with damping taken at the beginning of the step."""
+    IMPLICIT = "implicit"
+    IMPLICITFAST = "implicitfast"
+    RK4 = "RK4"
+    DISCRETE = "discrete"
+
+    @property
+    def mjcf_name(self) -> str:
+        """What `<option integrator="…">` says."""
+        return "Euler" if self is Integrator.EULER_EXPLICIT else self.value
+
+
+INTEGRATORS: tuple[Integrator, ...] = tuple(Integrator)
+STANDARD: tuple[Integrator, ...] = tuple(
+    one for one in Integrator if one is not Integrator.EULER_EXPLICIT
+)
+"""Those with a name of their own in MJCF."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """What happens: where it begins, how long it takes, what is commanded, when it is looked at."""
+
+    duration: float
+    """Seconds; a multiple of `sample`."""
+    sample: float
+    """Seconds from one look at the state to the next; every timestep divides it."""
+    qpos: tuple[float, ...] = ()
+    """Initial positions, as `mjData.qpos`; the model's own where there are none."""
+    qvel: tuple[float, ...] = ()
+    """Initial velocities, as `mjData.qvel`; zero where there are none."""
+    controls: tuple[tuple[float, ...], ...] = ()
+    """Commands one after the other, each for `hold` seconds, the last to the end."""
+    hold: float = 0.0
+    """Seconds, a multiple of `sample`: commands change on a grid that all timesteps share."""
+
+    @property
+    def times(self) -> Array:
+        """When the state is looked at, (n,) s: `sample`, 2 `sample`, …, `duration`."""
+        count = whole_number(self.duration, self.sample, "the duration", "the sampling interval")
+        return np.asarray(np.arange(1, count + 1) * (self.duration / count), dtype=np.float64)
+
+
+def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:
+    """How many times `part` goes into `length`.
+
+    Raises:
+        ValueError: not a whole number of times, so that an end would not be reached.
+    """
+    count = round(length / part)
+    if count < 1 or abs(count * part - length) > 1e-9 * length:
+        message = f"{length_name} ({length:g} s) is no multiple of {part_name} ({part:g} s)"
+        raise ValueError(message)
+    return count
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """States at n times, with attitudes apart from positions: their errors have other orders."""
+
+    times: Array
+    """(n,) s."""
+    position: Array
+    """(n, p) m or rad: coordinates of slides, hinges and places of free bodies, in `qpos` order."""
+    attitude: Array
+    """(n, a, 4): unit quaternions of ball joints and free bodies, body to world."""
+    velocity: Array
+    """(n, v) m/s or rad/s, as `qvel`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What exactly happens, and how well that is known."""
+
+    kind: Literal["closed", "ode", "self"]
+    """A closed form, an independent integration, or the same engine with smaller timesteps."""
+    source: str
+    """Where it comes from."""
+    motion: Callable[[Array], Motion]
+    """Times (n,), rising, in s → the motion."""
+    floor: float
+    """Errors of the reference itself: in m, rad, m/s and rad/s, over the problem's duration."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What theory says of the largest stable timestep of an integrator."""
+
+    timestep: float
+    """Seconds; infinite where every timestep is stable, 0 where none is."""
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A quantity of a hard case that is known exactly and can be measured."""
+
+    name: str
+    unit: str
+    exact: Callable[[Integrator], float | None]
+    """What it is in theory, where theory says it for this integrator."""
+    measure: Callable[[Integrator], float]
+    source: str
+    integrators: tuple[Integrator, ...] = STANDARD
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A hard case."""
+
+    name: str
+    """As the command line takes it, such as `tumbling-box`."""
+    title: str
+    case: int
+    """Its number on the list of hard cases."""
+    mjcf: str
+    """Minimal, without timestep and integrator."""
+    scenario: Scenario
+    position_bound: float
+    """Largest |qpos| that can be, in m or rad; what is beyond grows that should not."""
+    velocity_bound: float
+    """Largest |qvel| that can be, in m/s or rad/s."""
+    reference: Reference | None = None
+    second: Reference | None = None
+    """Made in another way, to check the first."""
+    agreement: float = 1e-10
+    """How well both agree over the duration, in m, rad, m/s and rad/s."""
+    timesteps: tuple[float, ...] = ()
+    """The ladder of timesteps for work against precision, s, falling."""
+    figures: tuple[Figure, ...] = ()
+    limit: Callable[[Integrator], Limit | None] | None = None
+    """Theory of the largest stable timestep; `None` where there is none to be had."""
+    search: tuple[float, float] | None = None
+    """Timesteps (s) between which the largest stable one is looked for."""
+    steps: int = 20_000
+    """Steps after which what grows must have shown itself."""
+    penetration_bound: float = float("inf")
+    """Deepest contact that is no fault, m."""
+    note: str = ""
+    """What to know when reading the figures."""

@@ -1,0 +1,255 @@
+"""`coursebuild explain PATH`: would it run again, why, and what depends on it.
+
+Entry point: `explain(options, name)`. The lessons are read and parsed; nothing is run, compiled or
+written, and neither NumPy nor MuJoCo is imported.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+from coursebuild.diagnostics import nearest
+from coursebuild.effects.mjcf import parts
+from coursebuild.model import (
+    Course,
+    Document,
+    ExampleTarget,
+    Image,
+    Lab,
+    Lesson,
+    Link,
+    ModelTarget,
+    NumberBinding,
+    Page,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    local_file,
+    walk_inlines,
+)
+from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.remember import Memory
+from coursebuild.report.explained import Explained, Explanation, State
+from coursebuild.scripts.dependencies import (
+    Inputs,
+    Kind,
+    described,
+    input_changes,
+    sought_files,
+    state_changes,
+)
+from coursebuild.scripts.extract import extract, jobs
+from coursebuild.scripts.remembered import Record
+
+
+def explain(options: Options, name: str) -> Explanation:
+    """What is known of a script, a lesson or page, a model, or any file of the project.
+
+    Raises:
+        UsageError: the course cannot be read, or nothing in it is called so.
+    """
+    course = load(options.root).course
+    if course is None:
+        raise UsageError("the course map cannot be read; `coursebuild check` says why")
+    return _Explainer(course, options).of(name)
+
+
+class _Explainer:
+    def __init__(self, course: Course, options: Options) -> None:
+        self.course = course
+        self.root = options.root
+        self.memory = Memory(options.root, options.store)
+        self.models = {
+            model.source.path: parts(options.root, model.source.path, model.source.text)
+            for model in course.models
+        }
+        extractions = extract(course).value
+        self.scripts = {
+            extraction.path: (extraction, job)
+            for extraction, job in zip(extractions, jobs(extractions), strict=True)
+        }
+        self.labs = {
+            name: (owner, lab) for owner, name, lab in labs_of(course) if lab.kind == SIMULATED
+        }
+
+    def of(self, name: str) -> Explanation:
+        for candidate in (name, self._from_root(name)):
+            found = self._named(candidate)
+            if found is not None:
+                return found
+        path = self._from_root(name)
+        dependents = self._dependents(path)
+        whole = self._part_of(path)
+        if not dependents and not whole and not (self.root / path).exists():
+            near = nearest(name, [*self.scripts, *self._documents()])
+            help = f"; did you mean `{near}`?" if near is not None else ""
+            raise UsageError(f"nothing of this course is called `{name}`{help}")
+        return self._file(path, "file", dependents)
+
+    def _named(self, name: str) -> Explanation | None:
+        if name in self.scripts:
+            dependents = self._dependents(name)
+            own = self._script(name)
+            return Explanation(name, "script", (own,), dependents, shown=self._shown(name))
+        part = self._documents().get(name)
+        if part is not None:
+            scripts = [
+                self._script(p) for p, (e, _) in self.scripts.items() if e.document == part.path
+            ]
+            labs = [self._lab(n) for n, (_, lab) in self.labs.items() if lab.span.path == part.path]
+            kind: Literal["lesson", "page"] = "lesson" if isinstance(part, Lesson) else "page"
+            return Explanation(part.path, kind, (*scripts, *labs))
+        for model in self.course.models:
+            path = model.source.path
+            if name in (model.name, path):
+                return self._file(path, "model", self._dependents(path))
+        return None
+
+    def _file(
+        self, path: str, kind: Literal["model", "file"], dependents: tuple[Explained, ...]
+    ) -> Explanation:
+        files = self.models.get(path, ())
+        whole, shown = self._part_of(path), self._shown(path)
+        return Explanation(path, kind, (), dependents, files, whole, shown)
+
+    def _part_of(self, path: str) -> tuple[str, ...]:
+        return tuple(model for model, files in self.models.items() if path in files)
+
+    def _from_root(self, name: str) -> str:
+        """A path as the course writes it: given from its folder, or from the working directory."""
+        for start in (Path.cwd(), self.root):
+            path = Path(os.path.normpath(start / name))
+            if path.is_relative_to(self.root) and (path.exists() or start == self.root):
+                return path.relative_to(self.root).as_posix()
+        return name
+
+    def _documents(self) -> dict[str, Lesson | Page]:
+        found: dict[str, Lesson | Page] = {}
+        for page in self.course.pages:
+            found |= {page.id: page, page.path: page}
+        for lesson in self.course.lessons:
+            file = f"{lesson.id}-{lesson.slug}"
+            for alias in (lesson.slug, file, f"{file}.md", lesson.path, lesson.id):
+                found[alias] = lesson
+        return found
+
+    # --- scripts and labs
+
+    def _script(self, path: str) -> Explained:
+        extraction, job = self.scripts[path]
+        if job.norun:
+            return Explained("script", path, extraction.owner, "norun")
+        inputs = self.memory.inputs(job, extraction.data)
+        record = self.memory.remembered(inputs)
+        if record is not None:
+            return _explained("script", path, extraction.owner, record, ())
+        last = self.memory.last(path)
+        reasons = self._reasons(last, inputs)
+        return _explained("script", path, extraction.owner, last, tuple(reasons))
+
+    def _lab(self, name: str) -> Explained:
+        owner, lab = self.labs[name]
+        inputs = lab_inputs(lab, name)
+        last = self.memory.last(inputs.path)
+        holds = last is not None and self._lab_holds(last, inputs)
+        reasons = [] if holds else self._reasons(last, inputs)
+        return _explained("lab", name, owner, last, tuple(reasons))
+
+    def _lab_holds(self, last: Record, inputs: Inputs) -> bool:
+        same = not last.forgotten and last.inputs == inputs
+        return same and not list(state_changes(last.dependencies, self.memory.states))
+
+    def _reasons(self, last: Record | None, inputs: Inputs) -> list[str]:
+        if last is None:
+            return ["there is no result of it on this machine"]
+        found = input_changes(last.inputs, inputs)
+        found += state_changes(last.dependencies, self.memory.states)
+        if last.forgotten:
+            found.append(f"its last result is not remembered: {last.forgotten}")
+        return found or ["its result is no longer kept"]
+
+    def _dependents(self, path: str) -> tuple[Explained, ...]:
+        """Scripts and labs whose last results depend on a file or on the listing of its folder."""
+        found = []
+        for script in self.scripts:
+            if script != path and self._depends(self.memory.last(script), path):
+                found.append(self._script(script))
+        for name, (_, lab) in self.labs.items():
+            inputs = lab_inputs(lab, name)
+            model = f"models/{lab.model}.xml" if lab.model else ""
+            if model == path or self._depends(self.memory.last(inputs.path), path):
+                found.append(self._lab(name))
+        return tuple(found)
+
+    def _depends(self, last: Record | None, path: str) -> bool:
+        folder = path.rpartition("/")[0]
+        return last is not None and any(
+            (d.kind is Kind.FILE and d.name == path)
+            or (d.kind is Kind.LISTING and d.name in (path, folder))
+            or (d.kind is Kind.SOUGHT and path in sought_files(d.name))
+            for d in last.dependencies
+        )
+
+    # --- pages
+
+    def _shown(self, path: str) -> tuple[str, ...]:
+        return tuple(
+            document.source.path
+            for document in self.course.documents
+            if any(True for _ in _uses(document, path))
+        )
+
+
+def _uses(document: Document, path: str) -> Iterator[object]:
+    """What in a document shows a file, links to it, or quotes its output."""
+    for block in document_blocks(document):
+        if isinstance(block, Lab) and block.model and f"models/{block.model}.xml" == path:
+            yield block
+        for inline in walk_inlines(block_inlines(block)):
+            match inline:
+                case Image(url=url) if local_file(url, document.source.path) == path:
+                    yield inline
+                case Link(target=UrlTarget(url=url)) if _local(url, document, path):
+                    yield inline
+                case Link(target=ModelTarget(name=name)) if f"models/{name}.xml" == path:
+                    yield inline
+                case Link(target=ExampleTarget(path=other)) if other == path:
+                    yield inline
+                case NumberBinding(script=script) if script == path:
+                    yield inline
+                case _:
+                    pass
+
+
+def _local(url: str, document: Document, path: str) -> bool:
+    return "://" not in url and local_file(url, document.source.path) == path
+
+
+def _explained(
+    kind: Literal["script", "lab"],
+    name: str,
+    owner: str,
+    record: Record | None,
+    reasons: tuple[str, ...],
+) -> Explained:
+    state: State = "would run" if reasons else "remembered"
+    if record is None:
+        return Explained(kind, name, owner, state, reasons)
+    depends = [described(dependency) for dependency in record.dependencies]
+    depends += [f"{what}: {value}" for what, value in record.inputs.around]
+    return Explained(
+        kind,
+        name,
+        owner,
+        state,
+        reasons,
+        tuple(depends),
+        record.made,
+        record.seconds,
+        record.outcome.value,
+    )

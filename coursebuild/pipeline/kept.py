@@ -1,0 +1,46 @@
+"""Templates and words in the form in which they are used, kept in the store.
+
+Entry points: `CompiledTemplates`, `words_for`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from coursebuild.effects.store import Store
+from coursebuild.effects.tool import tool_digest
+from coursebuild.render.strings import Strings
+
+_TEMPLATES, _WORDS = "templates", "words"
+
+
+class CompiledTemplates:
+    """The code that templates were compiled to, in the store."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def load(self, name: str) -> bytes | None:
+        """The code of a template, by a name that says all that it depends on but the tool."""
+        return None if self._store.fresh else self._store.peek(_TEMPLATES, self._key(name))
+
+    def keep(self, name: str, data: bytes) -> None:
+        """Keep the code of a template."""
+        self._store.keep(_TEMPLATES, self._key(name), data, local=True)
+
+    def _key(self, name: str) -> str:
+        return hashlib.sha256(f"{tool_digest()}\0{name}".encode()).hexdigest()
+
+
+def words_for(store: Store, texts: tuple[tuple[str, str], ...], language: str) -> Strings:
+    """The interface's words in a language, by the texts of the tool's files."""
+    key = hashlib.sha256(f"{tool_digest()}\0{language}".encode()).hexdigest()
+    data = None if store.fresh else store.peek(_WORDS, key)
+    if data is not None:
+        return Strings.of(json.loads(data))
+    from coursebuild.render.assets import strings_for
+
+    words = strings_for(texts, language)
+    store.keep(_WORDS, key, json.dumps(dict(words.entries)).encode(), local=True)
+    return words

@@ -1,0 +1,107 @@
+"""What is known of a document without its text, kept from build to build.
+
+Entry points: `Task`, a text; `Outline`; `packed` and `unpacked`, an outline as bytes, `pack` and
+`unpack`, any value whose places are in one source.
+
+An outline as bytes holds no text of the document but that of its scripts and the like: it is put
+together with the source again, which whoever unpacks it has read anyway.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pickle
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.tool import engine_digest, tool_digest
+from coursebuild.model import Document
+from coursebuild.source import Source
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A text to parse."""
+
+    source: Source
+    callouts: frozenset[str]
+    lesson: bool
+
+    @property
+    def key(self) -> str:
+        """A hash of all that its outline depends on."""
+        digest = hashlib.sha256(f"{tool_digest()}\0{engine_digest()}\0{self.lesson}".encode())
+        for part in (*sorted(self.callouts), "", self.source.path, self.source.text):
+            digest.update(b"\0" + part.encode("utf-8", "surrogatepass"))
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """A parsed text: what others than its own page look at, and what is wrong in it."""
+
+    skeleton: Document
+    diagnostics: tuple[Diagnostic, ...]
+    """Those of formulas among them."""
+    imports: Mapping[str, tuple[str, ...]]
+    """Modules that each script imports, by its path."""
+    lasting: bool
+    """Whether the same text gives the same again."""
+
+
+class _Packer(pickle.Pickler):
+    """Leaves out the source."""
+
+    def persistent_id(self, value: object) -> int | None:
+        """The source has a name in place of its content."""
+        return 0 if type(value) is Source else None
+
+
+class _Unpacker(pickle.Unpickler):
+    """Puts the source in."""
+
+    def __init__(self, data: bytes, source: Source) -> None:
+        super().__init__(io.BytesIO(data))
+        self.source = source
+
+    def persistent_load(self, name: object) -> Source:
+        """There is only one."""
+        return self.source
+
+
+def pack(value: object) -> bytes:
+    """A value as bytes, without the one source that all its places are in."""
+    out = io.BytesIO()
+    _Packer(out, pickle.HIGHEST_PROTOCOL).dump(value)
+    return out.getvalue()
+
+
+def unpack(data: bytes, source: Source) -> Any:
+    """The value that `pack` was given; `None` where the bytes are none."""
+    try:
+        return _Unpacker(data, source).load()
+    except Exception:  # whatever damaged bytes make of it
+        return None
+
+
+def packed(outline: Outline) -> bytes:
+    """An outline as bytes."""
+    return pack((outline.skeleton, outline.diagnostics, dict(outline.imports), outline.lasting))
+
+
+def unpacked(data: bytes, source: Source) -> Outline | None:
+    """The outline of a source; `None` where the bytes are none."""
+    found = unpack(data, source)
+    return Outline(*found) if isinstance(found, tuple) and len(found) == 4 else None
+
+
+def all_imports(outlines: Iterable[Outline]) -> dict[str, frozenset[str]]:
+    """Modules by the path of the script that imports them."""
+    return {
+        path: frozenset(modules)
+        for outline in outlines
+        for path, modules in outline.imports.items()
+    }

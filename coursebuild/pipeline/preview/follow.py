@@ -1,0 +1,85 @@
+"""From events of the file system to saves, and from saves to pages.
+
+Entry point: `follow(live, watcher, notice, said)`, which a thread of its own runs.
+
+1. What one save of an editor comes to (an empty file that is written next, a new file that takes
+   the place of the old one) counts once: when nothing more happened for ten milliseconds. While
+   that is awaited the page is made already, so that it costs no time.
+2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
+3. A document that is gone or empty may be so only for a moment.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from coursebuild.effects.watch import Watcher
+from coursebuild.pipeline.preview.live import MOST, LiveCourse, Plan
+from coursebuild.render.library import owners
+
+QUIET = 0.008
+"""Seconds without an event after which a save is complete; the watcher waits two more."""
+QUIET_MANY = 0.060
+"""The same where many files change."""
+QUIET_GONE = 0.100
+"""The same where a document is not there, or empty."""
+LONGEST = 0.250
+"""Seconds after which what there is counts, whatever still happens; with many files, four times."""
+
+
+def follow(
+    live: LiveCourse,
+    watcher: Watcher,
+    notice: Callable[[], None],
+    said: Callable[[frozenset[str], float], None],
+) -> None:
+    """Take saves until the watcher is stopped.
+
+    `notice` is told that more than documents changed; `said` what was saved, and how many seconds
+    after its first event it was taken.
+    """
+    while not watcher.stopped:
+        watcher.watch_also(_elsewhere(live))
+        paths = watcher.get(1.0)
+        if paths:
+            began = time.monotonic()
+            if _take(live, watcher, paths, began, notice):
+                said(paths, time.monotonic() - began)
+
+
+def _take(
+    live: LiveCourse,
+    watcher: Watcher,
+    paths: frozenset[str],
+    began: float,
+    notice: Callable[[], None],
+) -> bool:
+    """Take what a burst of events comes to; whether it came to anything."""
+    while True:
+        heard = time.monotonic()
+        plan = live.plan(paths)
+        many = len(paths) > MOST
+        last = began + LONGEST * (4 if many else 1)
+        quiet = QUIET_MANY if many else QUIET if plan is not None and _whole(plan) else QUIET_GONE
+        left = min(heard + quiet, last) - time.monotonic()
+        more = watcher.get(max(left, 0.0))
+        if not more:
+            break
+        paths |= more
+    if plan is not None and live.commit(plan):
+        return bool(plan.found)
+    notice()
+    return live.reread() or plan is None
+
+
+def _whole(plan: Plan) -> bool:
+    """Whether no document became empty."""
+    empty = {d.source.path for d in plan.course.documents if not d.source.text.strip()}
+    return empty.isdisjoint(plan.found)
+
+
+def _elsewhere(live: LiveCourse) -> frozenset[str]:
+    """The files of pages, wherever they lie."""
+    course = live.course
+    return frozenset() if course is None else frozenset(owner.path for owner in owners(course))

@@ -1,0 +1,320 @@
+"""The pages of a site that changes: drawn when they are asked for, kept until they are stale.
+
+Entry point: `Pages`.
+
+1. `renew` says what the course is now and which pages may have changed by it.
+2. `find` gives a file of the site as a build would publish it: a page is drawn if it is stale, an
+   archive is packed, a file of the course is read.
+3. A page with a mistake stays as it was last drawn.
+4. `refresh` makes the shared files anew where the pages need other characters or styles. Until
+   then pages are framed with the old ones, and those stay available, since a browser may still ask.
+
+Nothing here is locked: whoever calls sees to that.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Collection, Iterable, Iterator
+from pathlib import Path
+from typing import TypeAlias
+
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.read import read_bytes
+from coursebuild.model import Course, Document, MjcfModel
+from coursebuild.render import fonts, lesson, meta, pages, urls, zips
+from coursebuild.render.assets import Assets
+from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render.library import Library, owners
+from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
+from coursebuild.render.site import all_facts
+from coursebuild.results import OutputFile
+from coursebuild.values import dataclass
+
+Painter: TypeAlias = Callable[[Library], Draft]
+
+_NO_FACTS = PageFacts(frozenset(), frozenset(), frozenset())
+_ANYTHING = PageFacts(
+    frozenset(map(chr, range(0x20, 0x3000))),
+    frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
+    frozenset(),
+)
+"""For the first pages, which are shown before the others are known."""
+_GENERATIONS = 3
+"""How many sets of shared files stay available."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A page without its frame, and the styles that were written in its elements."""
+
+    draft: Draft
+    declarations: frozenset[str]
+
+
+def painters(course: Course) -> dict[str, Painter]:
+    """How each page is drawn, by its site path, in the order of a build."""
+    found: dict[str, Painter] = {urls.HOME: pages.home_draft}
+    for level in course.levels:
+        found[urls.level_path(level)] = functools.partial(_level, level.id)
+    for entry in course.lessons:
+        found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id)
+    for model in course.models:
+        found[urls.model_page_path(model.name)] = functools.partial(_model, model)
+    for page in course.pages:
+        if page.document is not None:
+            found[urls.page_path(page)] = functools.partial(_page, page.id)
+    found[urls.NOT_FOUND] = pages.not_found_draft
+    return found
+
+
+def _level(id: str, library: Library) -> Draft:
+    return pages.level_draft(library, library.levels[id])
+
+
+def _lesson(id: str, library: Library) -> Draft:
+    entry = library.lessons[id]
+    if entry.document is None:
+        return lesson.stub_draft(library, entry)
+    return lesson.lesson_draft(library, entry, entry.document)
+
+
+def _model(model: MjcfModel, library: Library) -> Draft:
+    return pages.model_draft(library, model)
+
+
+def _page(id: str, library: Library) -> Draft:
+    page = library.pages[id]
+    assert page.document is not None, "a page without a document has no painter"
+    return pages.page_draft(library, page, page.document)
+
+
+def site_paths(course: Course) -> dict[str, str]:
+    """The site path of each lesson and page, by the path of its file."""
+    paths = {entry.path: urls.lesson_path(entry) for entry in course.lessons}
+    return paths | {page.path: urls.page_path(page) for page in course.pages}
+
+
+class Pages:
+    """The site of a course as it is now."""
+
+    def __init__(
+        self,
+        root: Path,
+        assets: Assets,
+        subset: Callable[[fonts.FontJob], bytes],
+        surroundings: Callable[[Course], zips.Surroundings],
+        ready: Callable[[str], bool],
+    ) -> None:
+        """`ready` makes all that drawing a page needs; it says no to one with a mistake."""
+        self._root = root
+        self._ready = ready
+        self._assets = assets
+        self._subset = subset
+        self._surroundings = surroundings
+        self._library: Library | None = None
+        self._painters: dict[str, Painter] = {}
+        self._documents: dict[str, Document] = {}
+        self._drawn: dict[str, Drawn] = {}
+        self._facts: dict[str, PageFacts] = {}
+        self._stale: set[str] = set()
+        self._texts: dict[str, bytes] = {}
+        self._files: dict[str, Callable[[], bytes]] = {}
+        self._shared_facts: PageFacts | None = None
+        self._generations: list[dict[str, bytes]] = []
+        self._names: Names | None = None
+
+    # --- what the course is
+
+    def renew(self, library: Library, stale: Collection[str] | None = None) -> None:
+        """Take what the course is now; `stale` are the pages to draw anew, `None` means all."""
+        self._library = library
+        if stale is None:
+            self._painters = painters(library.course)
+            self._stale = set(self._painters)
+            for gone in self._drawn.keys() - self._painters.keys():
+                del self._drawn[gone]
+                self._facts.pop(gone, None)
+            self._texts.clear()  # each has the menu of all
+        else:
+            self._stale.update(stale)
+        course = library.course
+        self._documents = {
+            site: document
+            for owner, site in zip(owners(course), site_paths(course).values(), strict=True)
+            if (document := owner.document) is not None
+        }
+        self._files = dict(self._other_files(library))
+        if self._names is None:
+            self._share(_ANYTHING, lambda job: job.data)
+
+    def framed(self, drawn: Drawn, library: Library) -> bytes:
+        """The finished text of a page."""
+        assert self._names is not None, "there are shared files since the course was first read"
+        return frame(library, drawn.draft, self._names).encode()
+
+    def put(self, path: str, drawn: Drawn, text: bytes | None = None) -> None:
+        """Take a page that was drawn, and maybe framed, from the library as it is now."""
+        self._drawn[path] = drawn
+        self._facts.pop(path, None)
+        self._texts.pop(path, None)
+        self._stale.discard(path)
+        if text is not None:
+            self._texts[path] = text
+
+    def _other_files(self, library: Library) -> Iterator[tuple[str, Callable[[], bytes]]]:
+        """Everything that is no page and is not shared by all, made when it is asked for."""
+        course = library.course
+        for path, (script, _) in library.scripts.items():
+            yield path, functools.partial(str.encode, script.code.text)
+        for model in course.models:
+            yield urls.model_file_path(model.name), functools.partial(str.encode, model.source.text)
+        if library.scripts:
+            yield urls.EXAMPLES_ZIP, lambda: zips.course_zip(library, self._around(course)).data
+        with_scripts = {owner.id for _, owner in library.scripts.values()}
+        for entry in course.lessons:
+            if entry.id in with_scripts:
+                yield (
+                    urls.lesson_zip_path(entry),
+                    functools.partial(self._lesson_zip, library, entry.id),
+                )
+        for path in course.files:
+            yield urls.file_path(path), functools.partial(read_bytes, self._root, path)
+        for file in library.labs.files:
+            yield file.path, functools.partial(_data, file)
+        yield urls.ROBOTS, functools.partial(meta.robots, course)
+        if course.base_url:
+            yield urls.SITEMAP, self._sitemap
+
+    def _around(self, course: Course) -> zips.Surroundings:
+        return self._surroundings(course)
+
+    def _lesson_zip(self, library: Library, id: str) -> bytes:
+        entry = library.lessons[id]
+        archive = zips.lesson_zip(library, self._around(library.course), entry)
+        return b"" if archive is None else archive.data
+
+    def _sitemap(self) -> bytes:
+        assert self._library is not None
+        drafts = (self._page(path) for path in self._painters)
+        indexed = [drawn.draft.path for drawn in drafts if drawn and drawn.draft.indexed]
+        return meta.sitemap(self._library.course, indexed)
+
+    # --- what is asked for
+
+    @property
+    def names(self) -> Names | None:
+        """The names of the shared files, by which pages are framed."""
+        return self._names
+
+    @property
+    def library(self) -> Library | None:
+        """The course and its results; `None` before it was read."""
+        return self._library
+
+    def base(self) -> str:
+        """The path under which the published site is served, with a slash at both ends."""
+        return "/" if self._library is None else urls.base_path(self._library.course)
+
+    def document(self, path: str) -> Document | None:
+        """The document that a page shows, as it was last read."""
+        return self._documents.get(path)
+
+    def paths(self) -> tuple[str, ...]:
+        """The site paths of everything that a build would publish, sorted."""
+        newest = self._generations[-1].keys() if self._generations else ()
+        return tuple(sorted({*self._painters, *self._files, *newest}))
+
+    def has_page(self, path: str) -> bool:
+        """Whether there is a page, or would be but for its mistakes."""
+        return path in self._painters
+
+    def find(self, path: str) -> bytes | None:
+        """A file of the site, if there is one and it can be had."""
+        if path in self._painters:
+            return self._text(path)
+        if path in self._files:
+            try:
+                return self._files[path]()
+            except EffectError:
+                return None  # gone since the course was read
+        for files in reversed(self._generations):
+            if path in files:
+                return files[path]
+        return None
+
+    def _text(self, path: str) -> bytes | None:
+        drawn = self._page(path)
+        if drawn is None:
+            return None
+        if path not in self._texts:
+            assert self._library is not None
+            self._texts[path] = self.framed(drawn, self._library)
+        return self._texts[path]
+
+    def _page(self, path: str) -> Drawn | None:
+        if path in self._stale and self._ready(path):
+            assert self._library is not None
+            old = self._drawn.get(path)
+            new = draw(self._painters[path], self._library)
+            if new == old:
+                self._stale.discard(path)
+            else:
+                self.put(path, new)
+        return self._drawn.get(path)
+
+    def painter(self, path: str) -> Painter:
+        """How a page is drawn (`KeyError` where there is none)."""
+        return self._painters[path]
+
+    # --- what may wait
+
+    def waiting(self) -> tuple[str, ...]:
+        """The pages that are to be drawn anew."""
+        return tuple(path for path in self._painters if path in self._stale)
+
+    def look_at(self, path: str) -> None:
+        """Draw a page if it is stale, and note what the shared files must know of it."""
+        drawn = self._page(path) if path in self._painters else None
+        if drawn is not None and path not in self._facts:
+            self._facts[path] = page_facts(drawn.draft, drawn.declarations)
+
+    def unnoted(self) -> tuple[str, ...]:
+        """The pages of which that is not noted yet."""
+        return tuple(path for path in self._drawn if path not in self._facts)
+
+    def needed(self) -> PageFacts | None:
+        """The facts for new shared files, where those that there are do not do any more."""
+        if self._library is None:
+            return None
+        facts = all_facts(self._library, (self._facts.get(p, _NO_FACTS) for p in self._drawn))
+        return None if facts == self._shared_facts else facts
+
+    def make_shared(self, facts: PageFacts) -> tuple[tuple[OutputFile, ...], Names]:
+        """The shared files for these facts; this may take seconds, and changes nothing."""
+        return shared_files(self._assets, self._subset, facts)
+
+    def share(self, facts: PageFacts, files: Iterable[OutputFile], names: Names) -> None:
+        """Use shared files from now on."""
+        self._shared_facts = facts
+        self._generations = [
+            *self._generations[1 - _GENERATIONS :],
+            {file.path: file.data for file in files},
+        ]
+        if names != self._names:
+            self._names = names
+            self._texts.clear()
+
+    def _share(self, facts: PageFacts, subset: Callable[[fonts.FontJob], bytes]) -> None:
+        files, names = shared_files(self._assets, subset, facts)
+        self.share(facts, files, names)
+        self._shared_facts = None  # the fonts were not cut
+
+
+def draw(painter: Painter, library: Library) -> Drawn:
+    """Draw a page."""
+    return Drawn(*settled(painter(library)))
+
+
+def _data(file: OutputFile) -> bytes:
+    return file.data

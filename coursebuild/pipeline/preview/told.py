@@ -1,0 +1,257 @@
+"""What an open page is told beside its text, and what its author may accept there.
+
+Entry points: `page_news(live, path)`, as JSON; `accept(live, path, id)`.
+
+1. Every mistake of the course, those of the page's own document first; each says whether the page
+   shows it in its place.
+2. For each script of the page how it did, for each recorded output that differs the two side by
+   side, and for each bound number what would be right.
+3. What is offered has an id made from the text of the lesson and the edit. It is written only as
+   long as it would still be the same edit of the same text: nothing is ever written that was not
+   seen.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from coursebuild.diagnostics import Diagnostic, Edit, Severity
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.write import write_atomic
+from coursebuild.model import (
+    Course,
+    Document,
+    NumberBinding,
+    Recording,
+    Script,
+    document_blocks,
+)
+from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.preview.live import LiveCourse
+from coursebuild.report import Report
+from coursebuild.results import Outcome, ScriptRun, Verdict
+from coursebuild.scripts.bindings import document_bindings
+from coursebuild.scripts.diffrows import DiffRow, diff_rows
+from coursebuild.scripts.edit import apply_edits, updated_body
+from coursebuild.values import dataclass
+
+_MOST = 60
+"""Mistakes that a page is told of."""
+_IN_PLACE = ("output-drift", "binding-mismatch")
+"""Rules whose mistakes a page shows where they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """An edit that an author may accept."""
+
+    edit: Edit
+
+    @property
+    def id(self) -> str:
+        """By which it is accepted; another text or another edit has another."""
+        span = self.edit.span
+        parts = (span.path, str(span.start), str(span.end), self.edit.text, span.source.text)
+        digest = hashlib.sha256()
+        for part in parts:
+            digest.update(f"{len(part)}:{part}".encode("utf-8", "surrogatepass"))
+        return digest.hexdigest()[:24]
+
+
+def report_now(live: LiveCourse) -> Report:
+    """Everything that is wrong, as a report."""
+    course = live.course
+    written = [] if course is None else [x for x in course.lessons if x.document is not None]
+    return judge(course, live.diagnostics(), (), 0.0, lessons=len(written))
+
+
+def page_news(live: LiveCourse, path: str) -> str:
+    """What the page at a site path is told."""
+    with live.changed:
+        document = live.pages.document(path)
+        report = report_now(live)
+        news: dict[str, Any] = {
+            "problems": [_problem(d, document) for d in _sorted(report.diagnostics, document)],
+            "more": max(0, len(report.diagnostics) - _MOST),
+            "kept": live.is_kept(path),
+            "busy": live.busy,
+            "trouble": live.trouble,
+            "scripts": [],
+            "outputs": [],
+            "numbers": [],
+        }
+        if document is not None and live.course is not None:
+            news["scripts"] = list(_scripts(live, document))
+            news["outputs"] = list(_outputs(live, live.course, document))
+            news["numbers"] = list(_numbers(document, report.diagnostics))
+        return json.dumps(news, ensure_ascii=False, separators=(",", ":"))
+
+
+# --- mistakes
+
+
+def _sorted(found: Iterable[Diagnostic], document: Document | None) -> list[Diagnostic]:
+    own = "" if document is None else document.source.path
+
+    def rank(diagnostic: Diagnostic) -> tuple[bool, bool]:
+        return diagnostic.severity is not Severity.ERROR, diagnostic.span.path != own
+
+    return sorted(found, key=rank)[:_MOST]
+
+
+def _problem(diagnostic: Diagnostic, document: Document | None) -> dict[str, Any]:
+    span = diagnostic.span
+    here = document is not None and span.path == document.source.path
+    line = span.source.line_text(span.line)
+    end = len(line) if span.end_line > span.line else span.end_column - 1
+    return {
+        "severity": diagnostic.severity.value,
+        "rule": diagnostic.rule,
+        "place": f"{span.path}:{span.line}:{span.column}",
+        "message": diagnostic.message,
+        "label": diagnostic.label,
+        "help": diagnostic.help,
+        "notes": [_note(note.message, note.span) for note in diagnostic.notes],
+        "line": line,
+        "start": span.column - 1,
+        "end": max(end, span.column - 1),
+        "inPlace": here and diagnostic.rule in _IN_PLACE,
+    }
+
+
+def _note(message: str, span: Any) -> str:
+    return message if span is None else f"{span.path}:{span.line}:{span.column}: {message}"
+
+
+# --- scripts and outputs
+
+
+def _scripts(live: LiveCourse, document: Document) -> Iterator[dict[str, str]]:
+    assert live.library is not None
+    for script in (b for b in document_blocks(document) if isinstance(b, Script)):
+        run = live.library.runs.get(script.path)
+        yield {"path": script.path, "state": _state(run)}
+
+
+def _state(run: ScriptRun | None) -> str:
+    return "running" if run is None else run.outcome.value
+
+
+def _outputs(live: LiveCourse, course: Course, document: Document) -> Iterator[dict[str, Any]]:
+    """The recorded outputs, each with its number among those of its script on the page."""
+    assert live.library is not None
+    numbers: Counter[str] = Counter()
+    for recording in (b for b in document_blocks(document) if isinstance(b, Recording)):
+        if recording.script is None:
+            continue
+        nth = numbers[recording.script]
+        numbers[recording.script] += 1
+        verdict = live.library.verdict(recording)
+        run = live.library.runs.get(recording.script)
+        told: dict[str, Any] = {"script": recording.script, "nth": nth, "state": "unchecked"}
+        if run is None:
+            told["state"] = "running"
+        elif run.outcome is not Outcome.OK:
+            told["state"] = run.outcome.value
+        elif verdict is not None:
+            told["state"] = verdict.status
+            if verdict.status == "drift":
+                told |= _drift(live, course, verdict, run)
+        yield told
+
+
+def _drift(live: LiveCourse, course: Course, verdict: Verdict, run: ScriptRun) -> dict[str, Any]:
+    rows = diff_rows(verdict.recording, verdict, course.filters, run.stdout)
+    offered = _update(live, course, verdict, run)
+    told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
+    if isinstance(offered, Edit):
+        told["offer"] = Offer(offered).id
+    elif offered is not None:
+        told["refused"] = offered.message
+    return told
+
+
+def _row(row: DiffRow) -> list[Any]:
+    return [row.mark, [[piece.text, piece.changed] for piece in row.pieces]]
+
+
+def _update(
+    live: LiveCourse, course: Course, verdict: Verdict, run: ScriptRun
+) -> Edit | Diagnostic | None:
+    """What `coursebuild update` would write; nothing as long as the script was run only once."""
+    ran = live.parts.runs.get(run.path)
+    if ran is None or ran.run is not run or ran.again is None:
+        return None
+    filters = course.filters
+    return updated_body(verdict.recording, verdict.comparison, filters, run.stdout, ran.again)
+
+
+# --- bound numbers
+
+
+def _numbers(document: Document, found: Iterable[Diagnostic]) -> Iterator[dict[str, Any]]:
+    """The bound numbers that do not hold, each with its number among those of the same text."""
+    wrong = {
+        (d.span.start, d.span.end): d
+        for d in found
+        if d.rule == "binding-mismatch" and d.span.source.text == document.source.text
+    }
+    numbers: Counter[str] = Counter()
+    for binding in document_bindings(document):
+        nth = numbers[binding.text]
+        numbers[binding.text] += 1
+        told = wrong.get((binding.text_span.start, binding.text_span.end))
+        if told is not None:
+            yield _number(binding, nth, told)
+
+
+def _number(binding: NumberBinding, nth: int, told: Diagnostic) -> dict[str, Any]:
+    edit = next(iter(told.edits), None)
+    return {
+        "text": binding.text,
+        "nth": nth,
+        "message": told.message,
+        "label": told.label,
+        "better": "" if edit is None else edit.text,
+        "offer": None if edit is None else Offer(edit).id,
+    }
+
+
+# --- accepting
+
+
+def accept(live: LiveCourse, path: str, id: str) -> str:
+    """Write what is offered on a page under this id; gives why not, or nothing.
+
+    The lock is held, so that two browsers cannot accept the same at once.
+    """
+    with live.changed:
+        edit = next((offer.edit for offer in _offers(live, path) if offer.id == id), None)
+        if edit is None:
+            return "this is no longer what the page offers; look at it again"
+        source = edit.span.source
+        try:
+            new = apply_edits(source.text, [edit]).encode()
+            write_atomic(live.root, source.path, new, expected=source.text.encode())
+        except EffectError as error:
+            return error.message
+        return ""
+
+
+def _offers(live: LiveCourse, path: str) -> Iterator[Offer]:
+    document, course, library = live.pages.document(path), live.course, live.library
+    if document is None or course is None or library is None:
+        return
+    for recording in (b for b in document_blocks(document) if isinstance(b, Recording)):
+        verdict, run = library.verdict(recording), library.runs.get(recording.script or "")
+        if verdict is not None and verdict.status == "drift" and run is not None:
+            edit = _update(live, course, verdict, run)
+            if isinstance(edit, Edit):
+                yield Offer(edit)
+    for diagnostic in live.diagnostics():
+        if diagnostic.rule == "binding-mismatch" and diagnostic.span.path == document.source.path:
+            yield from (Offer(edit) for edit in diagnostic.edits)

@@ -1,0 +1,217 @@
+"""Documents read and pages drawn, one request at a time, here or in a copy of this process.
+
+Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
+
+1. `Read`: the text is parsed and its formulas are typeset; the outline is kept in the store.
+2. `Draw`: a page is drawn from its sheet and its document; body and record are kept in the store.
+3. The document and its formulas stay for the drawing, as long as there is room for them. Where they
+   are not there any more, or were read by an earlier build, the text is parsed again, and MathML
+   comes from the store.
+
+What draws is imported when there is something to draw.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pickle
+from collections import OrderedDict
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Self, assert_never
+
+from markupsafe import Markup
+
+from coursebuild.checks import document_formulas, formula_findings
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.resources import template_texts
+from coursebuild.effects.store import Store
+from coursebuild.effects.tool import engine_digest, tool_digest
+from coursebuild.effects.versions import package_version
+from coursebuild.model import Document, Script, document_blocks
+from coursebuild.model.skeleton import skeleton
+from coursebuild.pipeline.kept import CompiledTemplates, words_for
+from coursebuild.pipeline.outlines import Outline, Task, packed
+from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Draw, Read, Request
+from coursebuild.render.record import PageRecord, record
+from coursebuild.render.tools import Tools, mark_now
+from coursebuild.render.zips import imports
+from coursebuild.results import Formula, MathError
+from coursebuild.values import dataclass, replace
+
+if TYPE_CHECKING:
+    from coursebuild.effects.v8 import MathEngine
+
+_MATHML, _CODE = "mathml", "code"
+"""Kinds of entries in the store. All stay on this machine: reading them runs code."""
+_ROOM = 64 << 20
+"""Bytes that documents may take which wait to be drawn, about."""
+_COST = 40
+"""Bytes that a parsed document takes for each character of its text, about."""
+_FORMULAS = 4096
+"""Formulas that are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    document: Document
+    diagnostics: tuple[Diagnostic, ...]
+    formulas: dict[Formula, str | MathError]
+
+
+class Reader:
+    """Reads and draws; a context manager, since formulas are typeset by an engine."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._engine: MathEngine | None = None
+        self._waiting: OrderedDict[str, _Whole] = OrderedDict()
+        self._room = _ROOM
+        self._formulas: dict[Formula, str | MathError] = {}
+        self._tools: dict[str, Tools] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._engine is not None:
+            self._engine.close()
+
+    def answer(self, request: Request) -> Answer:
+        """Do what is asked."""
+        match request:
+            case Read():
+                return self._read(request.task)
+            case Draw():
+                return self._draw(request)
+            case _:
+                assert_never(request)
+
+    # --- reading
+
+    def _read(self, task: Task) -> bytes:
+        whole = self._whole(task)
+        found = formula_findings(whole.document, whole.formulas)
+        scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
+        outline = Outline(
+            skeleton=skeleton(whole.document),
+            diagnostics=(*whole.diagnostics, *found),
+            imports={s.path: tuple(sorted(imports(s.code.text))) for s in scripts},
+            lasting=not found,
+        )
+        data = packed(outline)
+        if outline.lasting:  # that a formula took too long may not happen again
+            self._store.keep(OUTLINES, task.key, data, local=True)
+        self._wait(task, whole)
+        return data
+
+    def _whole(self, task: Task) -> _Whole:
+        """A document with its formulas."""
+        known = self._waiting.pop(task.key, None)
+        if known is not None:
+            self._room += _COST * len(task.source.text)
+            return known
+        from coursebuild.syntax.document import parse_document
+
+        parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
+        formulas = document_formulas(parsed.value)
+        return _Whole(parsed.value, parsed.diagnostics, self._typeset(formulas))
+
+    def _wait(self, task: Task, whole: _Whole) -> None:
+        """Let a document wait for its page to be drawn; the oldest makes room."""
+        self._waiting[task.key] = whole
+        self._room -= _COST * len(task.source.text)
+        while self._room < 0 and self._waiting:
+            _, oldest = self._waiting.popitem(last=False)
+            self._room += _COST * len(oldest.document.source.text)
+
+    def _typeset(self, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
+        """MathML, from the store where these formulas were typeset together before."""
+        if not formulas:
+            return {}
+        known = [self._formulas.get(formula) for formula in formulas]
+        if all(found is not None for found in known):
+            return {f: m for f, m in zip(formulas, known, strict=True) if m is not None}
+        digest = hashlib.sha256(engine_digest().encode())
+        for formula in formulas:
+            digest.update(f"\0{formula.display}\0{formula.tex}".encode("utf-8", "surrogatepass"))
+        key = digest.hexdigest()
+        stored = None if self._store.fresh else self._store.peek(_MATHML, key)
+        made: list[str | MathError]
+        if stored is not None:
+            made = json.loads(stored)
+        else:
+            new = [f for f, found in zip(formulas, known, strict=True) if found is None]
+            fresh = iter(self._started().typeset(new))
+            made = [next(fresh) if found is None else found for found in known]
+            if all(isinstance(one, str) for one in made):
+                self._store.keep(_MATHML, key, json.dumps(made).encode(), local=True)
+        if len(self._formulas) > _FORMULAS:
+            self._formulas.clear()
+        found = dict(zip(formulas, made, strict=True))
+        self._formulas.update((f, one) for f, one in found.items() if isinstance(one, str))
+        return found
+
+    def _started(self) -> MathEngine:
+        from coursebuild.effects.v8 import MathEngine
+
+        if self._engine is None:
+            self._engine = MathEngine()
+        return self._engine
+
+    # --- drawing
+
+    def draw(self, request: Draw) -> tuple[PageRecord, str]:
+        """A page and its body."""
+        from coursebuild.render.draw import draw
+
+        whole = self._whole(request.task) if request.task is not None else None
+        tools = self._tools_for(request.language)
+        document = None
+        if whole is not None:
+            tools, document = replace(tools, formulas=whole.formulas), whole.document
+        return record(draw(request.sheet, document, tools), request.base_url)
+
+    def _draw(self, request: Draw) -> PageRecord:
+        made = self.draw(request)
+        data = pickle.dumps(made, pickle.HIGHEST_PROTOCOL)
+        self._store.keep(PAGES, request.key, data, local=True)
+        return made[0]
+
+    def _tools_for(self, language: str) -> Tools:
+        if language not in self._tools:
+            self._tools[language] = drawing_tools(self._store, language)
+        return self._tools[language]
+
+
+def drawing_tools(store: Store, language: str) -> Tools:
+    """Words and templates, these compiled by an earlier run where there was one."""
+    from coursebuild.render.assets import templates_of
+
+    texts = template_texts()
+    templates = templates_of(texts, CompiledTemplates(store))
+    return Tools(words_for(store, texts, language), templates, mark=_Marks(store))
+
+
+class _Marks:
+    """Code whose tokens are marked, from the store where it was marked before."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._version = package_version("pygments")
+
+    def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
+        parts = (tool_digest(), self._version, language, code)
+        key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+        found = None if self._store.fresh else self._store.peek(_CODE, key)
+        if found is not None:
+            return tuple(map(Markup, json.loads(found)))
+        lines = mark_now(language, code)
+        self._store.keep(_CODE, key, json.dumps(lines).encode(), local=True)
+        return lines

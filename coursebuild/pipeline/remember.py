@@ -1,0 +1,325 @@
+"""Results of scripts, remembered: a script runs again only if something that it depends on changed.
+
+Entry point: `Memory`.
+
+1. `recall`: what is known before a script runs names a group of results; the one all of whose
+   dependencies are as they were is its result. Groups that this machine has not are looked for in
+   the shared cache.
+2. `keep`: after a run its needs, as the trace tells them, are looked at, and it is kept with them.
+   What changed while it ran was maybe not what it saw: such a result is not kept.
+3. What became of a script's last run is noted under its path, whether it is remembered or not: for
+   `explain`, and for the order in which scripts run.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import assert_never
+
+from coursebuild.effects.around import places, surroundings
+from coursebuild.effects.digests import Clock, Digests, changed_since
+from coursebuild.effects.installed import Installed
+from coursebuild.effects.store import Store
+from coursebuild.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.scripts.dependencies import (
+    Dependency,
+    Inputs,
+    Kind,
+    Need,
+    folded,
+    forgotten,
+    group_key,
+    inputs_of,
+    needs,
+    result_key,
+    sought,
+    state_changes,
+)
+from coursebuild.scripts.remembered import REMEMBERED, Record, from_bytes, to_bytes
+from coursebuild.values import dataclass
+
+_RESULTS, _LAST = "scripts", "last"
+_MOST_SHARED = 32
+"""Results of one group that are fetched from the shared cache."""
+_FETCHERS = 16
+"""Requests to the shared cache at a time."""
+_REASON = "{} changed while it ran"
+
+
+@dataclass(frozen=True, slots=True)
+class LabTrial:
+    """The trial of a lab."""
+
+    ok: bool
+    kept: bool
+    """Whether its result can be used again."""
+    seconds: float
+    made: int
+    """When, in seconds since 1970."""
+
+
+class States:
+    """How things are now, each looked at when it is first asked for and not again."""
+
+    def __init__(self, root: Path, store: Store) -> None:
+        self.root = root
+        self.places = places(root, os.environ)
+        self.around = surroundings(os.environ)
+        self._digests = Digests(store)
+        self._installed = Installed(store, self._digests)
+        self._known: dict[Need, str] = {}
+
+    def __call__(self, need: Need) -> str:
+        """The state of something; the same all the time."""
+        if need not in self._known:
+            self._known[need] = self.now(need)
+        return self._known[need]
+
+    def now(self, need: Need) -> str:
+        """The state of something at this moment."""
+        match need.kind:
+            case Kind.FILE:
+                return self._digests.file(str(self.root / need.name))
+            case Kind.LISTING:
+                return self._digests.folder(str(self.root / need.name))
+            case Kind.SOUGHT:
+                folder, modules = sought(need.name)
+                return self._digests.modules(str(self.root / folder), modules)
+            case Kind.OUTSIDE:
+                return self._digests.file(need.name)
+            case Kind.MODULE:
+                return self._installed.version(need.name)
+            case Kind.PLACE:
+                return dict(self.places).get(need.name, "")
+            case _:
+                assert_never(need.kind)
+
+    def save(self) -> None:
+        """Remember what was read of the disk."""
+        self._digests.save()
+
+
+class Memory:
+    """What is remembered of the scripts of a course."""
+
+    def __init__(self, root: Path, store: Store, *, fresh: bool = False) -> None:
+        self.store = store
+        self.fresh = fresh or store.fresh
+        """Whether all is to be run, whatever is remembered."""
+        self.states = States(root, store)
+        self.differing: list[tuple[ScriptRun, ScriptRun]] = []
+        """Of runs made afresh: what was remembered, and what was done now with nothing changed."""
+        self._clock = Clock(store)
+        self._started: dict[str, int] = {}
+
+    def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
+        """What is known of a script before it runs."""
+        return inputs_of(job, text, self.states.around)
+
+    def recall(self, wanted: Sequence[Inputs]) -> dict[str, ScriptRun]:
+        """The results, by path, that hold; none where everything is to run."""
+        if self.fresh:
+            return {}
+        found: dict[str, ScriptRun] = {}
+        missing: list[Inputs] = []
+        for inputs in wanted:
+            record = self.remembered(inputs)
+            if record is None:
+                missing.append(inputs)
+            else:
+                found[inputs.path] = record.run(self.states.places)
+        for record in self._fetch(missing):
+            found[record.inputs.path] = record.run(self.states.places)
+        self.states.save()
+        return found
+
+    def remembered(self, inputs: Inputs) -> Record | None:
+        """The result kept on this machine that holds now."""
+        group = group_key(inputs)
+        for key in self.store.group(_RESULTS, group):
+            record = self._read(self.store.peek(_RESULTS, key), inputs)
+            if record is not None and self._holds(record):
+                self._note(record, key)
+                return record
+        return None
+
+    def results(self, inputs: Inputs) -> list[Record]:
+        """All results kept on this machine for these inputs, newest first."""
+        keys = self.store.group(_RESULTS, group_key(inputs))
+        records = (self._read(self.store.peek(_RESULTS, key), inputs) for key in keys)
+        return [record for record in records if record is not None]
+
+    def last(self, path: str) -> Record | None:
+        """What became of the last run of a script, without what it printed."""
+        data = self.store.peek(_LAST, _last_key(path))
+        record = None if data is None else from_bytes(data.partition(b"\n")[2])
+        return record if record is not None and record.inputs.path == path else None
+
+    def note_lab(self, inputs: Inputs, files: Iterable[str], trial: LabTrial) -> None:
+        """Note what a lab's trial depends on; `files` are those of its model."""
+        needed = [Need(Kind.FILE, path) for path in sorted(files)]
+        record = Record(
+            inputs,
+            tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed),
+            Outcome.OK if trial.ok else Outcome.FAILED,
+            0,
+            trial.seconds,
+            trial.made,
+            "" if trial.kept else "it may end in another way the next time",
+        )
+        self._note(record)
+
+    def started(self, path: str) -> None:
+        """A script is about to run."""
+        self._started[path] = self._clock.now()
+
+    def begin(self) -> None:
+        """Scripts are about to run: what was written until now was written before."""
+        self._clock.tick()
+
+    def keep(self, inputs: Inputs, run: ScriptRun) -> None:
+        """Remember the result of a run, or why it is not remembered."""
+        why = forgotten(run)
+        dependencies: tuple[Dependency, ...] = ()
+        if run.trace is not None:
+            needed = needs(run, inputs.requires, self.states.places)
+            needed = folded(needed, self.states.now)
+            dependencies = tuple(Dependency(n.kind, n.name, self.states.now(n)) for n in needed)
+            why = why or self._disturbed(inputs, needed)
+        record = Record(
+            inputs,
+            dependencies,
+            run.outcome,
+            run.status,
+            run.seconds,
+            int(time.time()),
+            why,
+            run.stdout,
+            run.stderr,
+        )
+        key = ""
+        if not why:
+            assert run.outcome in REMEMBERED
+            if self.fresh:
+                self._compare(record, run)
+            key = f"{group_key(inputs)}/{result_key(dependencies)}"
+            self.store.keep(_RESULTS, key, to_bytes(record, self.states.places))
+        self._note(record, key)
+
+    def close(self) -> None:
+        """Nothing more is run."""
+        self.states.save()
+
+    def _disturbed(self, inputs: Inputs, needed: Iterable[Need]) -> str:
+        """What may have changed between the moment a script saw it and now."""
+        if self.states.now(Need(Kind.FILE, inputs.path)) != inputs.text:
+            return _REASON.format("its file")
+        since = self._started.get(inputs.path)
+        if since is None:
+            return "nobody knows when it began"
+        for need in needed:
+            match need.kind:
+                case Kind.FILE | Kind.LISTING:
+                    path = str(self.states.root / need.name)
+                case Kind.SOUGHT:
+                    path = str(self.states.root / sought(need.name)[0])
+                case Kind.OUTSIDE:
+                    path = need.name
+                case Kind.MODULE | Kind.PLACE:
+                    continue
+                case _:
+                    assert_never(need.kind)
+            if changed_since(path, since):
+                return _REASON.format(path.removeprefix(f"{self.states.root}/"))
+        return ""
+
+    def _holds(self, record: Record) -> bool:
+        return not any(True for _ in state_changes(record.dependencies, self.states))
+
+    def _read(self, data: bytes | None, inputs: Inputs) -> Record | None:
+        """The record of an entry, if it is one of these inputs."""
+        if data is None:
+            return None
+        record = from_bytes(data)
+        fits = (
+            record is not None
+            and record.inputs == inputs
+            and not record.forgotten
+            and record.outcome in REMEMBERED
+        )
+        return record if fits else None
+
+    def _fetch(self, wanted: Sequence[Inputs]) -> list[Record]:
+        """Results that hold from the shared cache."""
+        if self.store.shared is None or not wanted:
+            return []
+
+        def fetch(inputs: Inputs) -> list[tuple[str, bytes | None]]:
+            group = group_key(inputs)
+            here = set(self.store.group(_RESULTS, group))
+            keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
+            return [(key, self.store.load(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
+
+        found: list[Record] = []
+        with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
+            for inputs, entries in zip(wanted, pool.map(fetch, wanted), strict=True):
+                for key, data in entries:
+                    record = self._read(data, inputs)
+                    if record is not None and self._holds(record):
+                        self._note(record, key)
+                        found.append(record)
+                        break
+        return found
+
+    def _note(self, record: Record, result: str = "") -> None:
+        """Note under the script's path what is known of its last run.
+
+        `result` is the key of the result, where it is remembered.
+        """
+        key = _last_key(record.inputs.path)
+        head = f"{result}\n".encode()
+        before = self.store.peek(_LAST, key)
+        if result and before is not None and before.startswith(head):
+            return
+        bare = Record(
+            record.inputs,
+            record.dependencies,
+            record.outcome,
+            record.status,
+            record.seconds,
+            record.made,
+            record.forgotten,
+        )
+        data = head + to_bytes(bare, ())
+        if before != data:
+            self.store.keep(_LAST, key, data, local=True)
+
+    def _compare(self, record: Record, run: ScriptRun) -> None:
+        """Hold a run made afresh against what is remembered for the same dependencies."""
+        for before in self.results(record.inputs):
+            if before.dependencies == record.dependencies:
+                old = before.run(self.states.places)
+                if (old.outcome, old.status, old.stdout) != (run.outcome, run.status, run.stdout):
+                    self.differing.append((old, run))
+
+
+def longest_first(
+    jobs: Sequence[ScriptJob], seconds: Mapping[str, float | None]
+) -> list[ScriptJob]:
+    """The order in which scripts take the least time together; an unknown one may be long."""
+    unknown = float("inf")
+
+    def length(job: ScriptJob) -> float:
+        known = seconds.get(job.path)
+        return unknown if known is None else known
+
+    return sorted(jobs, key=lambda job: -length(job))
+
+
+def _last_key(path: str) -> str:
+    return hashlib.sha256(path.encode("utf-8", "surrogateescape")).hexdigest()

@@ -1,0 +1,161 @@
+"""Compiled models, remembered: MuJoCo starts only for what changed.
+
+Entry point: `compile_all`, as `effects.mjcf.compile_all`.
+
+What a model is compiled of besides its own text (included files, meshes, textures, attached models,
+and where these were looked for) is worked out when it is compiled; the result, an error too, holds
+as long as all of these are as they were.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path, PurePosixPath
+
+import msgspec
+
+from coursebuild.effects import mjcf, mjcf_worker, mujoco_files
+from coursebuild.effects.digests import Clock, changed_since
+from coursebuild.effects.store import Store
+from coursebuild.effects.versions import engine_version
+from coursebuild.model import MjcfModel
+from coursebuild.pipeline.remember import States
+from coursebuild.results import CompileResult
+from coursebuild.scripts.dependencies import Kind, Need
+
+_KIND = "models"
+_OWN_FAULT = "MuJoCo's compiler "
+"""A message about the process that compiles begins so."""
+
+
+class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A result and what it was made of."""
+
+    files: tuple[tuple[str, str], ...]
+    """Path and state of each further file."""
+    result: CompileResult
+
+
+def compile_all(
+    root: Path,
+    store: Store,
+    models: Sequence[MjcfModel],
+    texts: Sequence[str],
+    stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
+) -> tuple[tuple[CompileResult, ...], tuple[CompileResult, ...]]:
+    """A result for each model, and one for each text; see `mjcf.compile_all`.
+
+    `stage` is entered where anything has to be compiled.
+    """
+    memory = _Models(root, store)
+    of_models = [memory.recall(m.source.path, m.source.text) for m in models]
+    of_texts = [memory.recall("", text) for text in texts]
+    left = [m for m, found in zip(models, of_models, strict=True) if found is None]
+    rest = list(dict.fromkeys(t for t, found in zip(texts, of_texts, strict=True) if not found))
+    if left or rest:
+        memory.begin()
+        with stage():
+            made, parts = mjcf.compile_all(root, left, rest)
+        for model, result in zip(left, made, strict=True):
+            memory.keep(model.source.path, model.source.text, result)
+        for text, result in zip(rest, parts, strict=True):
+            memory.keep("", text, result)
+        of_models = _filled(of_models, made)
+        by_text = dict(zip(rest, parts, strict=True))
+        of_texts = [
+            by_text[text] if found is None else found
+            for text, found in zip(texts, of_texts, strict=True)
+        ]
+    memory.states.save()
+    return tuple(_whole(of_models)), tuple(_whole(of_texts))
+
+
+def _filled(
+    found: Iterable[CompileResult | None], made: Iterable[CompileResult]
+) -> list[CompileResult | None]:
+    rest = iter(made)
+    return [next(rest) if result is None else result for result in found]
+
+
+def _whole(results: Iterable[CompileResult | None]) -> Iterator[CompileResult]:
+    for result in results:
+        assert result is not None
+        yield result
+
+
+class _Models:
+    def __init__(self, root: Path, store: Store) -> None:
+        self.root = root
+        self.store = store
+        self.states = States(root, store)
+        self._clock = Clock(store)
+        self._since = 0
+
+    def begin(self) -> None:
+        self._clock.tick()
+        self._since = self._clock.now()
+
+    def recall(self, path: str, text: str) -> CompileResult | None:
+        """The result of a text at a path, if it holds."""
+        if self.store.fresh:
+            return None
+        group = _group(path, text)
+        keys = self.store.group(_KIND, group)
+        found = self._first(keys)
+        if found is None:
+            shared = [key for key in self.store.shared_group(_KIND, group) if key not in keys]
+            found = self._first(shared)
+        return found
+
+    def keep(self, path: str, text: str, result: CompileResult) -> None:
+        """Remember a result, where all is known that it was made of."""
+        if result.error.startswith(_OWN_FAULT):
+            return
+        needed = [need_of(f) for f in mjcf.model_files(self.root, path or mjcf.TEXT_PATH, text)]
+        if any(changed_since(self._full(need), self._since) for need in needed):
+            return
+        files = tuple((need.name, self.states.now(need)) for need in needed)
+        key = hashlib.sha256(json.dumps(files).encode()).hexdigest()
+        try:
+            data = msgspec.json.encode(_Entry(files, result))
+        except UnicodeEncodeError:  # a name of a file that is no text
+            return
+        self.store.keep(_KIND, f"{_group(path, text)}/{key}", data)
+
+    def _first(self, keys: Iterable[str]) -> CompileResult | None:
+        for key in keys:
+            data = self.store.load(_KIND, key)
+            try:
+                entry = None if data is None else msgspec.json.decode(data, type=_Entry)
+            except (msgspec.MsgspecError, RecursionError):
+                continue
+            if entry and all(self.states(need_of(name)) == state for name, state in entry.files):
+                return entry.result
+        return None
+
+    def _full(self, need: Need) -> str:
+        return str(self.root / need.name)
+
+
+def need_of(name: str) -> Need:
+    """What the state of a model's file is asked by: a path of the project, or an absolute one."""
+    outside = PurePosixPath(name).is_absolute()
+    return Need(Kind.OUTSIDE if outside else Kind.FILE, name)
+
+
+def _group(path: str, text: str) -> str:
+    """All that counts and is known before: a text without a path stands in `models/`."""
+    parts = [engine_version(), _way(), path, text]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+@functools.cache
+def _way() -> str:
+    """A hash of how models are compiled, and of what is told of them."""
+    files = (mjcf.__file__, mjcf_worker.__file__, mujoco_files.__file__)
+    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()

@@ -1,0 +1,42 @@
+"""What is asked of a `Reader`, and what it answers.
+
+Entry points: `Read`, `Draw`.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from coursebuild.pipeline.outlines import Task
+from coursebuild.render.record import PageRecord
+from coursebuild.render.sheet import Sheet
+from coursebuild.values import dataclass
+
+OUTLINES, PAGES = "outlines", "pages"
+"""Kinds of entries in the store. They stay on this machine: reading them may run code."""
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Read a text."""
+
+    task: Task
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """Draw a page."""
+
+    sheet: Sheet
+    task: Task | None
+    """The text of its document, if it has one."""
+    language: str
+    """Of the interface."""
+    base_url: str
+    key: str
+    """Under which it is kept."""
+
+
+Request: TypeAlias = Read | Draw
+Answer: TypeAlias = bytes | PageRecord
+"""The outline of what was read, as bytes; the record of the page that was drawn."""

@@ -1,0 +1,270 @@
+"""The files of a site: pages, what they share, what can be downloaded.
+
+Entry point: `site_files(…)`.
+
+A file that is the same as in the site of before need not be made: it has a key, a hash of all that
+its bytes depend on, and `effects.site_swap.publish` makes it only where it was not published under
+this key.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import pickle
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.digests import Digests
+from coursebuild.effects.packages import kept_distributions, library_files
+from coursebuild.effects.read import read_bytes
+from coursebuild.effects.resources import Bundle, template_texts
+from coursebuild.effects.store import Store
+from coursebuild.effects.tool import tool_digest
+from coursebuild.model import Course
+from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.kept import CompiledTemplates, words_for
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.outlines import all_imports
+from coursebuild.pipeline.pages import Pages, indexed
+from coursebuild.render import meta, urls, zips
+from coursebuild.render.assets import Assets, templates_of
+from coursebuild.render.frame import Names
+from coursebuild.render.library import Library
+from coursebuild.render.shared import PageFacts, common_characters
+from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
+from coursebuild.source import Source
+from coursebuild.values import dataclass
+
+_SHARED, _SHARED_DATA = "shared", "shared-data"
+"""Kinds of entries in the store: the names of what all pages share, and its bytes."""
+_DIGEST = hashlib.sha256().digest_size * 2
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A site that may be published where nothing is wrong with it."""
+
+    files: tuple[SiteFile, ...]
+    """Sorted by path."""
+    diagnostics: tuple[Diagnostic, ...]
+    drawn: tuple[str, ...]
+    """The pages that were drawn just now, and not before."""
+
+
+def site_files(course: Course, results: Results, documents: Documents, options: Options) -> Site:
+    """The site of a course whose documents are skeletons."""
+    return _Site(course, results, documents, options).made()
+
+
+class _Site:
+    def __init__(
+        self, course: Course, results: Results, documents: Documents, options: Options
+    ) -> None:
+        self.course = course
+        self.options = options
+        self.store = options.store
+        self.documents = documents
+        self.assets = Assets(template_texts(), Bundle())
+        self.library = Library.of(
+            course,
+            results,
+            self.assets,
+            templates_of(self.assets.templates, CompiledTemplates(self.store)),
+            words_for(self.store, self.assets.templates, course.language),
+        )
+
+    def made(self) -> Site:
+        pages = Pages(self.library, self.documents, self.store)
+        names, files = self._shared([record.facts for record in pages.records])
+        files += self._labs()
+        files += self._downloads()
+        files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
+        if self.course.base_url:
+            sitemap = meta.sitemap(self.course, indexed(pages.records))
+            files.append(OutputFile(urls.SITEMAP, sitemap))
+        framed = tuple(pages.files(names))
+        found: tuple[Diagnostic, ...] = ()
+        if not pages.are_sound({file.path for file in files}):
+            found = tuple(broken_links([*framed, *files], self.course.base_url))
+        everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
+        return Site(everything, found, pages.drawn)
+
+    # --- what all pages share
+
+    def _shared(self, facts: Iterable[PageFacts]) -> tuple[Names, list[SiteFile]]:
+        """The shared files, made only for characters and styles for which they were not made."""
+        together = _together(facts, common_characters(self.library))
+        parts = (together.text, together.mathematics, together.declarations)
+        key = _key(tool_digest(), *("\0".join(sorted(part)) for part in parts))
+        data = _Data(self.store, key, functools.partial(self._make_shared, together))
+        names, paths = data.listing()
+        return names, [
+            KeptFile(path, _key(key, path), functools.partial(data.file, path)) for path in paths
+        ]
+
+    def _make_shared(self, together: PageFacts) -> tuple[Names, dict[str, bytes]]:
+        from coursebuild.render.fonts import FontJob, subset_font
+        from coursebuild.render.shared import shared_files
+
+        def subset(job: FontJob) -> bytes:
+            return self.store.kept("fonts", job.key, lambda: subset_font(job))
+
+        made, names = shared_files(self.assets, subset, together)
+        return names, {file.path: file.data for file in (*made, *self._copies(made))}
+
+    def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:
+        from coursebuild.render.compressed import compressed_files
+
+        def keep(key: str, make: Callable[[], bytes]) -> bytes:
+            return self.store.kept("compressed", key, make)
+
+        return compressed_files(files, keep)
+
+    def _labs(self) -> list[SiteFile]:
+        files = self.library.labs.files
+        return [*files, *self._copies(files)]
+
+    # --- downloads
+
+    def _downloads(self) -> Iterator[SiteFile]:
+        """Scripts, models, archives, and files of the course."""
+        for path, (script, _) in self.library.scripts.items():
+            yield OutputFile(path, script.code.text.encode())
+        for model in self.course.models:
+            path = urls.model_file_path(model.name)
+            yield OutputFile(path, model.source.text.encode())
+        for archive in zips.archives(self.library, self._around()):
+            yield KeptFile(archive.path, _key(tool_digest(), archive.key), archive.packed)
+        yield from self._course_files()
+
+    def _course_files(self) -> Iterator[SiteFile]:
+        digests = Digests(self.store)
+        for path in self.course.files:
+            digest = digests.file(f"{self.options.root}/{path}")
+            read = functools.partial(read_bytes, self.options.root, path)
+            if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
+                digest = hashlib.sha256(read()).hexdigest()
+            yield KeptFile(urls.file_path(path), digest, read)
+        digests.save()
+
+    def _around(self) -> zips.Surroundings:
+        """What scripts need around them."""
+        if not self.library.scripts:
+            return zips.Surroundings()
+        known = all_imports(self.documents.outlines)
+        texts = {
+            script.code.text: known[path]
+            for path, (script, _) in self.library.scripts.items()
+            if path in known
+        }
+        used = {name for modules in texts.values() for name in modules}
+        library = library_files() if "mjcourse" in used else ()
+        imports = _Imports(self.store, texts)
+        modules = zips.imported_modules(self.course, library, imports)
+        packages = tuple(zips.Package(*p) for p in kept_distributions(self.store, modules))
+        meshes = tuple(
+            OutputFile(path, read_bytes(self.options.root, path))
+            for path in self.course.files
+            if path.startswith("models/")
+        )
+        return zips.Surroundings(packages, library, meshes, imports)
+
+
+class _Data:
+    """Files that are made together, of which the names may be all that is needed."""
+
+    def __init__(
+        self, store: Store, key: str, make: Callable[[], tuple[Names, dict[str, bytes]]]
+    ) -> None:
+        self._store = store
+        self._key = key
+        self._make = make
+        self._files: dict[str, bytes] | None = None
+
+    def listing(self) -> tuple[Names, tuple[str, ...]]:
+        """Their names."""
+        known = self._load(_SHARED)
+        if known is not None:
+            names, paths = known
+            return names, paths
+        return self._made()
+
+    def file(self, path: str) -> bytes:
+        """The bytes of one."""
+        if self._files is None:
+            self._files = self._load(_SHARED_DATA)
+        if self._files is None:
+            self._made()
+        assert self._files is not None
+        return self._files[path]
+
+    def _made(self) -> tuple[Names, tuple[str, ...]]:
+        names, self._files = self._make()
+        listing = names, tuple(self._files)
+        self._store.keep(_SHARED_DATA, self._key, pickle.dumps(self._files), local=True)
+        self._store.keep(_SHARED, self._key, pickle.dumps(listing), local=True)
+        return listing
+
+    def _load(self, kind: str) -> Any:
+        data = None if self._store.fresh else self._store.peek(kind, self._key)
+        try:
+            return None if data is None else pickle.loads(data)
+        except Exception:  # whatever damaged bytes make of it
+            return None
+
+
+class _Imports:
+    """What Python texts import: those of lessons are known, others are kept."""
+
+    def __init__(self, store: Store, known: dict[str, frozenset[str]]) -> None:
+        self._store = store
+        self._known = known
+
+    def __call__(self, text: str) -> frozenset[str]:
+        if text not in self._known:
+            data = self._store.kept(
+                "imports",
+                _key(sys.version, text),
+                lambda: json.dumps(sorted(zips.imports(text))).encode(),
+            )
+            self._known[text] = frozenset(json.loads(data))
+        return self._known[text]
+
+
+def _together(facts: Iterable[PageFacts], common: frozenset[str]) -> PageFacts:
+    text: set[str] = {*common}
+    mathematics: set[str] = set()
+    declarations: set[str] = set()
+    for page in facts:
+        text |= page.text
+        mathematics |= page.mathematics
+        declarations |= page.declarations
+    return PageFacts(frozenset(text), frozenset(mathematics), frozenset(declarations))
+
+
+def _key(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
+    """Links of the built pages that lead nowhere; most are found in the sources already."""
+    from coursebuild.render.links import check_links
+
+    pages = {
+        file.path: file.data if isinstance(file, OutputFile) else file.make()
+        for file in files
+        if file.path.endswith(".html")
+    }
+    everything = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
+    for broken in check_links(everything, base_url):
+        page = Source(f"public/{broken.page}", pages[broken.page].decode())
+        start = page.line_starts[broken.line - 1]
+        at = page.text.find(broken.url, start)
+        span = page.span(at, at + len(broken.url)) if at >= 0 else page.span(start, start)
+        help = f"did you mean `{broken.near}`?" if broken.near else ""
+        message = f"`{broken.url}` leads nowhere: {broken.reason}"
+        yield diagnose("link-broken", span, message, help=help)

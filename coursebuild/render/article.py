@@ -1,0 +1,133 @@
+"""The text of a document on its page, and the list of its contents.
+
+Entry points: `article`, `contents`.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from coursebuild.model import (
+    Block,
+    Document,
+    Emphasis,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    Image,
+    Inline,
+    Lab,
+    Link,
+    Mjcf,
+    Quiz,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Text,
+)
+from coursebuild.render.context import PageContext
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """An entry of the contents list."""
+
+    anchor: str
+    title: Markup
+    children: tuple[Entry, ...] = ()
+
+
+def article(page: PageContext, document: Document) -> Markup:
+    """The text of a document. A docked lab stands beside the paragraphs around it."""
+    parts: list[Markup] = []
+    for group in _groups(document.blocks):
+        if group.lab is None:
+            parts.append(page.blocks(group.before))
+        else:
+            before, after = page.blocks(group.before), page.blocks(group.after)
+            instrument = page.block(group.lab)
+            parts.append(
+                page.template("partials/dock.html", before=before, lab=instrument, after=after)
+            )
+    return Markup("\n").join((*parts, page.footnotes()))
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Blocks that follow each other; with a docked lab, those before and after it."""
+
+    before: tuple[Block, ...]
+    lab: Lab | None = None
+    after: tuple[Block, ...] = ()
+
+
+_WIDE = (Script, Recording, Mjcf, Quiz, Lab, Table, HtmlBlock)
+"""Blocks that take the whole width, so that no lab can stand beside them."""
+
+
+def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
+    """Cut the text around its docked labs.
+
+    Each takes what lies between it and the next heading or wide block, on both sides.
+    """
+    groups: list[_Group] = []
+    rest = blocks
+    while (
+        at := next((i for i, b in enumerate(rest) if isinstance(b, Lab) and b.dock), None)
+    ) is not None:
+        lab = rest[at]
+        assert isinstance(lab, Lab)
+        start = next((i + 1 for i in range(at - 1, -1, -1) if isinstance(rest[i], _WIDE)), 0)
+        start = next(
+            (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
+        )
+        end = next(
+            (i for i in range(at + 1, len(rest)) if isinstance(rest[i], (*_WIDE, Heading))),
+            len(rest),
+        )
+        if start:
+            groups.append(_Group(rest[:start]))
+        groups.append(_Group(rest[start:at], lab, rest[at + 1 : end]))
+        rest = rest[end:]
+    return (*groups, _Group(rest)) if rest else tuple(groups)
+
+
+def contents(page: PageContext, document: Document) -> tuple[Entry, ...]:
+    """The contents list: headings of levels 2 and 3, the latter under the former."""
+    entries: list[Entry] = []
+    for block in document.blocks:
+        if not isinstance(block, Heading) or block.level > 3:
+            continue
+        entry = Entry(block.anchor, page.inlines(without_links(block.children)))
+        if block.level == 3 and entries:
+            last = entries[-1]
+            entries[-1] = Entry(last.anchor, last.title, (*last.children, entry))
+        else:
+            entries.append(entry)
+    return tuple(entries)
+
+
+def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
+    """Inlines that may stand inside a link: no link, footnote, raw HTML or picture, in one line."""
+    kept: list[Inline] = []
+    for inline in inlines:
+        match inline:
+            case Link():
+                kept += without_links(inline.children)
+            case Emphasis() | Strong() | Strikethrough():
+                kept.append(type(inline)(inline.span, without_links(inline.children)))
+            case Image():
+                kept.append(Text(inline.span, inline.alt))
+            case SoftBreak() | HardBreak():
+                kept.append(Text(inline.span, " "))
+            case RawInline() | FootnoteRef():
+                pass
+            case _:
+                kept.append(inline)
+    return tuple(kept)

@@ -1,0 +1,35 @@
+"""Characters that HTML forbids, made visible.
+
+Entry point: `visible(text)`. Control characters and non-characters are shown as the symbols that
+stand for them.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+
+_ALLOWED = re.compile("[\t\n -~\u00a0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0001fffd]*+")
+"""Text in which none is, found out fast; characters past U+1FFFF are left to a closer look."""
+_FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
+
+
+@functools.cache
+def _astral_noncharacter() -> re.Pattern[str]:
+    """The last two characters of each plane but the first; rarely needed, and long to compile."""
+    planes = range(1 << 16, 17 << 16, 1 << 16)
+    return re.compile("[" + "".join(chr(p + 0xFFFE) + chr(p + 0xFFFF) for p in planes) + "]")
+
+
+def visible(text: str) -> str:
+    """The text with what HTML forbids replaced: a control by its picture, the rest by U+FFFD."""
+    if _ALLOWED.fullmatch(text):
+        return text
+    return _astral_noncharacter().sub("\ufffd", _FORBIDDEN.sub(_picture, text))
+
+
+def _picture(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    if code < 0x20:
+        return chr(0x2400 + code)
+    return "\u2421" if code == 0x7F else "\ufffd"

@@ -1,0 +1,48 @@
+"""Drawing a page: its sheet and its document through the templates.
+
+Entry point: `draw(sheet, document, tools)`.
+"""
+
+from __future__ import annotations
+
+from coursebuild.model import Document, Paragraph, plain_text
+from coursebuild.render import urls
+from coursebuild.render.article import article, contents
+from coursebuild.render.context import PageContext
+from coursebuild.render.draft import Draft as Draft
+from coursebuild.render.sheet import Highlighted, Sheet
+from coursebuild.render.tools import Tools
+
+
+def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
+    """The page without its frame; the same values give the same page."""
+    values = {
+        name: tools.highlight(value.language, value.text)
+        if isinstance(value, Highlighted)
+        else value
+        for name, value in sheet.values.items()
+    }
+    description = sheet.description
+    if document is not None and sheet.shown is not None:
+        page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
+        values["contents"] = contents(page, document)
+        values["article"] = article(page, document)
+        if sheet.kind == "page":
+            description = _first_sentences(document)
+    return Draft(
+        sheet.path,
+        sheet.kind,
+        sheet.title,
+        description,
+        tools.render(sheet.template, **values),
+        json_ld=sheet.json_ld,
+        og_type=sheet.og_type,
+        indexed=sheet.indexed,
+    )
+
+
+def _first_sentences(document: Document) -> str:
+    """The first paragraph, cut at a word: what search engines show."""
+    first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
+    text = " ".join(plain_text(first.children).split()) if first is not None else ""
+    return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"

@@ -1,0 +1,59 @@
+"""A drawn page, ready for its frame, and what the rest of the site must know of it.
+
+Entry point: `record(draft, base_url)`.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from coursebuild.render.characters import visible
+from coursebuild.render.draft import Draft
+from coursebuild.render.frame import LIVE_LAB
+from coursebuild.render.links import Reference, page_references
+from coursebuild.render.shared import PageFacts, page_facts, settled
+from coursebuild.values import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True)
+class PageRecord:
+    """What the site must know of a page to put it together, but for the page's body."""
+
+    draft: Draft
+    """Without its body."""
+    live: bool
+    """Whether labs run on it."""
+    text: str
+    """The characters of its text, sorted; `mathematics` those of its formulas."""
+    mathematics: str
+    declarations: tuple[str, ...]
+    """Styles that were written in its elements, sorted."""
+    ids: tuple[str, ...]
+    """Anchors, sorted."""
+    references: tuple[Reference, ...]
+    """Where its links lead, sorted, each once."""
+
+    @property
+    def facts(self) -> PageFacts:
+        """What the shared files must know."""
+        return PageFacts(
+            frozenset(self.text), frozenset(self.mathematics), frozenset(self.declarations)
+        )
+
+
+def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
+    """The record of a page that was just drawn, and its body as it will be published."""
+    draft, declarations = settled(draft)
+    facts = page_facts(draft, declarations)
+    body = visible(draft.body)
+    ids, references = page_references(draft.path, body, base_url)
+    found = PageRecord(
+        draft=replace(draft, body=Markup()),
+        live=LIVE_LAB in body,
+        text="".join(sorted(facts.text)),
+        mathematics="".join(sorted(facts.mathematics)),
+        declarations=tuple(sorted(declarations)),
+        ids=tuple(sorted(ids)),
+        references=tuple(sorted(references)),
+    )
+    return found, body

@@ -1,0 +1,113 @@
+"""The files that every page refers to: fonts, the style sheet, the page's script, the icon.
+
+Entry points: `page_facts(draft)` and `common_characters(library)`, by which they depend on the
+pages; `shared_files`, which makes them.
+
+The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
+names and the styles that were written in single elements: a page that changes touches these files
+only where it brings a character or a style that no page has, or takes the last one away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html import unescape
+
+from markupsafe import Markup
+
+from coursebuild.render import fonts, formulas, styles
+from coursebuild.render.assets import Assets, hashed_name, page_script
+from coursebuild.render.frame import Draft, Names
+from coursebuild.render.library import Library
+from coursebuild.results import OutputFile
+from coursebuild.values import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True)
+class PageFacts:
+    """What the shared files must know of a page."""
+
+    text: frozenset[str]
+    """Characters of its text."""
+    mathematics: frozenset[str]
+    """Characters of its formulas."""
+    declarations: frozenset[str]
+    """Styles that were written in its elements."""
+
+
+def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
+    """A page without styles in its elements, and the declarations that were there."""
+    body, found = styles.hoist(formulas.glue(draft.body))
+    return replace(draft, body=Markup(body)), found
+
+
+_FORMULA = re.compile(r"<math\b.*?</math>", re.DOTALL)
+_TAGS = re.compile(r"<[^>]*>")
+_REFERENCE = re.compile(r"&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)")
+"""What may be a character reference, as in `html.unescape`."""
+
+
+def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
+    """The facts of a settled page."""
+    text = {*draft.title, *_characters(_FORMULA.sub("", draft.body))}
+    mathematics = _characters("\n".join(_FORMULA.findall(draft.body))) - {"\n"}
+    return PageFacts(frozenset(text), frozenset(mathematics), declarations)
+
+
+def _characters(html: str) -> set[str]:
+    """The characters of the text of a piece of HTML."""
+    text = _TAGS.sub("", html)
+    found = set(_REFERENCE.sub("", text))
+    for reference in set(_REFERENCE.findall(text)):
+        found.update(unescape(reference))
+    return found
+
+
+def common_characters(library: Library) -> frozenset[str]:
+    """The characters that any page may show: those of the interface and of the frame."""
+    course = library.course
+    text = {*course.title, *course.licence}
+    for page in course.pages:
+        text.update(page.title)
+    for _, words in library.words.entries:
+        text.update(words)
+    return frozenset(text)
+
+
+def shared_files(
+    assets: Assets, subset: Callable[[fonts.FontJob], bytes], facts: PageFacts
+) -> tuple[tuple[OutputFile, ...], Names]:
+    """The files for pages with these facts, taken together, and their names."""
+    files: list[OutputFile] = []
+
+    def publish(path: str, data: bytes) -> str:
+        name = hashed_name(f"assets/{path}", data)
+        files.append(OutputFile(name, data))
+        return name
+
+    text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
+    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
+    jobs = fonts.font_jobs(
+        ((face, assets.file(f"fonts/{face.file}")) for face in faces), text, mathematics
+    )
+    fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
+    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
+    own = styles.style_rules(facts.declarations)
+    names = Names(
+        style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
+        theme_script=publish("theme.js", page_script(assets.file("js/theme.js"))),
+        script=publish("site.js", page_script(assets.file("js/site.js"))),
+        icon=publish("icon.svg", assets.template("icon.svg").encode()),
+        credits=publish("licences.txt", _licences(assets)),
+    )
+    return tuple(files), names
+
+
+def _licences(assets: Assets) -> bytes:
+    """The licences of fonts and libraries that the site ships."""
+    parts = []
+    for path, data in assets.files("licences"):
+        name = path.removeprefix("licences/").removesuffix(".txt")
+        parts.append(f"{name}\n{'=' * len(name)}\n\n{data.decode().strip()}\n")
+    return "\n\n".join(parts).encode()

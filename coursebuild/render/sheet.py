@@ -1,0 +1,140 @@
+"""A page that is to be drawn, as a value: everything that it shows but the text of its document.
+
+Entry points: `Sheet`; `fingerprint(value)`, by which two of them are known to show the same.
+
+A page is drawn from its sheet, its document, and the tool's templates and words, and from nothing
+else: so it need be drawn again only when one of these is another. What a sheet is made of are plain
+values (texts, numbers, tuples, mappings and data classes of them); what a page looks up in the
+course (where a link leads, what a script printed) stands in it as the answer.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pickle
+from collections.abc import Mapping
+from typing import Literal
+
+from markupsafe import Markup
+
+from coursebuild.model import Comparison, Target
+from coursebuild.results import Outcome
+from coursebuild.values import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class ShownRun:
+    """What a page may say of the run of a script."""
+
+    outcome: Outcome
+    missing: tuple[str, ...]
+    """Modules that are not there."""
+    lines: tuple[tuple[int, str | None], ...] = ()
+    """Lines that it printed, by number from 1, as far as questions of the page ask for them;
+    `None` where there is no such line."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownVerdict:
+    """What a page says of the comparison of an output."""
+
+    status: Literal["verified", "drift", "volatile", "unchecked"]
+    comparison: Comparison
+
+
+@dataclass(frozen=True, slots=True)
+class ShownRecord:
+    """What a page shows of the trial of a lab."""
+
+    picture: str
+    """Site path."""
+    size: tuple[int, int]
+    """Pixels."""
+    time: float
+    """Simulated time of the picture, s."""
+    readouts: tuple[tuple[str, str], ...]
+    end: float
+    """Simulated time of the readouts and of the end of the plots, s."""
+    plots: tuple[str, ...]
+    """SVG."""
+    tried: int
+    parity: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShownLab:
+    """A lab that runs."""
+
+    name: str
+    config: str
+    """Site path, as of `script`."""
+    script: str
+    record: ShownRecord | None
+
+
+@dataclass(frozen=True, slots=True)
+class ShownCallout:
+    """The words of a kind of callout."""
+
+    label: str
+    promise: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What the page of a document shows of the rest of the course, and of what running it found.
+
+    What stands at a place in the document goes by its offset there.
+    """
+
+    engine: str = ""
+    """Version of MuJoCo."""
+    python: str = ""
+    hrefs: Mapping[Target, str] = field(default_factory=dict)
+    """Addresses of links, as seen from the page."""
+    callouts: Mapping[str, ShownCallout] = field(default_factory=dict)
+    runs: Mapping[str, ShownRun] = field(default_factory=dict)
+    """By path of the script."""
+    verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
+    labs: Mapping[int, ShownLab] = field(default_factory=dict)
+    keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the keyframes of models, by the model's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Highlighted:
+    """Code whose tokens are marked when the page is drawn."""
+
+    language: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A page that is to be drawn."""
+
+    path: str
+    """Its site path."""
+    kind: str
+    """See `Draft`."""
+    title: str
+    description: str
+    template: str
+    values: Mapping[str, object]
+    """For the template; `Highlighted` among them are drawn first."""
+    json_ld: Markup = Markup()
+    og_type: str = "website"
+    indexed: bool = True
+    document: str | None = None
+    """The path of its document, whose text and contents the template gets as well."""
+    shown: Shown | None = None
+
+
+def fingerprint(value: object) -> str:
+    """The same for equal values of the same types; the order of a mapping counts."""
+    out = io.BytesIO()
+    pickler = pickle.Pickler(out, 5)
+    pickler.fast = True  # what is written depends on what is equal, not on what is one object
+    pickler.dump(value)
+    return hashlib.sha256(out.getbuffer()).hexdigest()

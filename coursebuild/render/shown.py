@@ -1,0 +1,191 @@
+"""What the page of a document looks up in the course and in its results.
+
+Entry point: `shown(library, place, document)`.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never
+from urllib.parse import urlsplit
+
+from coursebuild.model import (
+    Block,
+    Callout,
+    Document,
+    ExampleTarget,
+    Lab,
+    LessonTarget,
+    LevelTarget,
+    Link,
+    ModelTarget,
+    OutputQuestion,
+    PageTarget,
+    Quiz,
+    Recording,
+    Script,
+    Target,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    local_file,
+    resolve,
+    walk_inlines,
+)
+from coursebuild.render import urls
+from coursebuild.render.characters import visible
+from coursebuild.render.lab_files import LabFiles
+from coursebuild.render.library import Library
+from coursebuild.render.sheet import (
+    Shown,
+    ShownCallout,
+    ShownLab,
+    ShownRecord,
+    ShownRun,
+    ShownVerdict,
+)
+from coursebuild.results import Outcome, ScriptRun
+
+
+def shown(library: Library, place: urls.Place, document: Document) -> Shown:
+    """All that the document's page shows besides what stands in the document.
+
+    The skeleton of a document does as well as the document.
+    """
+    page = _Page(library, place, document)
+    for block in document_blocks(document):
+        page.note(block)
+    return Shown(
+        engine=library.results.engine,
+        python=library.results.python,
+        hrefs=page.hrefs,
+        callouts=page.callouts,
+        runs=page.runs(),
+        verdicts=page.verdicts,
+        labs=page.labs,
+        keyframes=page.keyframes,
+    )
+
+
+class _Page:
+    """Collects what a document asks for."""
+
+    def __init__(self, library: Library, place: urls.Place, document: Document) -> None:
+        self.library = library
+        self.place = place
+        self.path = document.source.path
+        self.hrefs: dict[Target, str] = {}
+        self.callouts: dict[str, ShownCallout] = {}
+        self.verdicts: dict[int, ShownVerdict] = {}
+        self.labs: dict[int, ShownLab] = {}
+        self.keyframes: dict[str, tuple[str, ...]] = {}
+        self.scripts: dict[str, set[int]] = {}
+        """Paths of scripts, and the numbers of the lines that questions ask for."""
+
+    def note(self, block: Block) -> None:
+        """Note what a block asks for."""
+        match block:
+            case Script():
+                self.scripts.setdefault(block.path, set())
+            case Recording():
+                self._recording(block)
+            case Lab():
+                self._lab(block)
+            case Quiz():
+                for question in block.questions:
+                    if isinstance(question, OutputQuestion):
+                        self.scripts.setdefault(question.script, set()).add(question.line)
+            case Callout():
+                library, kind = self.library, block.kind
+                words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))
+                self.callouts[kind] = words
+            case _:
+                pass
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Link):
+                self._link(inline.target)
+
+    def _recording(self, block: Recording) -> None:
+        if block.script is not None:
+            self.scripts.setdefault(block.script, set())
+        verdict = self.library.verdict(block)
+        if verdict is not None:
+            self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
+
+    def _lab(self, block: Lab) -> None:
+        files = self.library.labs.labs.get((block.span.path, block.span.start))
+        if files is not None:
+            self.labs[block.span.start] = _shown_lab(files)
+        if block.model is not None:
+            self._link(ModelTarget(block.model))
+            compiled = self.library.models.get(block.model)
+            if isinstance(block.key, int) and compiled is not None and compiled.facts is not None:
+                self.keyframes[block.model] = compiled.facts.keyframes
+
+    def _link(self, target: Target) -> None:
+        if target not in self.hrefs:
+            self.hrefs[target] = address(self.library, self.place, self.path, target)
+
+    def runs(self) -> dict[str, ShownRun]:
+        """What is shown of the scripts that ran."""
+        runs = self.library.runs
+        return {
+            path: _shown_run(runs[path], lines)
+            for path, lines in self.scripts.items()
+            if path in runs
+        }
+
+
+def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
+    if run.outcome is not Outcome.OK or not numbers:
+        return ShownRun(run.outcome, run.missing)
+    lines = run.stdout.split("\n")
+    asked = (
+        (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
+        for n in sorted(numbers)
+    )
+    return ShownRun(run.outcome, run.missing, tuple(asked))
+
+
+def _shown_lab(files: LabFiles) -> ShownLab:
+    result, static, record = files.result, files.result.static, None
+    if static is not None and files.picture is not None:
+        record = ShownRecord(
+            picture=files.picture,
+            size=static.size,
+            time=static.time,
+            readouts=static.readouts,
+            end=static.end,
+            plots=static.plots,
+            tried=len(result.tried),
+            parity=result.parity,
+        )
+    return ShownLab(result.name, files.config, files.script, record)
+
+
+def address(library: Library, place: urls.Place, path: str, target: Target) -> str:
+    """The address of a link's target, from a place, in the document with a path."""
+    target = resolve(target, library.course, path)
+    match target:
+        case LessonTarget():
+            return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
+        case LevelTarget():
+            return place.href(urls.level_path(library.levels[target.id]))
+        case ModelTarget():
+            return place.href(urls.model_page_path(target.name))
+        case PageTarget():
+            return place.href(urls.page_path(library.pages[target.id]), target.anchor)
+        case ExampleTarget():
+            return place.href(target.path)
+        case UrlTarget():
+            return file_address(place, path, target.url)
+        case _:
+            assert_never(target)
+
+
+def file_address(place: urls.Place, path: str, url: str) -> str:
+    """An address as written, but a file of the course becomes its place in the site."""
+    parts = urlsplit(url)
+    if parts.scheme or parts.netloc or not parts.path:
+        return url
+    site_path = urls.file_path(local_file(url, path))
+    return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]

@@ -1,0 +1,57 @@
+"""What pages are drawn with, whatever they show: words, templates, formulas.
+
+Entry point: `Tools`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, TypeAlias
+
+from markupsafe import Markup
+
+from coursebuild.render.strings import Strings
+from coursebuild.results import Formula, MathError
+from coursebuild.values import dataclass, field
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+Mark: TypeAlias = Callable[[str, str], tuple[Markup, ...]]
+"""Gives the lines of code in a language, their tokens marked."""
+
+
+def mark_now(language: str, code: str) -> tuple[Markup, ...]:
+    """See `highlight.highlight_lines`, which is imported when there is something to mark."""
+    from coursebuild.render.highlight import highlight_lines
+
+    return highlight_lines(language, code)
+
+
+@dataclass(frozen=True, slots=True)
+class Tools:
+    """The interface's words in the course's language, the templates, and formulas as MathML."""
+
+    words: Strings
+    templates: Callable[[], Environment]
+    """Gives the template engine."""
+    formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
+    mark: Mark = mark_now
+    """How code is marked: whoever calls may keep what was marked before."""
+
+    def render(self, template: str, **values: object) -> Markup:
+        """A filled-in template, without its last line end; it sees `t`, the interface's words."""
+        text = self.templates().get_template(template).render(t=self.words, **values)
+        return Markup(text.rstrip("\n"))
+
+    def highlight(self, language: str, code: str) -> Markup:
+        """Code with its tokens marked."""
+        return Markup("\n").join(self.mark(language, code))
+
+    def mathml(self, tex: str, display: bool) -> Markup:
+        """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
+        found = self.formulas[Formula(tex, display)]
+        if isinstance(found, MathError):
+            raise ValueError(f"formula {tex!r} does not parse: {found.message}")
+        return Markup(found)

@@ -1,0 +1,139 @@
+"""Why something would run again, or not, and what depends on it: values, and as text and JSON.
+
+Entry points: `Explanation`, `explained_text`, `explained_json`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from typing import Literal
+
+from coursebuild.report.text import Style, visible
+from coursebuild.report.values import plural
+from coursebuild.values import dataclass
+
+State = Literal["remembered", "would run", "norun"]
+_GREEN, _YELLOW, _FAINT, _BOLD = "32", "1;33", "2", "1"
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """A script or a lab: whether it would run now, and why."""
+
+    kind: Literal["script", "lab"]
+    name: str
+    """A script's path, a lab's name."""
+    owner: str
+    """Id of its lesson or page."""
+    state: State
+    reasons: tuple[str, ...] = ()
+    """Why it would run, each a clause."""
+    depends: tuple[str, ...] = ()
+    """What its last result depends on, a line each."""
+    made: int | None = None
+    """When that was made, in seconds since 1970."""
+    seconds: float | None = None
+    outcome: str = ""
+    """How its last run ended; empty where there was none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What is known of a path."""
+
+    path: str
+    kind: Literal["script", "lesson", "page", "model", "file"]
+    own: tuple[Explained, ...]
+    """The script itself, or those of a lesson or page with its labs."""
+    dependents: tuple[Explained, ...] = ()
+    """Scripts and labs whose results depend on it."""
+    files: tuple[str, ...] = ()
+    """Of a model: the other files that it consists of."""
+    part_of: tuple[str, ...] = ()
+    """Models that it is a part of."""
+    shown: tuple[str, ...] = ()
+    """Files of the lessons and pages that show it, link to it or quote its output."""
+
+
+def explained_json(explanation: Explanation) -> str:
+    """As one JSON object."""
+    value = dataclasses.asdict(explanation)
+    return json.dumps(value, ensure_ascii=True, indent=2) + "\n"
+
+
+def explained_text(explanation: Explanation, style: Style) -> str:
+    """As text for people."""
+    e = explanation
+    parts: list[str] = []
+    if e.kind == "script":
+        parts += ["\n".join(_whole(one, style)) for one in e.own]
+    else:
+        parts.append(style.paint(_head(e), _BOLD))
+        parts += ["\n".join(_brief(one, style)) for one in e.own]
+    if e.files:
+        parts.append(_block("consists also of", e.files))
+    if e.part_of:
+        parts.append(_block("is a part of", e.part_of))
+    if e.dependents:
+        lines = [line for one in e.dependents for line in _brief(one, style)]
+        parts.append("\n".join(["depending on it:", *(f"  {line}" for line in lines)]))
+    elif e.kind in ("model", "file"):
+        parts.append("no result of a script or lab depends on it")
+    if e.shown:
+        parts.append(_block("shown, linked or quoted in", e.shown))
+    return "\n\n".join(parts) + "\n"
+
+
+def _head(e: Explanation) -> str:
+    if e.kind in ("model", "file"):
+        return visible(e.path)
+    again = sum(one.state == "would run" for one in e.own)
+    if not e.own:
+        return f"{visible(e.path)} has no scripts and no labs"
+    rest = "none would run" if not again else f"{again} would run"
+    scripts = sum(one.kind == "script" for one in e.own)
+    labs = len(e.own) - scripts
+    counted = [plural(scripts, "script")] if scripts else []
+    counted += [plural(labs, "lab")] if labs else []
+    return f"{visible(e.path)}: {' and '.join(counted)}, of which {rest}"
+
+
+def _block(head: str, lines: tuple[str, ...]) -> str:
+    return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
+
+
+def _verdict(one: Explained, style: Style) -> str:
+    match one.state:
+        case "remembered":
+            return style.paint("is remembered", _GREEN)
+        case "norun":
+            return "is never run: its lesson says `norun`"
+        case "would run":
+            again = " again" if one.made is not None else ""
+            verb = "run" if one.kind == "script" else "be tried"
+            return style.paint(f"would {verb}{again}", _YELLOW)
+
+
+def _whole(one: Explained, style: Style) -> list[str]:
+    lines = [f"{style.paint(visible(one.name), _BOLD)} {_verdict(one, style)}"]
+    lines += [f"  because {visible(reason)}" for reason in one.reasons]
+    lines.append(style.paint(f"  {_last(one)}", _FAINT))
+    if one.depends:
+        lines += ["", "its last result depends on:"]
+        lines += [f"  {visible(line)}" for line in one.depends]
+    return lines
+
+
+def _brief(one: Explained, style: Style) -> list[str]:
+    line = f"{visible(one.name)} {_verdict(one, style)}"
+    return [line, *(f"  because {visible(reason)}" for reason in one.reasons)]
+
+
+def _last(one: Explained) -> str:
+    owner = f"of {one.owner}"
+    if one.made is None or one.seconds is None:
+        return f"{owner}, not run yet on this machine"
+    when = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(one.made))
+    return f"{owner}, last run {when}, {one.seconds:.2f} s: {one.outcome}"

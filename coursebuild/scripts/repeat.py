@@ -1,0 +1,92 @@
+"""A script run again, with nothing changed that it depends on, does something else than before.
+
+Entry point: `repeat_findings`.
+
+An output that its lesson calls volatile may differ, and so may one that matches what is recorded
+both times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from coursebuild.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.model import Comparison, Course, Mode, Recording, document_blocks
+from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.compare import compare
+from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.extract import Extraction
+
+_LINES = 12
+_WIDTH = 120
+
+
+def repeat_findings(
+    course: Course,
+    extractions: Iterable[Extraction],
+    differing: Sequence[tuple[ScriptRun, ScriptRun]],
+) -> tuple[Diagnostic, ...]:
+    """A warning for each script; `differing` holds what is remembered and what was done now."""
+    by_path = {extraction.path: extraction for extraction in extractions}
+    found = []
+    for before, now in differing:
+        extraction = by_path.get(now.path)
+        if extraction is not None and not _may_differ(course, before, now):
+            found.append(_told(extraction, before, now))
+    return tuple(found)
+
+
+def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
+    if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
+        return False
+    recordings = [
+        block
+        for document in course.documents
+        for block in document_blocks(document)
+        if isinstance(block, Recording) and block.script == now.path and block.readable
+    ]
+    return bool(recordings) and all(_both_hold(course, r, before, now) for r in recordings)
+
+
+def _both_hold(course: Course, recording: Recording, before: ScriptRun, now: ScriptRun) -> bool:
+    comparison: Comparison = recording.comparison or course.comparison
+    if comparison.mode is Mode.VOLATILE:
+        return True
+    verdicts = (compare(recording, comparison, course.filters, run.stdout) for run in (before, now))
+    return all(verdict.status == "verified" for verdict in verdicts)
+
+
+def _told(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
+    notes = []
+    if (before.outcome, before.status) != (now.outcome, now.status):
+        notes.append(Note(f"it ended otherwise: before {_end(before)}, now {_end(now)}"))
+    diff = _diff(before.stdout, now.stdout)
+    if diff:
+        notes.append(Note("its output:\n" + diff))
+    return diagnose(
+        "script-unrepeatable",
+        extraction.script.span.first_line(),
+        f"`{extraction.path}` does something else than it did before, with nothing changed "
+        "that is known to count",
+        help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
+        "or put `volatile` on its output",
+        notes=notes,
+    )
+
+
+def _end(run: ScriptRun) -> str:
+    return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
+
+
+def _diff(before: str, now: str) -> str:
+    import difflib
+
+    lines = [
+        line
+        for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
+        if not line.startswith(("---", "+++", "@@"))
+    ]
+    shown = [shortened(line, _WIDTH) for line in lines[:_LINES]]
+    if len(lines) > _LINES:
+        shown.append(f"… and {len(lines) - _LINES} more lines")
+    return "\n".join(shown)

@@ -1,0 +1,145 @@
+/**
+ * What a shiny floor shows: the one reflection of a picture.
+ *
+ * As in MuJoCo's renderer, the first geom with `reflectance` that is a plane or a box, and not seen through, reflects: a plane on its
+ * upper side, a box on the face towards its +z. What it shows is added to its own colour, times `reflectance`; the sky is not in it.
+ *
+ * The scene is drawn a second time from the eye's mirror image, into a texture that the surface looks up by where it is on the
+ * screen. A scene without such a geom has no `Mirror`, and pays nothing.
+ */
+
+import { Matrix4, PerspectiveCamera, Vector2, Vector3, Vector4, WebGLRenderTarget } from 'three'
+import { GEOM } from './geometry.js'
+
+const SOFT = 0.5 // texels for each pixel, without a graphics processor
+
+export class Mirror {
+  /** @param {{solid: import('./solid.js').Solid, reflectance: number}[]} surfaces that may reflect, in the model's order */
+  constructor(surfaces) {
+    this.lens = new PerspectiveCamera()
+    this.lens.matrixAutoUpdate = false
+    this.target = null
+    this.picture = { value: null }
+    this.screen = { value: new Vector2() }
+    this.surfaces = surfaces.map(({ solid, reflectance }) => {
+      const strength = { value: 0 }
+      polish(solid.material, { labMirror: this.picture, labScreen: this.screen, labReflectance: strength })
+      return { solid, reflectance, strength }
+    })
+  }
+
+  /** Draw the reflection that the next picture through `lens` needs; gives whether there is one. */
+  draw({ renderer, software, sharpness }, scene, lens, width, height) {
+    this.picture.value = null
+    for (const { strength } of this.surfaces) strength.value = 0
+    const chosen = this.surfaces.find(({ solid }) => solid.shown && !solid.material.transparent)
+    const plane = chosen === undefined ? null : upperFace(chosen.solid)
+    if (plane === null || !reflect(lens, plane, this.lens)) return false
+    this.resize(sharpness * (software ? SOFT : 1), width, height)
+    this.render(renderer, scene, chosen.solid.material)
+    this.picture.value = this.target.texture
+    this.screen.value.set(1 / (width * sharpness), 1 / (height * sharpness))
+    chosen.strength.value = chosen.reflectance
+    return true
+  }
+
+  resize(scale, width, height) {
+    const [w, h] = [width, height].map((x) => Math.max(1, Math.round(scale * x)))
+    // Without antialiasing of its own: resolving it lost the shadow maps of point lights, which the picture needs next.
+    this.target ??= new WebGLRenderTarget(w, h)
+    this.target.setSize(w, h)
+  }
+
+  render(renderer, scene, material) {
+    const { background } = scene
+    scene.background = null
+    // The surface itself is not in its reflection, but it may cast a shadow there.
+    material.colorWrite = material.depthWrite = false
+    renderer.setRenderTarget(this.target)
+    renderer.render(scene, this.lens)
+    renderer.setRenderTarget(null)
+    material.colorWrite = material.depthWrite = true
+    scene.background = background
+  }
+
+  dispose() {
+    this.target?.dispose()
+  }
+}
+
+/** The surface that reflects, as a point of it and its normal; null where it has no size. */
+function upperFace({ type, meshes: [mesh] }) {
+  const e = mesh.matrix.elements
+  const normal = new Vector3(e[8], e[9], e[10])
+  const point = new Vector3(e[12], e[13], e[14])
+  if (type === GEOM.BOX) point.add(normal)
+  return normal.lengthSq() > 0 ? { point, normal: normal.normalize() } : null
+}
+
+/**
+ * Set `mirrored` to a camera that sees what a plane shows to `lens`, with left and right exchanged.
+ *
+ * What is behind the plane is cut off by its near plane, which is laid into the mirror.
+ *
+ * @returns {boolean} false where the eye is behind the plane
+ */
+export function reflect(lens, { point, normal }, mirrored) {
+  const eye = new Vector3().setFromMatrixPosition(lens.matrixWorld)
+  const offset = normal.dot(point)
+  if (normal.dot(eye) <= offset) return false
+  const { x, y, z } = normal
+  const householder = new Matrix4().set(
+    1 - 2 * x * x, -2 * x * y, -2 * x * z, 2 * offset * x,
+    -2 * x * y, 1 - 2 * y * y, -2 * y * z, 2 * offset * y,
+    -2 * x * z, -2 * y * z, 1 - 2 * z * z, 2 * offset * z,
+    0, 0, 0, 1,
+  ) // prettier-ignore
+  // Exchanging left and right makes a rotation of it again, so that front faces stay front faces.
+  mirrored.matrix.multiplyMatrices(householder, lens.matrixWorld).scale(new Vector3(-1, 1, 1))
+  mirrored.updateMatrixWorld(true)
+  mirrored.projectionMatrix.copy(lens.projectionMatrix)
+  mirrored.projectionMatrixInverse.copy(lens.projectionMatrixInverse)
+  cut(mirrored, normal, point)
+  return true
+}
+
+/** Lay the near plane of a camera into a plane, and its far plane so that the corner of the frustum that is farthest off stays. */
+function cut(camera, normal, point) {
+  const inverse = camera.matrixWorldInverse
+  const n = normal.clone().transformDirection(inverse)
+  const plane = new Vector4(n.x, n.y, n.z, -n.dot(point.clone().applyMatrix4(inverse)))
+  const corner = new Vector4(Math.sign(plane.x), Math.sign(plane.y), 1, 1).applyMatrix4(camera.projectionMatrixInverse)
+  const e = camera.projectionMatrix.elements
+  const w = new Vector4(e[3], e[7], e[11], e[15])
+  plane.multiplyScalar((2 * w.dot(corner)) / plane.dot(corner)).sub(w)
+  e[2] = plane.x
+  e[6] = plane.y
+  e[10] = plane.z
+  e[14] = plane.w
+  camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert()
+}
+
+/** Let a material add what a mirror shows, where its normal is its geom's z axis. */
+function polish(material, uniforms) {
+  const { onBeforeCompile } = material
+  const name = `${material.userData.shader ?? ''} lab-mirror`
+  material.onBeforeCompile = (shader, renderer) => {
+    onBeforeCompile.call(material, shader, renderer)
+    Object.assign(shader.uniforms, uniforms)
+    shader.vertexShader = shader.vertexShader
+      .replace('#include <common>', '#include <common>\nvarying float vLabTop;')
+      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabTop = step(0.5, normal.z);')
+    shader.fragmentShader = shader.fragmentShader
+      .replace(
+        '#include <common>',
+        '#include <common>\nvarying float vLabTop;\nuniform sampler2D labMirror;\nuniform vec2 labScreen;\nuniform float labReflectance;',
+      )
+      .replace(
+        '#include <opaque_fragment>',
+        `#include <opaque_fragment>
+        vec2 labAt = gl_FragCoord.xy * labScreen;
+        gl_FragColor.rgb += labReflectance * vLabTop * texture2D(labMirror, vec2(1.0 - labAt.x, labAt.y)).rgb;`,
+      )
+  }
+  material.customProgramCacheKey = () => name
+}

@@ -1,0 +1,45 @@
+/** A lab's code that is looked after piece by piece. */
+
+/** Ends a run once it is known what was looked for. */
+class Found extends Error {}
+
+/**
+ * The same code, which ends with an exception after the piece that changes what a guard looks after.
+ *
+ * @param {object} code
+ * @param {import('./guard.js').Guard} guard
+ * @returns {{code: object, entry: () => (string | number)[] | null}} `entry` of that piece
+ */
+export function watchedCode(code, guard) {
+  let guilty = null
+  const look = (entry) => {
+    if (guilty !== null || guard.changes().length === 0) return
+    guilty = entry
+    guard.repair()
+    throw new Found()
+  }
+  const watch = (entry, run) => {
+    if (!run) return run
+    return (env, value) => {
+      let result
+      try {
+        result = run(env, value)
+      } catch (error) {
+        look(entry)
+        throw error
+      }
+      look(entry)
+      return result
+    }
+  }
+  const list = (name) => code[name].map((run, i) => watch([name, i, 'expr'], run))
+  const watched = {
+    setup: watch(['setup'], code.setup),
+    controller: watch(['controller'], code.controller),
+    controls: code.controls.map(({ set, run }, i) => ({ set: watch(['controls', i], set), run: watch(['controls', i, 'run'], run) })),
+    readouts: list('readouts'),
+    plots: code.plots.map((traces, i) => traces.map((run, j) => watch(['plots', i, 'traces', j, 'expr'], run))),
+    expect: list('expect'),
+  }
+  return { code: watched, entry: () => guilty }
+}

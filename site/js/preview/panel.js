@@ -1,0 +1,119 @@
+/**
+ * What is wrong with the course, over the page: a small button in the corner says how things stand, and opens the list.
+ *
+ * The list opens by itself when there is a mistake that was not there before, closes when the last one is mended, and stays away once
+ * a reader has closed it, until there is another.
+ */
+
+import { h } from './elements.js'
+
+const PATIENCE = 600 // ms
+
+const count = (number, noun) => `${number} ${noun}${number === 1 ? '' : 's'}`
+
+/** What the button says of the news. */
+export function summary({ problems, busy, trouble }, lost, gone) {
+  const errors = problems.filter(({ severity }) => severity === 'error').length
+  const warnings = problems.length - errors
+  const parts = []
+  if (lost) parts.push('the preview has stopped')
+  if (gone) parts.push('this page is gone')
+  if (trouble) parts.push('the checks could not be done')
+  if (errors) parts.push(count(errors, 'mistake'))
+  if (warnings) parts.push(count(warnings, 'warning'))
+  if (busy && !lost) parts.push(`${busy} …`)
+  return parts.join(', ')
+}
+
+export class Panel {
+  constructor() {
+    this.news = { problems: [], more: 0, busy: '', trouble: '' }
+    this.lost = false
+    this.gone = false
+    this.open = false
+    this.told = new Set() // mistakes that a reader has seen
+    this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
+    this.status = h('span', { class: 'preview-unseen', role: 'status' })
+    this.list = h('section', { class: 'preview-panel', 'aria-label': 'Problems', tabindex: '-1' })
+    this.root = h('div', { class: 'preview-own', lang: 'en', dir: 'ltr' }, this.list, this.button, this.status)
+    this.root.addEventListener('keydown', (event) => {
+      if (event.key === 'Escape' && this.open) this.toggle()
+    })
+    document.documentElement.append(this.root)
+    this.draw()
+  }
+
+  show(news) {
+    // What is done in a moment is not worth a word.
+    clearTimeout(this.timer)
+    if (news.busy && !this.news.busy) {
+      this.timer = setTimeout(() => this.take(news), PATIENCE)
+      news = { ...news, busy: '' }
+    }
+    this.take(news)
+  }
+
+  take(news) {
+    this.news = news
+    const errors = news.problems.filter(({ severity, inPlace }) => severity === 'error' && !inPlace)
+    const fresh = errors.filter(({ place, message }) => !this.told.has(`${place} ${message}`))
+    if (fresh.length > 0) this.open = true
+    if (errors.length === 0 && !news.trouble) this.open = false
+    this.told = new Set(errors.map(({ place, message }) => `${place} ${message}`))
+    this.draw()
+  }
+
+  state({ lost = this.lost, gone = this.gone }) {
+    Object.assign(this, { lost, gone })
+    this.draw()
+  }
+
+  toggle() {
+    this.open = !this.open
+    this.draw()
+    if (this.open) this.list.focus()
+    else this.button.focus()
+  }
+
+  draw() {
+    const text = summary(this.news, this.lost, this.gone)
+    const some = this.news.problems.length > 0 || this.news.trouble !== ''
+    const drawn = JSON.stringify([text, this.open, this.news, this.gone])
+    if (drawn === this.drawn) return
+    this.drawn = drawn
+    this.button.hidden = text === ''
+    this.button.textContent = text
+    this.button.disabled = !some && !this.gone
+    this.button.classList.toggle('preview-bad', this.lost || this.gone || this.news.problems.some(({ severity }) => severity === 'error'))
+    this.button.setAttribute('aria-expanded', String(this.open))
+    this.status.textContent = some || this.gone || this.lost ? text : ''
+    this.list.hidden = !this.open
+    this.list.replaceChildren(...(this.open ? this.content() : []))
+  }
+
+  content() {
+    const { problems, more, trouble, kept } = this.news
+    const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, 'Close')
+    const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, kept ? 'The last good page is shown' : 'What is wrong with the course'), close)]
+    if (trouble) parts.push(h('pre', { class: 'preview-trouble' }, trouble))
+    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map(problem)))
+    if (more) parts.push(h('p', {}, `and ${more} more, in the terminal`))
+    return parts
+  }
+}
+
+function problem({ severity, rule, place, message, label, help, notes, line, start, end }) {
+  const item = h('li', { class: `preview-problem preview-${severity}` })
+  item.append(
+    h('p', { class: 'preview-message' }, h('strong', {}, severity === 'error' ? 'Mistake' : 'Warning'), ` ${message}`),
+    h('p', { class: 'preview-place' }, h('code', {}, place), ` ${rule}`),
+  )
+  if (line.trim()) {
+    const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
+    item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), marked, line.slice(Math.max(end, start + 1))))
+  }
+  if (label) item.append(h('p', { class: 'preview-label' }, label))
+  for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
+  if (help) item.append(h('p', { class: 'preview-help' }, help))
+  return item
+}

@@ -1,0 +1,16 @@
+/** Texts that differ in one stretch. */
+
+/** The stretch of `before` to replace, and by what: `{start, count, text}`. No half of a character is left alone. */
+export function stretch(before, after) {
+  const shortest = Math.min(before.length, after.length)
+  let start = 0
+  while (start < shortest && before[start] === after[start]) start++
+  if (start > 0 && isHigh(before, start - 1)) start--
+  let end = 0
+  while (end < shortest - start && before[before.length - 1 - end] === after[after.length - 1 - end]) end++
+  if (end > 0 && isLow(before, before.length - end)) end--
+  return { start, count: before.length - end - start, text: after.slice(start, after.length - end) }
+}
+
+const isHigh = (text, at) => (text.charCodeAt(at) & 0xfc00) === 0xd800
+const isLow = (text, at) => (text.charCodeAt(at) & 0xfc00) === 0xdc00

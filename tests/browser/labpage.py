@@ -1,0 +1,122 @@
+"""What the tests of labs in a browser share: to find a lab, to wait, to read what it shows."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Callable
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+from playwright.sync_api import BrowserContext, Locator, Page
+
+SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
+"""The labs of the page, by number."""
+
+MOUNT = """async (number) => {
+  const place = document.querySelectorAll('.lab')[number]
+  const copy = place.cloneNode(true)
+  place.replaceWith(copy)
+  copy.id = 'tried'
+  const script = new URL(copy.dataset.script, document.baseURI).href
+  const { mountLab } = await import(script)
+  window.made = await mountLab(copy, (key) => key)
+  copy.querySelector('.lab-view').scrollIntoView({ block: 'center' })
+}"""
+"""Mounts a lab by hand, in a copy of its place that the page's own script does not know: so that a
+test sees more of it, as `made`, than its picture."""
+
+
+def watched(context: BrowserContext) -> tuple[Page, list[str]]:
+    """A page, and what it says to the console."""
+    page, said = context.new_page(), list[str]()
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
+    return page, said
+
+
+def until(page: Page, true: str, argument: object = None, tries: int = 400) -> None:
+    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
+    for _ in range(tries):
+        if page.evaluate(true, argument):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never true: {true}")
+
+
+def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
+    """A lab of the page, in the window and started."""
+    found = page.locator(".lab").nth(number)
+    found.scroll_into_view_if_needed()
+    if state is not None:
+        reach(page, number, state)
+    return found
+
+
+def reach(page: Page, number: int, state: str) -> None:
+    until(
+        page,
+        "([n, state]) => document.querySelectorAll('.lab')[n].dataset.state === state",
+        [number, state],
+    )
+
+
+def readout(found: Locator, label: str) -> str:
+    row = found.locator(".lab-live .lab-readouts > div").filter(has_text=label)
+    return row.locator("dd").inner_text().strip().replace("−", "-")
+
+
+def shows(found: Locator, label: str, text: str) -> None:
+    """A readout comes to show a text; a page draws when it gets to it."""
+    comes(found.page, lambda: readout(found, label) == text)
+
+
+def comes(page: Page, true: Callable[[], bool]) -> None:
+    """Wait for something; how long it takes on a machine is no matter."""
+    for _ in range(400):
+        if true():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError("it never comes")
+
+
+def changed(page: Page, view: Locator, before: bytes) -> bytes:
+    """The picture once it is another one."""
+    for _ in range(100):
+        now = view.screenshot()
+        if now != before:
+            return now
+        page.wait_for_timeout(100)
+    raise AssertionError("the picture stays as it is")
+
+
+def time_of(found: Locator) -> float:
+    return float(found.locator(".lab-time").inner_text().removesuffix("s").strip())
+
+
+def state_of(page: Page, found: Locator) -> dict[str, object]:
+    """What the link of a lab's state holds."""
+    before = page.evaluate("() => location.href")
+    found.get_by_role("button", name="Copy link").click()
+    for _ in range(100):
+        if page.evaluate("() => location.href") != before:
+            break
+        page.wait_for_timeout(20)
+    return parsed(page.evaluate("() => location.href"))
+
+
+def parsed(address: str) -> dict[str, object]:
+    """The content of a link: its JSON, and the physics as `physics`."""
+    packed = parse_qs(urlsplit(address).fragment)["z"][0]
+    content = zlib.decompress(base64.urlsafe_b64decode(packed + "==="), wbits=-15)
+    head, _, physics = content.partition(b"\n")
+    state: dict[str, object] = json.loads(head)
+    return {**state, "physics": physics}
+
+
+def floats(state: dict[str, object]) -> np.ndarray:
+    physics = state["physics"]
+    assert isinstance(physics, bytes)
+    return np.frombuffer(physics, dtype="<f8")

@@ -1,0 +1,230 @@
+"""Labs under fingers: turning, pinching, pulling a body, and a page that still scrolls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from labcourse import PAGE
+from labpage import MOUNT, SWING, comes, until, watched
+from playwright.sync_api import Browser, CDPSession, Page
+
+pytestmark = pytest.mark.browser
+
+HEIGHT = 320
+"""CSS pixels of the picture."""
+
+
+class Fingers:
+    """Fingers on a page's screen; the pointer events and scrolling they cause are the browser's."""
+
+    def __init__(self, page: Page, session: CDPSession) -> None:
+        self.page, self._session = page, session
+        self._down: dict[int, tuple[float, float]] = {}
+
+    def _send(self, kind: str) -> None:
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in self._down.items()]
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def down(self, *places: tuple[float, float]) -> None:
+        for place in places:
+            self._down[len(self._down)] = place
+            self._send("touchStart")
+
+    def move(self, *targets: tuple[float, float], steps: int = 8) -> None:
+        """Draw all fingers to their targets, at the same time."""
+        begun = dict(self._down)
+        for k in range(1, steps + 1):
+            for i, (x, y) in enumerate(targets):
+                x0, y0 = begun[i]
+                self._down[i] = (x0 + (x - x0) * k / steps, y0 + (y - y0) * k / steps)
+            self._send("touchMove")
+            self.page.wait_for_timeout(16)
+
+    def up(self) -> None:
+        self._down.clear()
+        self._send("touchEnd")
+
+
+@pytest.fixture
+def phone(browsers: dict[str, Browser], base: str) -> Iterator[tuple[Page, Fingers, list[str]]]:
+    """The swing on a small screen with touch, at rest in the middle of the window."""
+    with browsers["webgl"].new_context(
+        viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True
+    ) as context:
+        page, said = watched(context)
+        page.goto(base + PAGE)
+        page.evaluate(MOUNT, SWING)
+        until(page, "() => window.made.state === 'paused' && window.made.view.frame !== null")
+        page.wait_for_timeout(300)
+        yield page, Fingers(page, context.new_cdp_session(page)), said
+
+
+def camera(page: Page) -> dict[str, Any]:
+    found: dict[str, Any] = page.evaluate(
+        "() => { const { azimuth, elevation, distance, target } = window.made.view.camera\n"
+        "return { azimuth, elevation, distance, target: [...target] } }"
+    )
+    return found
+
+
+def middle(page: Page) -> tuple[float, float]:
+    box = page.locator("#tried .lab-view").bounding_box()
+    assert box is not None
+    assert (box["y"] > 50, box["height"]) == (True, HEIGHT)
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def scrolled(page: Page) -> float:
+    return float(page.evaluate("() => window.scrollY"))
+
+
+def focused(page: Page) -> bool:
+    return bool(page.evaluate("() => document.activeElement === window.made.view.element"))
+
+
+Phone = tuple[Page, Fingers, list[str]]
+
+
+def test_one_finger_turns(phone: Phone) -> None:
+    page, fingers, said = phone
+    x, y = middle(page)
+    before, scroll = camera(page), scrolled(page)
+    fingers.down((x - 60, y))
+    fingers.move((x + 60, y))
+    # A finger that began sideways may go on up and down.
+    fingers.move((x + 60, y + 60))
+    fingers.up()
+    after = camera(page)
+    # A view's height is half a turn.
+    assert before["azimuth"] - after["azimuth"] == pytest.approx(180 * 120 / HEIGHT, abs=1)
+    assert before["elevation"] - after["elevation"] == pytest.approx(180 * 60 / HEIGHT, abs=1)
+    assert after["distance"] == before["distance"]
+    assert scrolled(page) == scroll
+    assert said == []
+
+
+def test_a_finger_that_goes_up_or_down_scrolls_the_page_each_time(phone: Phone) -> None:
+    page, fingers, _ = phone
+    for way in (-1, 1, -1):
+        x, y = middle(page)
+        before, scroll = camera(page), scrolled(page)
+        fingers.down((x, y))
+        fingers.move((x, y + way * 120), steps=12)
+        fingers.up()
+        comes(page, lambda: (scroll - scrolled(page)) * way > 60)  # noqa: B023
+        assert camera(page) == before
+        assert not focused(page)
+        page.wait_for_timeout(500)
+
+
+def test_a_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
+    page, fingers, _ = phone
+    x, y = middle(page)
+    fingers.down((x, y))
+    fingers.up()
+    comes(page, lambda: focused(page))
+    before, scroll = camera(page), scrolled(page)
+    fingers.down((x, y - 40))
+    fingers.move((x, y + 80), steps=12)
+    fingers.up()
+    assert before["elevation"] - camera(page)["elevation"] == pytest.approx(
+        180 * 120 / HEIGHT, abs=1
+    )
+    assert scrolled(page) == scroll
+    # Beside it, another tap gives the page its own back.
+    for _ in range(20):
+        page.wait_for_timeout(400)  # what follows a drag at once is no tap
+        page.touchscreen.tap(x, y - HEIGHT / 2 - 20)
+        if not focused(page):
+            break
+    comes(page, lambda: not focused(page))
+
+
+@pytest.mark.parametrize("sideways", [True, False])
+def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
+    page, fingers, said = phone
+    x, y = middle(page)
+    across = (1.0, 0.0) if sideways else (0.0, 1.0)
+
+    def at(along: float, dx: float = 0.0, dy: float = 0.0) -> tuple[float, float]:
+        return x + along * across[0] + dx, y + along * across[1] + dy
+
+    before, scroll = camera(page), scrolled(page)
+    fingers.down(at(-30), at(30))
+    fingers.move(at(-90), at(90))
+    wide = camera(page)
+    assert wide["distance"] == pytest.approx(before["distance"] / 3, rel=0.05)
+    assert wide["target"] == pytest.approx(before["target"], abs=0.02)
+    fingers.move(at(-90, 0, 45), at(90, 0, 45))
+    moved = camera(page)
+    fingers.up()
+    height = 2 * moved["distance"] * math.tan(math.pi / 8)
+    up = height * math.cos(math.radians(moved["elevation"])) * 45 / HEIGHT
+    assert moved["target"][2] - wide["target"][2] == pytest.approx(up, rel=0.1)
+    assert moved["distance"] == pytest.approx(wide["distance"], rel=0.02)
+    assert (moved["azimuth"], moved["elevation"]) == (before["azimuth"], before["elevation"])
+    assert scrolled(page) == scroll
+    assert page.evaluate("() => window.visualViewport.scale") == 1
+    assert said == []
+
+
+def test_a_finger_that_rests_on_a_body_pulls_it(phone: Phone) -> None:
+    page, fingers, said = phone
+    page.locator("#tried input[type=range]").fill("0")  # no gravity
+    x, y = middle(page)
+    scale = HEIGHT / (2 * 2.5 * math.tan(math.pi / 8))
+    end = x - 0.4 * math.sin(2.5) * scale, y + 0.4 * math.cos(2.5) * scale
+    page.locator("#tried .lab-play").tap()
+    until(page, "() => window.made.state === 'playing'")
+    before, scroll = camera(page), scrolled(page)
+    fingers.down(end)
+    until(page, "() => window.made.view.frame[3] === 1")
+    fingers.move((x, y + 0.45 * scale), steps=20)
+    # The rod comes to hang where it is drawn to; the view and the page stay as they are.
+    hangs = "() => Math.abs(parseFloat(document.querySelector('#tried dd').textContent\
+      .trim().replace('−', '-'))) < 0.6"
+    until(page, hangs)
+    assert camera(page) == before
+    assert scrolled(page) == scroll
+    fingers.up()
+    until(page, "() => window.made.view.frame[3] === 0")
+    assert said == []
+
+
+def test_a_finger_that_rests_where_nothing_is_turns_as_ever(phone: Phone) -> None:
+    page, fingers, _ = phone
+    x, y = middle(page)
+    before = camera(page)
+    fingers.down((x - 150, y + 130))
+    page.wait_for_timeout(600)
+    fingers.move((x - 50, y + 130))
+    fingers.up()
+    assert before["azimuth"] - camera(page)["azimuth"] == pytest.approx(180 * 100 / HEIGHT, abs=1)
+    assert page.evaluate("() => window.made.view.frame[3]") == 0
+
+
+def test_buttons_sliders_and_lists_by_touch(phone: Phone) -> None:
+    page, fingers, said = phone
+    slider = page.locator("#tried input[type=range]")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    assert box is not None
+    y = box["y"] + box["height"] / 2
+    fingers.down((box["x"] + box["width"] / 2, y))
+    fingers.move((box["x"] + box["width"] * 0.9, y))
+    fingers.up()
+    assert float(slider.input_value()) == pytest.approx(18, abs=1.2)
+    assert not slider.input_value().startswith("9.8")
+    page.locator("#tried .lab-buttons button").tap()
+    until(page, "() => window.made.values[0] > 16")
+    page.locator("#tried .lab-play").tap()
+    until(page, "() => window.made.state === 'playing'")
+    page.locator("#tried .lab-play").tap()
+    until(page, "() => window.made.state === 'paused'")
+    box = slider.bounding_box()
+    assert box is not None
+    assert box["height"] >= 16, "a finger can hit it"
+    assert said == []

@@ -1,0 +1,257 @@
+"""Results shared between machines: folders, fsspec's places, and places that fail."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.shared import FolderPlace, SharedCache, shared_cache
+from coursebuild.effects.store import Store
+
+KEY = hashlib.sha256(b"a key").hexdigest()
+GROUP = hashlib.sha256(b"a group").hexdigest()
+UPPER = "coursebuild-1"
+
+
+def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Store, list[str]]:
+    (tmp_path / name).mkdir(exist_ok=True)
+    store = Store(tmp_path / name, shared=shared)
+    lines: list[str] = []
+    store.listen(lines.append)
+    return store, lines
+
+
+def never() -> bytes:
+    raise AssertionError("it is in the shared cache")
+
+
+@pytest.fixture(params=["folder", "file", "memory"])
+def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    folder = tmp_path / "sha red"
+    return {
+        "folder": str(folder),
+        "file": f"file://{str(folder).replace(' ', '%20')}",
+        "memory": f"memory://{uuid.uuid4()}/cache",
+    }[request.param]
+
+
+def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
+    one, told_one = machine(tmp_path, "one", shared_cache(where))
+    assert one.kept("labs", KEY, lambda: b"\0made\xff") == b"\0made\xff"
+    one.keep("scripts", f"{GROUP}/{KEY}", b"a result")
+    one.keep("digests", KEY, b"of this machine", local=True)
+    one.close()
+    two, told_two = machine(tmp_path, "two", shared_cache(where))
+    assert two.kept("labs", KEY, never) == b"\0made\xff"
+    assert two.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
+    assert two.load("scripts", f"{GROUP}/{KEY}") == b"a result"
+    assert two.load("digests", KEY) is None
+    assert two.shared_group("scripts", KEY) == []
+    # What was fetched is kept here too.
+    alone, _ = Store(tmp_path / "two"), None
+    assert alone.load("labs", KEY) == b"\0made\xff"
+    assert alone.group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
+    assert told_one == told_two == []
+
+
+def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> None:
+    place = tmp_path / "shared"
+    one, _ = machine(tmp_path, "one", shared_cache(str(place)))
+    one.keep("labs", KEY, b"made")
+    one.close()
+    path = place / UPPER / "labs" / KEY
+    whole = path.read_bytes()
+    for at in range(len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        two, told = machine(tmp_path, f"two{at}", shared_cache(str(place)))
+        assert two.kept("labs", KEY, lambda: b"made") == b"made"
+        two.close()
+        said = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
+        assert told == [said]
+        assert path.read_bytes() == whole
+
+
+class Broken:
+    """A place with which everything goes wrong, in its own way."""
+
+    def __init__(self, trouble: Callable[[], object]) -> None:
+        self.trouble, self.calls = trouble, 0
+
+    def read(self, path: str) -> bytes | None:
+        self.calls += 1
+        self.trouble()
+        return None
+
+    def write(self, path: str, data: bytes) -> None:
+        self.calls += 1
+        self.trouble()
+
+    def names(self, folder: str) -> list[str]:
+        self.calls += 1
+        self.trouble()
+        return []
+
+
+class CloudError(Exception):
+    """What the library of a cloud raises."""
+
+
+def failing(error: Exception) -> Callable[[], object]:
+    def fail() -> object:
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(101, "Network is unreachable"), "network is unreachable"),
+        (CloudError("An error\noccurred (403)."), "an error occurred (403)"),
+        (CloudError(), "CloudError"),
+        (PermissionError(13, "Permission denied"), "permission denied"),
+        (TimeoutError(), "TimeoutError"),
+    ],
+)
+def test_a_place_that_fails_is_told_of_once_and_left_alone(
+    tmp_path: Path, error: Exception, words: str
+) -> None:
+    place = Broken(failing(error))
+    store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
+    for number in range(20):
+        assert store.kept("labs", f"{number:064x}", lambda: b"made") == b"made"
+    assert store.shared_group("scripts", GROUP) == []
+    store.close()
+    assert told == [f"the shared cache s3://there cannot be used: {words}"]
+    assert place.calls == 1
+
+
+def test_a_place_that_hangs_costs_its_time_once(tmp_path: Path) -> None:
+    stop = threading.Event()
+    place = Broken(lambda: stop.wait(30))
+    store, told = machine(tmp_path, "one", SharedCache("s3://there", place, timeout=0.2))
+    began = time.monotonic()
+    for number in range(20):
+        assert store.kept("labs", f"{number:064x}", lambda: b"made") == b"made"
+    store.close()
+    assert time.monotonic() - began < 5
+    stop.set()
+    assert told == ["the shared cache s3://there cannot be used: no answer within 0.2 s"]
+
+
+class Unwritable(Broken):
+    """A place that may only be read."""
+
+    def read(self, path: str) -> bytes | None:
+        return None
+
+
+def test_a_place_that_takes_nothing(tmp_path: Path) -> None:
+    place = Unwritable(failing(PermissionError(13, "Permission denied")))
+    store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
+    store.kept("labs", KEY, lambda: b"made")
+    store.close()
+    assert told == ["the shared cache s3://there cannot be used: permission denied"]
+
+
+def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
+    stop = threading.Event()
+
+    class Slow(Unwritable):
+        def write(self, path: str, data: bytes) -> None:
+            stop.wait(30)
+
+    store, told = machine(tmp_path, "one", SharedCache("s3://there", Slow(lambda: None)))
+    store.keep("labs", KEY, b"made")
+    assert store.shared is not None
+    store.shared.flush(0.2)
+    stop.set()
+    assert told == [
+        "the shared cache s3://there cannot be used: 1 results could not be sent in 0.2 s"
+    ]
+
+
+def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None:
+    before = threading.active_count()
+    place = tmp_path / "shared"
+    store, told = machine(tmp_path, "one", shared_cache(str(place)))
+    for number in range(300):
+        store.keep("labs", f"{number:064x}", b"x")
+    store.close()
+    assert len(list((place / UPPER / "labs").iterdir())) == 300
+    until = time.monotonic() + 5
+    while threading.active_count() > before and time.monotonic() < until:
+        time.sleep(0.01)
+    assert threading.active_count() == before
+    assert told == []
+
+
+def test_a_folder_whose_parent_is_not_there_is_not_made(tmp_path: Path) -> None:
+    """A network's folder that is not mounted must not be filled where it would be."""
+    place = tmp_path / "not mounted" / "cache"
+    store, told = machine(tmp_path, "one", shared_cache(str(place)))
+    assert store.kept("labs", KEY, lambda: b"made") == b"made"
+    store.close()
+    assert told == [f"the shared cache {place} cannot be used: no such file or directory"]
+    assert not place.parent.exists()
+
+
+def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
+    place = tmp_path / "cache"
+    place.write_text("in the way")
+    store, told = machine(tmp_path, "one", shared_cache(str(place)))
+    assert store.kept("labs", KEY, lambda: b"made") == b"made"
+    store.close()
+    assert told == [f"the shared cache {place} cannot be used: file exists"]
+
+
+def test_names_that_are_no_keys_are_passed_over(tmp_path: Path) -> None:
+    store, told = machine(tmp_path, "one", shared_cache(str(tmp_path / "shared")))
+    folder = tmp_path / "shared" / UPPER / "scripts" / GROUP
+    folder.mkdir(parents=True)
+    for name in ("notes.txt", ".new-1", KEY, KEY[:-1], KEY.upper(), f"{KEY}.bak"):
+        (folder / name).write_text("x")
+    assert store.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
+    assert store.load("scripts", f"{GROUP}/{KEY}") is None
+    assert len(told) == 1
+
+
+def test_other_users_can_read_what_is_shared(tmp_path: Path) -> None:
+    FolderPlace(tmp_path / "shared").write("kind/key", b"x")
+    assert (tmp_path / "shared/kind/key").stat().st_mode & 0o044 == 0o044
+
+
+def test_no_such_kind_of_place() -> None:
+    with pytest.raises(EffectError) as caught:
+        shared_cache("nowhere://there")
+    assert caught.value.message.startswith("there is no place like nowhere://there: protocol not")
+
+
+def test_without_fsspec(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "fsspec.core", None)
+    with pytest.raises(EffectError) as caught:
+        shared_cache("s3://bucket/cache")
+    assert caught.value.message == "the cache s3://bucket/cache needs the package fsspec"
+    assert caught.value.help == "run `pip install 'coursebuild[cache]'`"
+    shared_cache(str(tmp_path))
+
+
+def test_a_folder_needs_no_fsspec(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom coursebuild.effects.shared import shared_cache\n"
+        "shared_cache('/tmp/x').read('a')\nprint('fsspec' in sys.modules)"
+    )
+    root = str(Path(__file__).parents[2])
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True
+    )
+    assert done.stdout == "False\n"

@@ -1,0 +1,526 @@
+"""What is remembered of scripts: runs here are made up, the files that they look at are real."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.effects.shared import shared_cache
+from coursebuild.effects.store import Store
+from coursebuild.pipeline.remember import Memory, longest_first
+from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
+
+SCRIPT = b"print('hello')\n"
+PATH = "examples/a.py"
+JOB = ScriptJob(PATH, (), 10.0, (), False)
+NOTHING = Trace((), (), (), (), "")
+
+
+@dataclass
+class Desk:
+    """A course folder, and commands on it one after the other."""
+
+    root: Path
+    fresh: bool = False
+    shared: str | None = None
+    told: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.write(PATH, SCRIPT)
+        self.write("models/a.xml", b"<mujoco/>")
+        self.settle()
+
+    def write(self, path: str, data: bytes) -> None:
+        full = self.root / path
+        full.parent.mkdir(parents=True, exist_ok=True)
+        full.write_bytes(data)
+
+    def settle(self) -> None:
+        """Let the clock of the file system go on: what was written was written before."""
+        time.sleep(0.012)
+
+    def memory(self) -> Memory:
+        """That of a new command."""
+        shared = None if self.shared is None else shared_cache(self.shared)
+        store = Store(self.root, fresh=self.fresh, shared=shared)
+        store.listen(self.told.append)
+        return Memory(self.root, store)
+
+    def recall(self, job: ScriptJob = JOB, text: bytes = SCRIPT) -> ScriptRun | None:
+        memory = self.memory()
+        return memory.recall([memory.inputs(job, text)]).get(job.path)
+
+    def run(
+        self,
+        trace: Trace | None = NOTHING,
+        job: ScriptJob = JOB,
+        text: bytes = SCRIPT,
+        during: object = None,
+        **fields: object,
+    ) -> Memory:
+        """A run that looked at these things, and what is remembered of it."""
+        memory = self.memory()
+        memory.begin()
+        memory.started(job.path)
+        if callable(during):
+            self.settle()
+            during()
+        made = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
+        memory.keep(memory.inputs(job, text), replace(made, **fields))  # type: ignore[arg-type]
+        memory.close()
+        memory.store.close()
+        return memory
+
+    def why(self) -> str:
+        last = self.memory().last(PATH)
+        assert last is not None
+        return last.forgotten
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path / "course")
+
+
+def test_nothing_is_remembered_at_first(desk: Desk) -> None:
+    assert desk.recall() is None
+    assert desk.memory().last(PATH) is None
+
+
+def test_a_result_is_remembered(desk: Desk) -> None:
+    desk.run(stderr="a warning\n")
+    found = desk.recall()
+    assert found is not None
+    assert (found.outcome, found.status, found.stdout, found.stderr, found.seconds) == (
+        Outcome.OK,
+        0,
+        "hello\n",
+        "a warning\n",
+        0.5,
+    )
+    assert found.cached
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status"),
+    [(Outcome.FAILED, 3), (Outcome.OUTPUT_LIMIT, 9), (Outcome.ENCODING, 0)],
+)
+def test_failures_are_remembered_with_their_message(
+    desk: Desk, outcome: Outcome, status: int
+) -> None:
+    stderr = f'File "{desk.root}/examples/a.py", line 1\nValueError: no\n'
+    desk.run(outcome=outcome, status=status, stderr=stderr)
+    found = desk.recall()
+    assert found is not None
+    assert (found.outcome, found.status, found.stderr) == (outcome, status, stderr)
+
+
+@pytest.mark.parametrize("outcome", [Outcome.TIMEOUT, Outcome.KILLED, Outcome.SKIPPED])
+def test_what_may_end_otherwise_is_not(desk: Desk, outcome: Outcome) -> None:
+    desk.run(outcome=outcome, status=9)
+    assert desk.recall() is None
+    last = desk.memory().last(PATH)
+    assert last is not None and last.outcome is outcome and last.forgotten
+
+
+def test_an_opaque_or_unwatched_run_is_not_remembered(desk: Desk) -> None:
+    desk.run(replace(NOTHING, opaque="it starts other programs"))
+    assert desk.recall() is None
+    assert desk.why() == "it starts other programs"
+    desk.run(None)
+    assert desk.recall() is None
+
+
+@pytest.mark.parametrize(
+    "job",
+    [
+        replace(JOB, args=("-v",)),
+        replace(JOB, timeout=20.0),
+        replace(JOB, requires=("numpy",)),
+    ],
+)
+def test_another_option_is_another_result(desk: Desk, job: ScriptJob) -> None:
+    desk.run()
+    assert desk.recall(job) is None
+
+
+def test_another_text_is_another_result(desk: Desk) -> None:
+    desk.run()
+    assert desk.recall(text=SCRIPT + b"#\n") is None
+    assert desk.recall() is not None
+
+
+def test_the_environment_that_can_matter(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    desk.run()
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert desk.recall() is None
+    monkeypatch.delenv("MUJOCO_GL")
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setenv("HOME", "/nowhere")
+    monkeypatch.setenv("UNRELATED", "1")
+    assert desk.recall() is not None
+
+
+# --- files
+
+LOOKED = Trace(("models/a.xml", "models/none.xml"), (), (), (), "")
+
+
+def test_a_file_that_changes_and_changes_back(desk: Desk) -> None:
+    """Each state has its result, and a state that was seen before needs no run."""
+    desk.run(LOOKED, stdout="one\n")
+    desk.write("models/a.xml", b"<mujoco model='b'/>")
+    assert desk.recall() is None
+    desk.settle()
+    desk.run(LOOKED, stdout="two\n")
+    found = desk.recall()
+    assert found is not None and found.stdout == "two\n"
+    desk.write("models/a.xml", b"<mujoco/>")
+    found = desk.recall()
+    assert found is not None and found.stdout == "one\n"
+
+
+def test_the_touch_of_a_file_and_of_others_is_nothing(desk: Desk) -> None:
+    desk.run(LOOKED)
+    os.utime(desk.root / "models/a.xml")
+    desk.write("models/other.xml", b"x")
+    desk.write("content/lessons/1.1-a.md", b"prose")
+    assert desk.recall() is not None
+
+
+def test_a_file_of_the_same_size_and_time_is_another(desk: Desk) -> None:
+    path = desk.root / "models/a.xml"
+    status = path.stat()
+    desk.run(LOOKED)
+    assert desk.recall() is not None
+    path.write_bytes(b"<mujacu/>")
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert desk.recall() is None
+
+
+def test_a_file_that_appears_or_goes_or_becomes_a_folder(desk: Desk) -> None:
+    desk.run(LOOKED)
+    desk.write("models/none.xml", b"x")
+    assert desk.recall() is None
+    (desk.root / "models/none.xml").unlink()
+    assert desk.recall() is not None
+    (desk.root / "models/none.xml").mkdir()
+    assert desk.recall() is None
+    (desk.root / "models/none.xml").rmdir()
+    (desk.root / "models/a.xml").unlink()
+    assert desk.recall() is None
+    (desk.root / "models/a.xml").mkdir()
+    assert desk.recall() is None
+    shutil.rmtree(desk.root / "models")
+    (desk.root / "models").write_text("a file where the folder was")
+    assert desk.recall() is None
+
+
+def test_a_link_that_leads_elsewhere(desk: Desk) -> None:
+    desk.write("models/b.xml", b"<mujoco model='b'/>")
+    link = desk.root / "models/link.xml"
+    link.symlink_to("a.xml")
+    desk.settle()
+    desk.run(Trace(("models/link.xml",), (), (), (), ""))
+    assert desk.recall() is not None
+    link.unlink()
+    link.symlink_to("b.xml")
+    assert desk.recall() is None
+
+
+def test_names_that_are_no_text(desk: Desk) -> None:
+    name = os.fsdecode(b"models/\xff.bin")
+    desk.write(name, b"1")
+    desk.settle()
+    desk.run(Trace((name,), (), (), (), ""))
+    assert desk.recall() is not None
+    desk.write(name, b"2")
+    assert desk.recall() is None
+
+
+def test_upper_and_lower_case_are_two_files(desk: Desk) -> None:
+    desk.run(Trace(("models/A.xml",), (), (), (), ""))
+    assert desk.recall() is not None
+    desk.write("models/A.xml", b"x")
+    assert desk.recall() is None
+
+
+def test_a_listed_folder(desk: Desk) -> None:
+    desk.run(Trace((), ("models",), (), (), ""))
+    desk.write("models/a.xml", b"other content")
+    assert desk.recall() is not None
+    desk.write("models/b.xml", b"one more")
+    assert desk.recall() is None
+
+
+def test_a_file_outside_of_the_course(desk: Desk, tmp_path: Path) -> None:
+    outside = tmp_path / "outside.txt"
+    outside.write_text("1")
+    desk.settle()
+    desk.run(Trace((), (), (str(outside),), (), ""))
+    assert desk.recall() is not None
+    outside.write_text("2")
+    assert desk.recall() is None
+
+
+def test_a_course_that_is_moved(desk: Desk, tmp_path: Path) -> None:
+    desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n')
+    desk.root.rename(tmp_path / "moved")
+    desk.root = tmp_path / "moved"
+    found = desk.recall()
+    assert found is not None
+    assert found.stderr == f'File "{tmp_path}/moved/examples/a.py"\n'
+
+
+def test_a_moved_course_runs_what_printed_its_place(desk: Desk, tmp_path: Path) -> None:
+    desk.run(stdout=f"reading {desk.root}/models/a.xml\n")
+    assert desk.recall() is not None
+    desk.root.rename(tmp_path / "moved")
+    desk.root = tmp_path / "moved"
+    assert desk.recall() is None
+
+
+def test_a_module_of_another_version(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    from coursebuild.effects import installed
+
+    desk.run(Trace((), (), (), ("numpy",), ""), replace(JOB, requires=("nowhere.at_all",)))
+    needing = replace(JOB, requires=("nowhere.at_all",))
+    assert desk.recall(needing) is not None
+    real = installed.Installed._version
+    monkeypatch.setattr(
+        installed.Installed,
+        "_version",
+        lambda self, name: "numpy 0.1" if name == "numpy" else real(self, name),
+    )
+    assert desk.recall(needing) is None
+    monkeypatch.setattr(
+        installed.Installed,
+        "_version",
+        lambda self, name: "found 1" if name == "nowhere" else real(self, name),
+    )
+    assert desk.recall(needing) is None
+
+
+# --- while it runs
+
+
+def test_a_file_saved_while_the_script_ran(desk: Desk) -> None:
+    desk.run(LOOKED, during=lambda: desk.write("models/a.xml", b"saved"))
+    assert desk.why() == "models/a.xml changed while it ran"
+    assert desk.recall() is None
+
+
+def test_a_file_that_went_and_came_while_the_script_ran(desk: Desk) -> None:
+    def blink() -> None:
+        desk.write("models/none.xml", b"x")
+        (desk.root / "models/none.xml").unlink()
+
+    desk.run(LOOKED, during=blink)
+    assert desk.why() == "models/none.xml changed while it ran"
+
+
+def test_a_script_edited_while_it_ran(desk: Desk) -> None:
+    desk.run(during=lambda: desk.write(PATH, b"print('other')\n"))
+    assert desk.why() == "its file changed while it ran"
+    assert desk.recall() is None
+
+
+def test_something_else_saved_while_the_script_ran(desk: Desk) -> None:
+    desk.run(LOOKED, during=lambda: desk.write("content/lessons/1.1-a.md", b"prose"))
+    assert desk.recall() is not None
+
+
+def test_a_file_of_the_future(desk: Desk) -> None:
+    """Its time of content is set to be in the future, as unpacked archives have it."""
+    os.utime(desk.root / "models/a.xml", (4_000_000_000, 4_000_000_000))
+    desk.settle()
+    desk.run(LOOKED)
+    assert desk.recall() is not None
+
+
+# --- the store
+
+
+def entries(desk: Desk) -> list[Path]:
+    return [path for path in (desk.root / ".coursebuild/scripts").rglob("*") if path.is_file()]
+
+
+def test_a_damaged_result_is_told_and_run_again(desk: Desk) -> None:
+    desk.run()
+    (path,) = entries(desk)
+    whole = path.read_bytes()
+    for at in range(0, len(whole), 7):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x40]) + whole[at + 1 :])
+        desk.told.clear()
+        assert desk.recall() is None
+        assert len(desk.told) == 1
+        assert desk.told[0].endswith("in .coursebuild is damaged: it is made again")
+        desk.told.clear()
+        assert desk.recall() is None
+        assert desk.told == [], "it is gone"
+        desk.run()
+    for end in (0, 1, 31, 32, 33, len(whole) - 1):
+        path.write_bytes(whole[:end])
+        assert desk.recall() is None
+        desk.run()
+
+
+def test_a_result_under_another_ones_name(desk: Desk) -> None:
+    desk.run()
+    (one,) = entries(desk)
+    other = replace(JOB, args=("-v",))
+    desk.run(job=other)
+    (two,) = set(entries(desk)) - {one}
+    two.write_bytes(one.read_bytes())
+    assert desk.recall(other) is None
+
+
+def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
+    for number in range(12):
+        desk.write("models/a.xml", str(number).encode())
+        desk.settle()
+        desk.run(LOOKED, stdout=f"{number}\n")
+    found = desk.recall()
+    assert found is not None and found.stdout == "11\n"
+    assert len(entries(desk)) <= 8
+
+
+def test_a_store_that_cannot_be_written(desk: Desk) -> None:
+    (desk.root / ".coursebuild").write_text("in the way")
+    desk.run()
+    assert desk.recall() is None
+    assert len(desk.told) >= 1
+
+
+def test_several_commands_at_once(desk: Desk) -> None:
+    threads = [threading.Thread(target=desk.run, args=(LOOKED,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert desk.recall() is not None
+    assert len(entries(desk)) == 1
+
+
+# --- afresh
+
+
+def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
+    desk.run(stdout="one\n")
+    desk.fresh = True
+    assert desk.recall() is None
+    memory = desk.run(stdout="two\n")
+    ((before, now),) = memory.differing
+    assert (before.stdout, now.stdout) == ("one\n", "two\n")
+    desk.fresh = False
+    found = desk.recall()
+    assert found is not None and found.stdout == "two\n", "the new result is the one that is kept"
+    desk.fresh = True
+    assert desk.run(stdout="two\n").differing == []
+
+
+def test_a_fresh_run_with_another_file_differs_from_nothing(desk: Desk) -> None:
+    desk.run(LOOKED, stdout="one\n")
+    desk.write("models/a.xml", b"other")
+    desk.settle()
+    desk.fresh = True
+    assert desk.run(LOOKED, stdout="two\n").differing == []
+
+
+# --- shared
+
+
+def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
+    desk.shared = str(tmp_path / "shared")
+    desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n')
+    other = Desk(tmp_path / "other", shared=desk.shared)
+    found = other.recall()
+    assert found is not None
+    assert found.stderr == f'File "{other.root}/examples/a.py"\n'
+    other.shared = None
+    assert other.recall() is not None, "it is kept there too"
+    third = Desk(tmp_path / "third", shared=desk.shared)
+    third.write("models/a.xml", b"other")
+    assert third.recall() is None
+
+
+def test_a_shared_result_that_lies(desk: Desk, tmp_path: Path) -> None:
+    """An entry that is whole, and holds what no record holds, or one of another script."""
+    shared = tmp_path / "shared"
+    desk.shared = str(shared)
+    desk.run()
+    other = replace(JOB, path="examples/b.py")
+    desk.write(other.path, SCRIPT)
+    desk.settle()
+    desk.run(job=other)
+    one, two = sorted(p for p in shared.rglob("*") if p.is_file())
+    for data in (b"", b"{}", b"[1]", b"\x80\x04N."):
+        from coursebuild.effects.store import sealed
+
+        for path in (one, two):
+            name = path.relative_to(shared / "coursebuild-1").as_posix()
+            path.write_bytes(sealed(name, data))
+        fresh = Desk(tmp_path / f"new{len(data)}", shared=desk.shared)
+        assert fresh.recall() is None
+
+
+# --- order
+
+
+def test_the_longest_run_first_and_unknown_ones_before_them() -> None:
+    jobs = [replace(JOB, path=name) for name in "abcd"]
+    seconds = {"a": 1.0, "b": None, "c": 3.0}
+    assert [job.path for job in longest_first(jobs, seconds)] == ["b", "d", "c", "a"]
+
+
+def test_what_a_run_took_is_known_afterwards(desk: Desk) -> None:
+    desk.run(seconds=2.5)
+    last = desk.memory().last(PATH)
+    assert last is not None and last.seconds == 2.5
+
+
+# --- if and only if
+
+FILES = ("models/a.xml", "models/b.xml", "data.txt")
+edits = st.tuples(st.sampled_from(FILES), st.sampled_from([b"1", b"2", b"", None]))
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(edits, max_size=6), st.sets(st.sampled_from(FILES)))
+def test_it_runs_again_if_and_only_if_something_changed(
+    tmp_path_factory: pytest.TempPathFactory,
+    changes: list[tuple[str, bytes | None]],
+    looked: set[str],
+) -> None:
+    """A result is there exactly where the files that were looked at were like this before."""
+    desk = Desk(tmp_path_factory.mktemp("course"))
+    trace = Trace(tuple(sorted(looked)), (), (), (), "")
+    known: set[tuple[bytes | None, ...]] = set()
+
+    def state() -> tuple[bytes | None, ...]:
+        paths = [desk.root / path for path in sorted(looked)]
+        return tuple(path.read_bytes() if path.exists() else None for path in paths)
+
+    for path, data in [("data.txt", None), *changes]:
+        if data is None:
+            (desk.root / path).unlink(missing_ok=True)
+        else:
+            desk.write(path, data)
+        now = state()
+        found = desk.recall()
+        assert (found is not None) == (now in known)
+        if found is None:
+            desk.settle()
+            desk.run(trace, stdout=repr(now))
+            known.add(now)
+        else:
+            assert found.stdout == repr(now)

@@ -1,0 +1,134 @@
+"""Compiled models that are remembered: MuJoCo starts if and only if something changed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects import mjcf
+from coursebuild.effects.store import Store
+from coursebuild.model import MjcfModel
+from coursebuild.pipeline.remember_models import compile_all
+from coursebuild.results import CompileResult
+from coursebuild.source import Source
+
+MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+MAIN = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
+<asset><mesh name="m" file="m.obj"/></asset>
+<worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"""
+PART = '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
+Compile = Callable[..., CompileResult]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    root = tmp_path / "course"
+    (root / "models/assets").mkdir(parents=True)
+    (root / "models/assets/m.obj").write_text(MESH)
+    (root / "models/part.xml").write_text(PART)
+    (root / "models/main.xml").write_text(MAIN)
+    return root
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What MuJoCo is asked to compile: names of models, and texts."""
+    asked: list[str] = []
+    real = mjcf.compile_all
+
+    def compile(root: Path, models: list[MjcfModel], texts: list[str]) -> object:
+        asked.extend([model.name for model in models] + texts)
+        return real(root, models, texts)
+
+    monkeypatch.setattr(mjcf, "compile_all", compile)
+    return asked
+
+
+def models(root: Path) -> list[MjcfModel]:
+    found = []
+    for path in sorted((root / "models").glob("*.xml")):
+        found.append(MjcfModel(path.stem, Source(f"models/{path.name}", path.read_text())))
+    return found
+
+
+def run(
+    root: Path, texts: tuple[str, ...] = (), *, fresh: bool = False
+) -> dict[str, CompileResult]:
+    read = models(root)
+    of_models, of_texts = compile_all(root, Store(root, fresh=fresh), read, texts)
+    named = {model.name: result for model, result in zip(read, of_models, strict=True)}
+    return named | dict(zip(texts, of_texts, strict=True))
+
+
+def test_nothing_is_compiled_twice(root: Path, compiled: list[str]) -> None:
+    text = '<mujoco><include file="part.xml"/></mujoco>'
+    broken = "<mujoco><nonsense/></mujoco>"
+    first = run(root, (text, broken, text))
+    assert sorted(compiled) == sorted(["main", "part", text, broken])
+    assert first["main"].facts is not None and first["main"].facts.includes == (
+        "models/assets/m.obj",
+        "models/part.xml",
+    )
+    assert first[broken].error
+    compiled.clear()
+    for path in root.rglob("*"):
+        os.utime(path)
+    assert run(root, (broken, text)) == {k: first[k] for k in ("main", "part", broken, text)}
+    assert compiled == []
+    moved = root.rename(root.with_name("moved"))
+    assert run(moved) == {name: first[name] for name in ("main", "part")}
+    assert compiled == []
+
+
+@pytest.mark.parametrize(
+    ("file", "again"),
+    [
+        ("models/assets/m.obj", ["main"]),
+        ("models/part.xml", ["main", "part"]),
+        ("models/main.xml", ["main"]),
+        ("models/other.txt", []),
+    ],
+)
+def test_what_is_made_of_a_file_is_compiled_again(
+    root: Path, compiled: list[str], file: str, again: list[str]
+) -> None:
+    run(root)
+    compiled.clear()
+    path = root / file
+    path.write_text((path.read_text() if path.exists() else "") + "\n")
+    run(root)
+    assert compiled == again
+
+
+def test_an_error_is_remembered_until_the_missing_file_is_there(
+    root: Path, compiled: list[str]
+) -> None:
+    (root / "models/assets/m.obj").unlink()
+    first = run(root)
+    assert "m.obj" in first["main"].error
+    compiled.clear()
+    assert run(root) == first
+    assert compiled == []
+    (root / "models/assets/m.obj").write_text(MESH)
+    assert run(root)["main"].error == ""
+    assert compiled == ["main"]
+
+
+def test_afresh(root: Path, compiled: list[str]) -> None:
+    run(root)
+    compiled.clear()
+    run(root, fresh=True)
+    assert compiled == ["main", "part"]
+
+
+def test_a_damaged_entry_is_compiled_again(root: Path, compiled: list[str]) -> None:
+    first = run(root)
+    for path in (root / ".coursebuild/models").rglob("*"):
+        if path.is_file():
+            path.write_bytes(path.read_bytes()[:-1])
+    compiled.clear()
+    assert run(root) == first
+    assert compiled == ["main", "part"]

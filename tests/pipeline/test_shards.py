@@ -1,0 +1,182 @@
+"""Work divided between machines: everything exactly once, whatever each of them knows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from coursekit import Folder, block
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.pipeline.options import UsageError
+from coursebuild.pipeline.shards import read_shard, read_timings, split, write_timings
+
+Make = Callable[..., Folder]
+names = st.lists(st.text(max_size=6), max_size=30)
+times = st.dictionaries(st.text(max_size=6), st.floats(0, 1e6), max_size=20)
+
+
+@given(names, st.integers(1, 12), times)
+def test_every_name_is_in_exactly_one_part(
+    names: list[str], count: int, seconds: dict[str, float]
+) -> None:
+    parts = split(names, count, seconds)
+    assert set(parts) == set(names)
+    assert set(parts.values()) <= set(range(1, count + 1))
+    assert split(list(reversed(names)), count, dict(reversed(seconds.items()))) == parts
+
+
+@given(names, st.integers(1, 12))
+def test_without_times_the_parts_are_equally_large(names: list[str], count: int) -> None:
+    parts = list(split(names, count, {}).values())
+    sizes = [parts.count(part) for part in range(1, count + 1)]
+    assert max(sizes) - min(sizes) <= 1
+
+
+@given(st.dictionaries(st.text(max_size=6), st.integers(1, 1000), min_size=1), st.integers(1, 8))
+def test_with_times_no_part_is_much_longer_than_it_must_be(
+    seconds: dict[str, int], count: int
+) -> None:
+    parts = split(seconds, count, seconds)
+    loads = [sum(seconds[n] for n in parts if parts[n] == p) for p in range(1, count + 1)]
+    longest = max(seconds.values())
+    assert max(loads) <= sum(seconds.values()) / count + (1 - 1 / count) * longest + 1e-9
+
+
+def test_a_name_without_a_time_counts_as_the_usual_one() -> None:
+    parts = split(["a", "b", "new"], 2, {"a": 10.0, "b": 1.0})
+    assert parts["b"] != parts["a"]
+    assert parts["new"] != parts["a"] or parts["b"] != parts["new"]
+
+
+@pytest.mark.parametrize("text", "1 / 0/2 3/2 1/0 -1/2 1/2/3 a/b 1/99999 ²/3".split())
+def test_parts_that_are_none(text: str) -> None:
+    with pytest.raises(UsageError, match=r"^--shard: "):
+        read_shard(text, [])
+
+
+def test_times_without_parts() -> None:
+    with pytest.raises(UsageError) as caught:
+        read_shard(None, ["x.json"])
+    assert str(caught.value) == "--timings says how `--shard` divides the work: it needs `--shard`"
+    assert read_shard(None, []) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xff",
+        b"[]",
+        b"{}",
+        b'{"seconds": []}',
+        b'{"seconds": {"a": "1"}}',
+        b'{"seconds": {"a": true}}',
+        b'{"seconds": {"a": -1}}',
+        b'{"seconds": {"a": NaN}}',
+        b'{"seconds": {"a": 1e400}}',
+        b"[" * 99999,
+    ],
+)
+def test_a_file_that_holds_no_times(tmp_path: Path, data: bytes) -> None:
+    file = tmp_path / "times.json"
+    file.write_bytes(data)
+    with pytest.raises(UsageError) as caught:
+        read_timings(str(file))
+    said = f"--timings: {file} holds no times; `--write-timings` writes such a file"
+    assert str(caught.value) == said
+    with pytest.raises(UsageError):
+        write_timings(str(file), {"a": 1.0}, ["a"])
+    assert file.read_bytes() == data, "what somebody else put there stays"
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as caught:
+        read_timings(str(tmp_path / "none.json"))
+    said = f"--timings: {tmp_path}/none.json cannot be read: no such file or directory"
+    assert str(caught.value) == said
+
+
+def test_times_are_written_sorted_and_merged(tmp_path: Path) -> None:
+    file = tmp_path / "times.json"
+    write_timings(str(file), {"b": 2.00049, "a": 1.0, "old": 3.0}, ["a", "b", "old"])
+    write_timings(str(file), {"b": 5.0}, ["a", "b"])
+    assert json.loads(file.read_bytes()) == {"seconds": {"a": 1.0, "b": 5.0}}
+    assert file.read_bytes().startswith(b'{\n  "seconds": {\n    "a": 1.0,')
+    assert read_timings(str(file)) == {"a": 1.0, "b": 5.0}
+
+
+def test_several_files_of_times_make_one(tmp_path: Path) -> None:
+    one, two = tmp_path / "1.json", tmp_path / "2.json"
+    write_timings(str(one), {"a": 1.0, "b": 9.0}, ["a", "b"])
+    write_timings(str(two), {"b": 2.0, "c": 3.0}, ["b", "c"])
+    first = read_shard("1/2", [str(one), str(two)])
+    assert first == read_shard("1/2", [str(two), str(one)])
+    assert first is not None and dict(first.seconds) == {"a": 1.0, "b": 9.0, "c": 3.0}
+
+
+def test_times_that_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"^--write-timings: "):
+        write_timings(str(tmp_path / "no folder/times.json"), {"a": 1.0}, ["a"])
+
+
+# --- the command
+
+LESSON = "## A\n\n" + "".join(
+    block(f"s{number}.py", f"print({number})\n", str(number)) for number in range(5)
+)
+
+
+def scripts_of(report: str) -> list[str]:
+    return sorted(script["path"] for script in json.loads(report)["scripts"])
+
+
+def test_all_parts_together_are_the_course(make: Make) -> None:
+    folder = make(LESSON)
+    times = folder.root / "times.json"
+    assert folder.main("check", "--write-timings", str(times)).status == 0
+    assert sorted(read_timings(str(times))) == [f"examples/s{number}.py" for number in range(5)]
+    for more in ([], ["--timings", str(times)]):
+        found: list[str] = []
+        for part in (1, 2, 3):
+            done = folder.main("check", "--shard", f"{part}/3", "--format", "json", *more)
+            assert done.status == 0
+            found += scripts_of(done.out)
+        assert sorted(found) == [f"examples/s{number}.py" for number in range(5)]
+
+
+def test_a_part_with_nothing_to_do_is_no_mistake(make: Make) -> None:
+    folder = make("## A\n\n" + block("a.py", "print(1)\n", "1"))
+    reports = [folder.main("check", "--shard", f"{part}/3") for part in (1, 2, 3)]
+    assert [done.status for done in reports] == [0, 0, 0]
+    ends = sorted(done.out.splitlines()[-1] for done in reports)
+    assert [end for end in ends if "0 scripts run" in end] == ends[:2]
+    assert "this was part 1/3 of the work: " in reports[0].out
+
+
+def test_a_course_without_scripts_is_one_in_parts_too(make: Make) -> None:
+    folder = make("## A\n\nNothing to run.\n")
+    done = folder.main("check", "--shard", "1/3")
+    assert done.status == 1
+    assert "error[no-scripts]" in done.out
+
+
+def test_a_mistake_in_a_script_is_found_by_its_part_alone(make: Make) -> None:
+    folder = make(LESSON + block("bad.py", "print(1)\n", "2"))
+    found = [folder.main("check", "--shard", f"{part}/3") for part in (1, 2, 3)]
+    assert sorted(done.status for done in found) == [0, 0, 1]
+
+
+def test_wrong_usage(make: Make) -> None:
+    folder = make(LESSON)
+    done = folder.main("check", "--shard", "4/3")
+    assert (done.status, done.err) == (2, "coursebuild: --shard: there is no part 4 of 3\n")
+    done = folder.main("check", "--shard", "two")
+    said = "coursebuild: --shard: 'two' is no part of the work; write 2/8 for the second of 8\n"
+    assert (done.status, done.err) == (2, said)
+    done = folder.main("check", "--timings", "x")
+    said = "coursebuild: --timings says how `--shard` divides the work: it needs `--shard`\n"
+    assert (done.status, done.err) == (2, said)

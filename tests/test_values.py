@@ -1,0 +1,189 @@
+"""Our data classes do what the standard library's do."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import pickle
+from typing import Any, Generic, TypeVar
+
+import pytest
+
+from coursebuild import values
+from coursebuild.source import Source
+
+T = TypeVar("T")
+
+
+@values.dataclass(frozen=True, slots=True)
+class Point:
+    """Two numbers."""
+
+    x: int
+    y: int = 2
+
+    @property
+    def both(self) -> tuple[int, int]:
+        """The two."""
+        return self.x, self.y
+
+    @classmethod
+    def origin(cls) -> Point:
+        """The first of all."""
+        return cls(0, 0)
+
+
+@values.dataclass(frozen=True, slots=True)
+class Named(Point):
+    """A point with a name."""
+
+    name: str = ""
+
+
+@values.dataclass(frozen=True, slots=True)
+class Box(Generic[T]):
+    """Of one thing, and of notes that do not count."""
+
+    content: T
+    notes: list[str] = values.field(default_factory=list, repr=False, compare=False, hash=False)
+    _cache: dict[str, str] = values.field(
+        default_factory=dict, init=False, repr=False, compare=False, hash=False
+    )
+
+
+@values.dataclass(slots=True)
+class Open:
+    """Can be changed."""
+
+    a: int = 1
+    b: list[int] = values.field(default_factory=list)
+
+
+@values.dataclass(frozen=True, slots=True, eq=False)
+class Itself:
+    """Equal to nothing but itself."""
+
+    a: int
+
+
+@values.dataclass(frozen=True, slots=True, order=True)
+class Ranked:
+    """Can be sorted."""
+
+    a: int
+    b: str
+
+
+@values.dataclass(frozen=True, slots=True)
+class Empty:
+    """Nothing."""
+
+
+def test_making() -> None:
+    assert Point(1).both == (1, 2)
+    assert Point(y=3, x=1) == Point(1, 3) != Point(1, 4)
+    assert Point.origin() == Point(0, 0)
+    assert Named(1, 2, "p") == Named(name="p", x=1)
+    assert Empty() == Empty()
+    make: Any = Point
+    for values_of, named in (((), {}), ((1, 2, 3), {}), ((1,), {"z": 2})):
+        with pytest.raises(TypeError):
+            make(*values_of, **named)
+
+
+def test_each_has_its_own_of_what_is_made() -> None:
+    one, two = Box(1), Box(1)
+    one.notes.append("x")
+    one._cache["k"] = "v"
+    assert (two.notes, two._cache) == ([], {})
+    assert one == two and hash(one) == hash(two)
+    assert Box(1, ["n"]).notes == ["n"]
+
+
+def test_equality_and_hashes() -> None:
+    assert Point(1, 2) != Named(1, 2)
+    assert Point(1, 2) != (1, 2)  # type: ignore[comparison-overlap]
+    assert hash(Point(1, 2)) == hash((1, 2))
+    assert len({Point(1), Point(1, 2), Point(2)}) == 2
+    assert Itself(1) != Itself(1)
+    assert len({Itself(1), Itself(1)}) == 2
+    assert Open() == Open()
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(Open())
+    assert sorted([Ranked(2, "a"), Ranked(1, "b")]) == [Ranked(1, "b"), Ranked(2, "a")]
+
+
+def test_what_is_frozen_stays() -> None:
+    point: Any = Point(1)
+    with pytest.raises(dataclasses.FrozenInstanceError, match="cannot assign to field 'x'"):
+        point.x = 2
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        point.z = 2
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        del point.x
+    changing: Any = Open()
+    changing.a = 5
+    assert changing == Open(5)
+    with pytest.raises(AttributeError):
+        changing.c = 1
+    assert not hasattr(point, "__dict__")
+
+
+def test_showing() -> None:
+    assert repr(Point(1)) == "Point(x=1, y=2)"
+    assert repr(Named(1, name="p")) == "Named(x=1, y=2, name='p')"
+    assert repr(Box("x")) == "Box(content='x')"
+    holder = Open()
+    holder.b.append(holder)  # type: ignore[arg-type]
+    assert repr(holder) == "Open(a=1, b=[...])"
+
+
+def test_copies() -> None:
+    for value in (Point(1), Named(1, 2, "n"), Open(3, [1]), Empty(), Ranked(1, "r")):
+        for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+            assert pickle.loads(pickle.dumps(value, protocol)) == value
+        assert copy.copy(value) == copy.deepcopy(value) == value
+    source = Source("p", "a\nb")
+    assert source.line_starts == [0, 2]
+    assert pickle.loads(pickle.dumps(source)).line_starts == [0, 2]
+
+
+def test_the_standard_library_knows_them() -> None:
+    assert values.replace(Named(1, name="p"), y=7) == Named(1, 7, "p")
+    assert dataclasses.replace(Named(1, name="p"), y=7) == Named(1, 7, "p")
+    assert dataclasses.asdict(Point(1)) == {"x": 1, "y": 2}
+    assert [field.name for field in dataclasses.fields(Box)] == ["content", "notes", "_cache"]
+    assert [field.name for field in dataclasses.fields(Named(1))] == ["x", "y", "name"]
+    assert dataclasses.is_dataclass(Point)
+    assert Named.__match_args__ == ("x", "y", "name")
+    match Named(1, 2, "n"):
+        case Named(x, _, name):
+            assert (x, name) == (1, "n")
+    with pytest.raises(ValueError, match="init=False"):
+        dataclasses.replace(Box(1), _cache={})
+
+
+@pytest.mark.parametrize(
+    ("ours", "options"),
+    [
+        (Point, {"frozen": True, "slots": True}),
+        (Open, {"slots": True}),
+        (Ranked, {"frozen": True, "slots": True, "order": True}),
+    ],
+)
+def test_like_the_same_class_of_the_standard_library(ours: Any, options: dict[str, bool]) -> None:
+    names = [one.name for one in dataclasses.fields(ours)]
+    body: dict[str, Any] = {"__annotations__": dict.fromkeys(names, Any)}
+    body |= {
+        one.name: dataclasses.field(default=one.default, default_factory=one.default_factory)
+        for one in dataclasses.fields(ours)
+    }
+    theirs: Any = dataclasses.dataclass(**options)(type(ours.__name__, (), body))
+    for values_of in ((1, "a"), (1, "b"), (2, "a")):
+        a, b = ours(*values_of), theirs(*values_of)
+        assert repr(a) == repr(b)
+        assert (a.__hash__ is None) == (b.__hash__ is None)
+        assert a.__slots__ == b.__slots__
+        if a.__hash__ is not None:
+            assert hash(a) == hash(b)
+        assert (a == ours(1, "a")) == (b == theirs(1, "a"))
