@@ -15,6 +15,7 @@ import ctypes
 import sys
 
 from coursebuild.effects.preload import Finder
+from coursebuild.effects.tracing import Tracer
 
 _STREAMS = ("stdout", "stderr")
 
@@ -22,13 +23,14 @@ _STREAMS = ("stdout", "stderr")
 class Ending:
     """Sees how a script, whose text this is, ends, and may end the process."""
 
-    def __init__(self, finder: Finder, script: bytes) -> None:
+    def __init__(self, finder: Finder, tracer: Tracer, script: bytes) -> None:
         self._finder = finder
+        self._tracer = tracer
         self._told = b"__cached__" not in script
         """Whether the script leaves alone what tells of its end."""
         self._streams = tuple(getattr(sys, name) for name in _STREAMS)
         self._normal = False
-        self._exit = ctypes.PyDLL(None).exit
+        self._libc = ctypes.PyDLL(None)
 
     def check(self) -> None:
         """The last exit function: whether the script ran to its end.
@@ -48,9 +50,12 @@ class Ending:
         )
 
     def leave(self) -> None:
-        """Exit, if the status is known; libraries in C still see the end of the process."""
+        """Exit, if the status is known; native code that the script loaded sees it."""
         if self._normal and self._flushed():
-            self._exit(0)
+            if self._tracer.native:
+                self._libc.exit(0)
+            self._libc.fflush(None)
+            self._libc._exit(0)
 
     def _flushed(self) -> bool:
         """Write out what the script has printed; `False` where Python will have to complain."""

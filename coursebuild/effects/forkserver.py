@@ -40,7 +40,7 @@ from coursebuild.effects.interpreter import Interpreter
 from coursebuild.effects.notes import Notes, read_notes
 from coursebuild.effects.preload import Recorder
 from coursebuild.effects.supervisor import Job, Slot, die_with, library_is_installed
-from coursebuild.effects.tracing import Tracer, installed_folders
+from coursebuild.effects.tracing import Tracer, installed_folders, library_folders
 from coursebuild.effects.watching import Launched
 
 PLACEHOLDER = "/coursebuild: the place of a script's path"
@@ -81,6 +81,8 @@ def serve(recorder: Recorder, control: int) -> None:
         text = traceback.format_exc()
         if os.getpid() == me:
             server.control.send(json.dumps({"failed": text}).encode())
+        else:
+            os.write(2, text.encode())
         os._exit(70)
 
 
@@ -198,6 +200,7 @@ class _Forker:
         """A folder where there is none, and when it was changed."""
         self.libc = ctypes.CDLL(None)
         self.installed = installed_folders()
+        self.has_library = server.has_library
         server.recorder.hide()
         # What is here outlives the interpreter of a script, which so leaves it alone.
         for kept in (server.recorder, server, self):
@@ -242,9 +245,12 @@ class _Forker:
         _set_environment(environment)
         _renew_main()
         self.interpreter.become(f"{root}/{job['path']}", [job["path"], *job["args"]])
-        tracer = Tracer(job["root"], environment["TMPDIR"], self.installed, notes, shared)
+        installed = self.installed
+        if not self.has_library:
+            installed = [*installed, *library_folders(root, job["library"])]
+        tracer = Tracer(root, environment["TMPDIR"], installed, notes, shared)
         mujoco_tracing.tracer = tracer
-        ending = Ending(self.recorder.offer(tracer.restored), _contents(job["path"]))
+        ending = Ending(self.recorder.offer(tracer.restored), tracer, _contents(job["path"]))
         atexit.register(ending.check)  # the first that is registered is the last that runs
         tracer.at_end = ending.leave
         gc.enable()

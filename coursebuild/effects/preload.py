@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 _OWN = "coursebuild"
+_NEEDED = frozenset(("__main__", "builtins", "sys"))
 
 
 class Recorder:
@@ -231,6 +232,7 @@ class Finder:
         import _imp
 
         self._told = told
+        self._modules = {name: sys.modules[name] for name in recorder.bare} | recorder.modules
         self._recorder = recorder
         self._bare_path = frozenset(bare_path)
         self._restored: set[str] = set()
@@ -242,16 +244,16 @@ class Finder:
         self, name: str, path: object = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """A spec of the module that is there already; `None` where a bare Python has to look."""
-        module = self._recorder.modules.get(name)
+        module = self._modules.get(name)
         if module is None or name in self._restored or target is not None:
             return None
         if "." not in name and self._shadowed(name):
             self._restored.add(name)
             return None
-        ours, theirs = self._recorder.modules, sys.modules
+        ours, theirs = self._modules, sys.modules
         attributes, replayed = self._recorder.attributes, self._recorder.replayed
         again = []
-        for each in self._recorder.closure(name):
+        for each in self._recorder.closure(name) or (name,):
             if each in self._restored or each in theirs:
                 continue
             theirs[each] = ours[each]
@@ -269,19 +271,23 @@ class Finder:
         return type(sys.__spec__)(name, self)  # type: ignore[arg-type]
 
     def withdraw(self) -> None:
-        """Take back what was given, so that the end of the interpreter leaves it alone."""
-        for name in self._restored:
-            if sys.modules.get(name) is self._recorder.modules[name]:
+        """Take back what was given, so that the end of the interpreter leaves it alone.
+
+        What every Python has is taken too, but for what that end needs. All can be imported again.
+        """
+        for name in (*self._restored, *self._recorder.bare - _NEEDED):
+            if name in sys.modules and sys.modules[name] is self._modules.get(name):
                 del sys.modules[name]
+        self._restored.clear()
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """The module itself."""
-        return self._recorder.modules[spec.name]
+        return self._modules[spec.name]
 
     def exec_module(self, module: ModuleType) -> None:
         """Give the module back the spec that it was imported with."""
         for name, spec in list(self._specs.items()):
-            if self._recorder.modules[name] is module:
+            if self._modules[name] is module:
                 module.__spec__ = spec
                 del self._specs[name]
 

@@ -28,9 +28,9 @@ def start(notes: str, tool: str, bare: frozenset[str]) -> None:
     """
     sys.path.remove(tool)
     temporary = posix.environ[b"TMPDIR"].decode("utf-8", "surrogateescape")
-    tracer = tracing.Tracer(
-        posix.getcwd(), temporary, tracing.installed_folders(), notes, sink=None
-    )
+    root = posix.getcwd()
+    installed = [*tracing.installed_folders(), *tracing.library_folders(root, tool)]
+    tracer = tracing.Tracer(root, temporary, installed, notes, sink=None)
     mujoco_tracing.tracer = tracer
     sys.meta_path.insert(0, _Waiting())
     for name in [name for name in sys.modules if name not in bare]:

@@ -52,8 +52,8 @@ _FIXED = {
     "MPLBACKEND": "Agg",
 }
 _PRELOADED = ("numpy", "numpy.random", "mujoco")
-"""Packages that are worth importing once for all scripts, in this order: one may import those before
-it. None does anything that a script could see."""
+"""Packages that are worth importing once for all scripts, in this order: one may import those
+before it. None does anything that a script could see."""
 _IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]+([^\n#;]+)", re.MULTILINE)
 
 

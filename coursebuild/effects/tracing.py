@@ -118,6 +118,8 @@ class Tracer:
         self._builtin = frozenset(sys.builtin_module_names)
         self._standard = sys.stdlib_module_names
         self._is_frozen = sys.modules["_imp"].is_frozen
+        self.native = False
+        """Whether the script has loaded native code, which may do something at the end."""
         self.at_end: Callable[[], None] | None = None
         """Is called when the interpreter has ended, but for giving back its memory."""
 
@@ -246,6 +248,7 @@ class Tracer:
     def _import(self, args: tuple[object, ...]) -> None:
         name, file, path = args[:3]
         if file is not None:
+            self.native = True
             at = self._relevant(file)
             if at is not None:
                 self._note(f"r{at}")
@@ -292,6 +295,7 @@ class Tracer:
 
     def _load(self, args: tuple[object, ...]) -> None:
         name = args[0]
+        self.native = True
         if isinstance(name, str) and "/" in name:
             self.library(name)
 
@@ -395,6 +399,13 @@ def _exists(path: str) -> bool:
     except (OSError, ValueError):
         return False
     return True
+
+
+def library_folders(root: str, library: str) -> list[str]:
+    """Where `mjcourse` is when it is not installed; nothing where the project itself holds it."""
+    if f"{library}/".startswith(f"{root}/"):
+        return []
+    return [f"{library}/mjcourse"]
 
 
 def installed_folders() -> list[str]:

@@ -1,11 +1,13 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `simulate`.
+Entry points: `compiled`, `simulate`, `advance`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
    the state before the step, so it is computed again, on other data, from the state sampled.
 3. Steps between two looks are made in one call.
+4. MuJoCo writes a warning to standard error and into a file in the working directory; here it is
+   counted, and said by the judgement.
 """
 
 from __future__ import annotations
@@ -49,6 +51,20 @@ def compiled(mjcf: str, integrator: Integrator, timestep: float) -> Any:
     if integrator is Integrator.EULER_EXPLICIT:
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     return model
+
+
+def advance(model: Any, data: Any, steps: int = 1) -> None:
+    """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(_ignore)
+    try:
+        mujoco.mj_step(model, data, steps)
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _ignore(_: str) -> None:
+    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +114,7 @@ def simulate_model(problem: Problem, model: Any) -> Run:
     for index in range(len(times)):
         if scenario.controls:
             data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
-        mujoco.mj_step(model, data, every)
+        advance(model, data, every)
         qpos[index], qvel[index] = data.qpos, data.qvel
         if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
             qpos[index:], qvel[index:] = np.nan, np.nan

@@ -157,7 +157,7 @@ class Problem:
     """Theory of the largest stable timestep; `None` where there is none to be had."""
     search: tuple[float, float] | None = None
     """Timesteps (s) between which the largest stable one is looked for."""
-    steps: int = 20_000
+    steps: int = 10_000
     """Steps after which what grows must have shown itself."""
     penetration_bound: float = float("inf")
     """Deepest contact that is no fault, m."""

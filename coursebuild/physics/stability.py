@@ -14,11 +14,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 
 from coursebuild.physics.detector import Judgement, Status, deepest_contact, judge, observe
-from coursebuild.physics.engine import begun, compiled
+from coursebuild.physics.engine import advance, begun, compiled
 from coursebuild.physics.problem import INTEGRATORS, STANDARD, Integrator, Limit, Problem
 from coursebuild.values import dataclass
 
@@ -135,7 +134,7 @@ def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Trial:
     depth = 0.0
     judgement = Judgement(Status.OK)
     for look in range(_LOOKS):
-        mujoco.mj_step(model, data, chunk)
+        advance(model, data, chunk)
         sizes.append(_size(data))
         depth = max(depth, deepest_contact(data))
         seen = observe(

@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import assert_never
 
-from coursebuild.effects.around import places, surroundings
+from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.installed import Installed
 from coursebuild.effects.store import Store
@@ -69,7 +69,7 @@ class States:
     def __init__(self, root: Path, store: Store) -> None:
         self.root = root
         self.places = places(root, os.environ)
-        self.around = surroundings(os.environ)
+        self.around = conditions(os.environ)
         self._digests = Digests(store)
         self._installed = Installed(store, self._digests)
         self._known: dict[Need, str] = {}

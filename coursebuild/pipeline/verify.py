@@ -255,7 +255,12 @@ def _run(
     memory.begin()
     with progress.stage(stage, count):
         ordered = longest_first(todo, seconds)
-        runs = run_scripts(options.root, ordered, parallel=options.jobs, on_event=told)
+        if options.executor is not None:
+            from coursebuild.effects.dask_runner import run_on_dask
+
+            runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
+        else:
+            runs = run_scripts(options.root, ordered, parallel=options.jobs, on_event=told)
     memory.close()
     return runs
 

@@ -24,7 +24,7 @@ def _astral_noncharacter() -> re.Pattern[str]:
 def visible(text: str) -> str:
     """The text with what HTML forbids replaced: a control by its picture, the rest by U+FFFD."""
     if _ALLOWED.fullmatch(text):
-        return text
+        return str(text)  # and no markup
     return _astral_noncharacter().sub("\ufffd", _FORBIDDEN.sub(_picture, text))
 
 

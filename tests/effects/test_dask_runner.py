@@ -14,8 +14,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import distributed
 import pytest
 
+from coursebuild.cli import main
 from coursebuild.effects import dask_runner, dask_task
 from coursebuild.effects.dask_runner import archive, is_dask, run_on_dask
 from coursebuild.effects.errors import EffectError
@@ -54,6 +56,12 @@ class Cluster:
             *("--local-directory", str(self.folder)),
             **environment,
         )
+
+    def wait_for_workers(self, count: int) -> None:
+        with distributed.Client(  # type: ignore[no-untyped-call]
+            f"tcp://{self.address}", set_as_default=False
+        ) as client:
+            client.wait_for_workers(count, timeout=60)
 
     def _start(self, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
         process = subprocess.Popen(
@@ -206,6 +214,7 @@ def test_a_script_that_takes_every_worker_along_counts_as_killed(
         "os.kill(p, signal.SIGKILL)\nimport time\ntime.sleep(30)\n"
     )
     workers = [own_cluster.worker() for _ in range(5)]
+    own_cluster.wait_for_workers(5)
     [run] = run_on_dask(own_cluster.url, root, [job("murder", timeout=60.0)])
     assert run.outcome is Outcome.KILLED
     assert run.stderr == "worker after worker was lost while this script ran\n"
@@ -317,3 +326,51 @@ def test_a_course_too_large_to_send(root: Path, monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(EffectError) as caught:
         archive(root)
     assert caught.value.message == "the course has more than 0 MiB of files, too much to send"
+
+
+MAP = """[course]
+title = "A course"
+summary = "For trying."
+language = "en"
+
+[[level]]
+id = "1"
+title = "Level"
+summary = "All of it."
+
+[[level.lesson]]
+id = "1.1"
+slug = "one"
+title = "One"
+summary = "A lesson."
+status = "complete"
+"""
+
+
+def test_check_runs_scripts_on_a_cluster_and_remembers_them(
+    cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = tmp_path / "course"
+    lesson = root / "content/lessons/1.1-one.md"
+    lesson.parent.mkdir(parents=True)
+    (root / "content/course.toml").write_text(MAP)
+    text = (
+        "## One\n\n```python file=examples/one.py\nprint({})\n```\n\nOutput:\n\n```text\n1\n```\n"
+    )
+    command = ["-C", str(root), "check", "--executor", cluster.url]
+    lesson.write_text(text.format(1))
+    assert main(command) == 0
+    assert "  examples/one.py: ok after" in capsys.readouterr().err
+    lesson.write_text(text.format(1) + "\nMore prose.\n")
+    assert main(command) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "ok       examples/one.py  cached"
+    lesson.write_text(text.format(2))
+    assert main(command) == 1
+    assert "error[output-drift]" in capsys.readouterr().out
+
+
+def test_an_executor_that_is_none(capsys: pytest.CaptureFixture[str], root: Path) -> None:
+    assert main(["-C", str(root), "check", "--executor", "ssh://host"]) == 2
+    assert capsys.readouterr().err == (
+        "coursebuild: --executor: 'ssh://host' is no place to run scripts: dask://HOST:PORT\n"
+    )

@@ -1,9 +1,10 @@
-"""A script in a forked process is none the wiser: the same probes run there, alone, and bare."""
+"""A script in a forked process is none the wiser; and the process that forks it stays warm."""
 
 from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import textwrap
@@ -13,7 +14,13 @@ from pathlib import Path
 import pytest
 
 from coursebuild.effects import workers
-from coursebuild.effects.runner import ScriptServer, clean_environment, run_scripts
+from coursebuild.effects.runner import (
+    RunEvent,
+    RunStarted,
+    ScriptServer,
+    clean_environment,
+    run_scripts,
+)
 from coursebuild.effects.surroundings import library_folder, wanted_packages
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
@@ -23,8 +30,9 @@ PROBES = {
     "modules of mujoco": "import sys, mujoco\nprint(sorted(sys.modules))\n",
     "modules one after another": """
         import sys
-        for name in ("re", "json", "numpy.linalg", "logging", "numpy.testing", "mujoco", "xml.etree",
-                     "xml.etree.ElementTree", "multiprocessing", "concurrent.futures", "asyncio"):
+        for name in ("re", "json", "numpy.linalg", "logging", "numpy.testing", "mujoco",
+                     "xml.etree", "xml.etree.ElementTree", "numpy.random", "multiprocessing",
+                     "concurrent.futures", "asyncio"):
             before = set(sys.modules)
             __import__(name)
             print(name, sorted(set(sys.modules) - before))
@@ -57,7 +65,7 @@ PROBES = {
         print(json is sys.modules["json"], linalg is numpy.linalg, numpy.__spec__.name)
         print(numpy.__spec__.loader is numpy.__loader__, json.__spec__.origin == json.__file__)
         print(json.__spec__._initializing if hasattr(json.__spec__, "_initializing") else None)
-        print(importlib.import_module("numpy") is numpy, importlib.util.find_spec("numpy") is not None)
+        print(importlib.import_module("numpy") is numpy, importlib.util.find_spec("numpy").name)
         print(type(importlib.reload(json)) is type(sys), json.loads("[1]"))
         del sys.modules["json"]
         import json as again
@@ -97,7 +105,7 @@ PROBES = {
         print(os.getcwd(), os.getpgrp() == os.getpid(), os.getsid(0) == os.getpid(), os.nice(0))
         print(resource.getrlimit(resource.RLIMIT_NOFILE), oct(os.umask(0)))
         print(sorted((k, v) for k, v in os.environ.items() if k != "TMPDIR"))
-        print(os.environ["TMPDIR"] == os.environb[b"TMPDIR"].decode(), os.getenv("COURSEBUILD_TRACE"))
+        print(os.environ["TMPDIR"] == os.environb[b"TMPDIR"].decode())
         os.system("env | grep -v TMPDIR | grep -v _= | sort")
     """,
     "hooks": """
@@ -157,6 +165,29 @@ PROBES = {
         folder = tempfile.TemporaryDirectory()
         print("end", end="")
     """,
+    "imports when all is over": """
+        import sys
+        class Late:
+            def __init__(self, *names): self.names = names
+            def __del__(self):
+                for name in self.names:
+                    try:
+                        module = __import__(name)
+                        print(name, module is sys.modules.get(name), module.__name__)
+                    except ImportError as error:
+                        print(name, type(error).__name__)
+        import numpy, json, os
+        late = Late("numpy", "os", "json", "random")
+        late.itself = late
+        del late
+        numpy.late = json.late = os.late = 1
+    """,
+    "modules are gone when all is over": """
+        import json, os
+        class Late:
+            def __del__(self, json=json): print(json.dumps([1]), os is None, __name__)
+        late = Late()
+    """,
     "exit function fails": """
         import atexit
         def fails(): raise ValueError("in an exit function")
@@ -195,7 +226,7 @@ PROBES = {
     """,
     "other processes": """
         import multiprocessing, sys
-        def square(x): return x * x, __name__, multiprocessing.current_process().name != "MainProcess"
+        def square(x): return x * x, __name__, type(multiprocessing.parent_process()).__name__
         if __name__ == "__main__":
             for method in ("fork", "spawn", "forkserver"):
                 with multiprocessing.get_context(method).Pool(2) as pool:
@@ -293,6 +324,7 @@ FAILURES = {
         '"""Doc."""\nprint(__doc__)\n',
     ],
 }
+WARM = str(workers._WARM)
 ARGUMENTS = ("a b", "", "*", "é", "--flag=1", "\udc80")
 
 
@@ -366,3 +398,194 @@ def test_a_forked_script_does_what_a_bare_one_does(
     assert seen(warm) == expected
     (cold,) = run_scripts(root, jobs("examples/probe.py"), parallel=1, fork=False)
     assert seen(cold) == expected
+
+
+WHO = "import os\nprint(os.getppid(), open(f'/proc/{os.getppid()}/stat').read().split()[3])\n"
+
+
+def server_of(run: ScriptRun) -> int:
+    assert run.outcome is Outcome.OK, run.stderr
+    return int(run.stdout.split()[1])
+
+
+class TestServer:
+    def script(self, root: Path, code: str, name: str = "examples/x.py") -> ScriptJob:
+        (root / name).write_text(code)
+        return ScriptJob(name, (), 30.0, (), False)
+
+    def test_it_stays(self, root: Path) -> None:
+        job = self.script(root, "import numpy\n" + WHO)
+        with ScriptServer() as server:
+            runs = [server.run(root, [job] * 3, parallel=2) for _ in range(3)]
+        assert len({server_of(run) for several in runs for run in several}) == 1
+
+    @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
+    def test_it_dies_between_two_runs(self, root: Path, number: signal.Signals) -> None:
+        job = self.script(root, WHO)
+        with ScriptServer() as server:
+            first = server_of(server.run(root, [job], parallel=1)[0])
+            os.kill(first, number)
+            second = server_of(server.run(root, [job], parallel=1)[0])
+        assert first != second
+
+    def test_a_script_ends_it(self, root: Path) -> None:
+        code = "import os, time\npid = int(open(f'/proc/{os.getppid()}/stat').read().split()[3])\n"
+        job = self.script(root, f"{code}os.kill(pid, 9)\ntime.sleep(20)\n", "examples/bad.py")
+        good = self.script(root, WHO)
+        with ScriptServer() as server:
+            runs = server.run(root, [job, good, good], parallel=1)
+            again = server.run(root, [good], parallel=1)
+        assert (runs[0].outcome, runs[0].status) == (Outcome.KILLED, 9)
+        assert "the process that supervises this script was ended by SIGKILL" in runs[0].stderr
+        assert server_of(runs[1]) == server_of(runs[2]) == server_of(again[0])
+
+    def test_it_sees_another_environment(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        job = self.script(root, "import os\nprint(os.environ.get('MUJOCO_GL'))")
+        with ScriptServer() as server:
+            for value in ("egl", "osmesa"):
+                monkeypatch.setenv("MUJOCO_GL", value)
+                assert server.run(root, [job], parallel=1)[0].stdout == f"{value}\n"
+
+    def test_another_version_is_installed(self, root: Path, tmp_path: Path) -> None:
+        """The package stands in for NumPy: a folder on a path that an interpreter starts with."""
+        job = self.script(root, "import numpy\n" + WHO)
+        with ScriptServer() as server:
+            first = server_of(server.run(root, [job], parallel=1)[0])
+            assert server.run(root, [job], parallel=1)[0].stdout.split()[1] == str(first)
+            assert server._server is not None
+            stamps = server._server._stamps
+            assert any(path.endswith("/numpy/__init__.py") for path in stamps)
+            path = next(path for path in stamps if path.endswith("/numpy/__init__.py"))
+            stamps[path] = (0, 0, 0)
+            assert server_of(server.run(root, [job], parallel=1)[0]) != first
+
+    def test_more_is_imported_when_it_is_asked_for(self, root: Path) -> None:
+        probe = "print(bool(re.search(r'libmujoco|_multiarray', open('/proc/self/maps').read())))"
+        plain = self.script(root, f"import re\n{probe}\n{WHO}", "examples/plain.py")
+        asks = self.script(root, f"import mujoco\n{WHO}", "examples/asks.py")
+        with ScriptServer() as server:
+            first = server.run(root, [plain], parallel=1)[0].stdout.split()
+            second = server.run(root, [asks], parallel=1)[0].stdout.split()
+            third = server.run(root, [plain], parallel=1)[0].stdout.split()
+        assert (first[0], third[0]) == ("False", "True")
+        assert first[2] == second[1] == third[2]
+
+    def test_a_module_beside_the_script_comes_first(self, root: Path) -> None:
+        for name in ("random", "numpy", "json"):
+            (root / f"examples/{name}.py").write_text("value = 'mine'\n")
+        code = "import random, numpy, json\nprint(random.value, numpy.value, json.value)\n"
+        job = self.script(root, code)
+        other = self.script(root, "import numpy.linalg, json\nprint(json.dumps(1))", "y.py")
+        with ScriptServer() as server:
+            mine, theirs = server.run(root, [job, other], parallel=1)
+        assert (mine.stdout, theirs.stdout) == ("mine mine mine\n", "1\n")
+
+    def test_a_module_on_a_path_that_the_script_adds(self, root: Path) -> None:
+        (root / "lib").mkdir()
+        (root / "lib/json.py").write_text("value = 'mine'\n")
+        job = self.script(
+            root, "import sys, numpy\nsys.path.insert(0, 'lib')\nimport json\nprint(json.value)"
+        )
+        with ScriptServer() as server:
+            assert server.run(root, [job], parallel=1)[0].stdout == "mine\n"
+
+    def test_scripts_do_not_share_random_numbers(self, root: Path) -> None:
+        code = "import random, numpy as np, uuid\nprint(random.random())\n"
+        code += "print(np.random.rand())\nprint(uuid.uuid4())\n"
+        job = self.script(root, code)
+        with ScriptServer() as server:
+            runs = server.run(root, [job] * 4, parallel=2)
+        assert len({line for run in runs for line in run.stdout.splitlines()}) == 12
+
+    def test_scripts_leave_nothing_to_each_other(self, root: Path) -> None:
+        soil = self.script(
+            root,
+            "import numpy as np, os, sys, warnings, gc, signal\nnp.set_printoptions(precision=1)\n"
+            "np.seterr(all='raise')\nos.environ['X'] = '1'\nsys.path.append('x')\n"
+            "warnings.simplefilter('error')\ngc.disable()\nnp.pi = 3\nos.umask(0)\n"
+            "signal.signal(15, signal.SIG_IGN)\nsys.setrecursionlimit(50)\n",
+            "examples/soil.py",
+        )
+        look = self.script(
+            root,
+            "import numpy as np, os, sys, gc, signal\nprint(np.pi, np.geterr()['divide'], "
+            "os.environ.get('X'), 'x' in sys.path, gc.isenabled(), os.umask(0) != 0, "
+            "signal.getsignal(15) == signal.SIG_DFL, sys.getrecursionlimit(), np.array(2 / 3))",
+        )
+        with ScriptServer() as server:
+            runs = server.run(root, [soil, look, soil, look], parallel=1)
+        expected = "3.141592653589793 warn None False True True True 1000 0.6666666666666666\n"
+        assert [run.stdout for run in runs] == ["", expected] * 2
+
+    def test_order(self, root: Path) -> None:
+        jobs = [self.script(root, f"print({i})", f"examples/{i}.py") for i in range(4)]
+        started: list[str] = []
+
+        def listen(event: RunEvent) -> None:
+            if isinstance(event, RunStarted):
+                started.append(event.path)
+
+        order = [2, 0, 3, 1]
+        runs = run_scripts(root, jobs, parallel=1, order=order, on_event=listen)
+        assert started == [jobs[i].path for i in order]
+        assert [run.stdout for run in runs] == ["0\n", "1\n", "2\n", "3\n"]
+
+    def test_where_forking_cannot_be_scripts_are_started(
+        self, root: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        """A package that starts a thread, prints, fails or crashes when it is imported."""
+        job = self.script(root, "print('ran')")
+        for body in (
+            "import threading, time\nthreading.Thread(target=time.sleep, args=(9,)).start()",
+            "print('hello')",
+            "import os\nos.environ['X'] = '1'",
+            "1 / 0",
+            "import os\nos.abort()",
+            "raise SystemExit",
+            "import signal\nsignal.signal(15, signal.SIG_IGN)",
+            "import os\nos.open('/dev/null', 0)",
+        ):
+            module = tmp_path / "standin.py"
+            module.write_text(body)
+            monkeypatch.setattr(
+                "coursebuild.effects.runner.wanted_packages", lambda scripts: ("standin",)
+            )
+            monkeypatch.setattr("coursebuild.effects.workers._WARM", f"{WARM}:{tmp_path}")
+            with ScriptServer() as server:
+                (run,) = server.run(root, [job], parallel=1)
+                assert (run.outcome, run.stdout) == (Outcome.OK, "ran\n"), body
+                assert server._server is None or server._server.trouble, body
+
+    def test_what_is_not_installed_is_no_trouble(
+        self, root: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(
+            "coursebuild.effects.runner.wanted_packages", lambda scripts: ("no_such_package",)
+        )
+        with ScriptServer() as server:
+            assert server.run(root, [self.script(root, WHO)], parallel=1)[0].outcome is Outcome.OK
+            assert server._server is not None and not server._server.trouble
+
+
+@pytest.mark.parametrize(
+    ("code", "wanted"),
+    [
+        ("", ()),
+        ("import numpy as np", ("numpy",)),
+        ("from numpy.linalg import inv", ("numpy",)),
+        ("import numpy as np\nnp.random.rand()", ("numpy", "numpy.random")),
+        ("from numpy.random import default_rng", ("numpy", "numpy.random")),
+        ("if x:\n    import os, mujoco as m", ("numpy", "mujoco")),
+        ("import mjcourse", ("numpy",)),
+        ("import beside", ("numpy", "mujoco")),
+        ("import numpydoc, mujocox", ()),
+        ('"""\nimport mujoco\n"""', ()),
+        ("# import mujoco\nx = 'import numpy'", ()),
+        ("import mujoco\ndef f(:", ()),
+        ("import mujoco\0", ()),
+    ],
+)
+def test_wanted_packages(tmp_path: Path, code: str, wanted: tuple[str, ...]) -> None:
+    (tmp_path / "beside.py").write_text("import x, mujoco\n")
+    (tmp_path / "x.py").write_text(code)
+    assert wanted_packages([tmp_path / "none.py", tmp_path / "x.py"]) == wanted

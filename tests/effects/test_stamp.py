@@ -269,7 +269,8 @@ def test_looking_imports_next_to_nothing() -> None:
         env={**os.environ, "PYTHONPATH": str(Path(stamp.__file__).parents[2])},
     )
     assert done.stdout.splitlines() == [
-        "['coursebuild.cli', 'coursebuild.effects', 'coursebuild.effects.errors', "
+        "['coursebuild.cli', 'coursebuild.cli.arguments', 'coursebuild.cli.commands', "
+        "'coursebuild.cli.output', 'coursebuild.effects', 'coursebuild.effects.errors', "
         "'coursebuild.effects.place', 'coursebuild.effects.stamp']",
         "[]",
     ]

@@ -28,6 +28,8 @@ from coursebuild.physics.problems.common import NO_CONTACT, NO_GRAVITY, motion_w
 
 RATE = 10.0
 """√(k/m), rad/s."""
+START = (1.0, 5.0)
+"""m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
 RATIOS = (0.0, 0.1, 1.0, 10.0)
 """ζ, damping relative to the critical one."""
 
@@ -47,35 +49,35 @@ def mjcf(ratio: float, rate: float = RATE) -> str:
 """
 
 
-def oscillation(ratio: float, rate: float, start: float, times: Array) -> Motion:
-    """x″ + 2ζωx′ + ω²x = 0 from rest at `start` (m), at the times (n,) s."""
+def oscillation(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
+    """x″ + 2ζωx′ + ω²x = 0 from x0 (m) and v0 (m/s), at the times (n,) s."""
     decay = ratio * rate
     if ratio == 1.0:
-        fall = np.exp(-decay * times) * start
-        place, speed = fall * (1 + decay * times), -fall * rate**2 * times
+        fall, b = np.exp(-decay * times), v0 + decay * x0
+        place = fall * (x0 + b * times)
+        speed = fall * (b - decay * (x0 + b * times))
     elif ratio < 1.0:
         turn = rate * math.sqrt(1 - ratio**2)
-        fall = np.exp(-decay * times) * start
-        sine = np.sin(turn * times)
-        place = fall * (np.cos(turn * times) + decay / turn * sine)
-        speed = -fall * rate**2 / turn * sine
+        fall, sine, cosine = np.exp(-decay * times), np.sin(turn * times), np.cos(turn * times)
+        place = fall * (x0 * cosine + (v0 + decay * x0) / turn * sine)
+        speed = fall * (v0 * cosine - (decay * v0 + rate**2 * x0) / turn * sine)
     else:  # the slow root without the difference of large numbers
         fast = -rate * (ratio + math.sqrt(ratio**2 - 1))
         slow = rate**2 / fast
-        a, b = np.exp(slow * times) * start, np.exp(fast * times) * start
-        place = (fast * a - slow * b) / (fast - slow)
-        speed = fast * slow * (a - b) / (fast - slow)
+        a, b = (fast * x0 - v0) / (fast - slow), (v0 - slow * x0) / (fast - slow)
+        place = a * np.exp(slow * times) + b * np.exp(fast * times)
+        speed = slow * a * np.exp(slow * times) + fast * b * np.exp(fast * times)
     return motion_without_attitude(times, place[:, None], speed[:, None])
 
 
-def integrated(ratio: float, rate: float, start: float, times: Array) -> Motion:
+def integrated(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
     """The same by Bulirsch–Stoer."""
 
     def slope(state: State) -> State:
         x, v = state.tolist()
         return np.array([v, -2 * ratio * rate * v - rate**2 * x])
 
-    states = integrate(slope, np.array([start, 0.0]), times)
+    states = integrate(slope, np.array([x0, v0]), times)
     return motion_without_attitude(times, states[:, :1], states[:, 1:])
 
 
@@ -129,22 +131,22 @@ def _problem(ratio: float) -> Problem:
         title=f"Damped spring, ζ = {ratio:g}",
         case=5,
         mjcf=mjcf(ratio),
-        scenario=Scenario(1.0, 0.1, (1.0,)),
-        position_bound=1e3,
-        velocity_bound=1e5,
+        scenario=Scenario(1.0, 0.1, START[:1], START[1:]),
+        position_bound=1e2,
+        velocity_bound=1e2 * RATE * (1 + 4 * ratio),
         reference=Reference(
             "closed",
             "the linear oscillator",
-            lambda times: oscillation(ratio, RATE, 1.0, times),
+            lambda times: oscillation(ratio, RATE, *START, times),
             floor=1e-14 * RATE,
         ),
         second=Reference(
             "ode",
             "Bulirsch–Stoer",
-            lambda times: integrated(ratio, RATE, 1.0, times),
+            lambda times: integrated(ratio, RATE, *START, times),
             floor=1e-13 * RATE,
         ),
         timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160, 320, 640)),
         limit=lambda one: limit_of(ratio, RATE, one, explicit=(Integrator.EULER_EXPLICIT,)),
-        search=(1e-3 / RATE, 1e3 / RATE),
+        search=(1e-2 / RATE, 1e2 / RATE),
     )

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from coursebuild.physics.elliptic import complete_k, jacobi
-from coursebuild.physics.engine import begun, compiled
+from coursebuild.physics.engine import advance, begun, compiled
 from coursebuild.physics.problem import (
     STANDARD,
     Array,
@@ -165,7 +165,7 @@ def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e
     mujoco.mj_forward(model, data)
     before, slope = float(data.qvel[4]), float(data.qacc[4])
     for step in range(round(4 * Tumbling(nudge, SPIN).first_crossing / timestep)):
-        mujoco.mj_step(model, data)
+        advance(model, data)
         mujoco.mj_forward(model, data)
         after, slope_after = float(data.qvel[4]), float(data.qacc[4])
         if after <= 0.0:
@@ -194,7 +194,7 @@ def kinetic_drift(integrator: Integrator) -> float:
     one = _begun_with(1e-3)
     model = compiled(one.mjcf, integrator, 2e-3)
     data = begun(one, model)
-    mujoco.mj_step(model, data, 10_000)
+    advance(model, data, 10_000)
     inertia = moments()
     final = float(inertia @ np.array(data.qvel[3:]) ** 2)
     first = float(inertia @ np.array(one.scenario.qvel[3:]) ** 2)

@@ -1,6 +1,6 @@
 """What a script's result depends on besides the script: interpreter, system, environment.
 
-Entry points: `surroundings`, `places`.
+Entry points: `conditions`, `places`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from coursebuild.effects.runner import clean_environment
+from coursebuild.effects.surroundings import clean_environment
 
 _SAYS_NOTHING = frozenset(
     {
@@ -29,7 +29,7 @@ _SAYS_NOTHING = frozenset(
 """Variables that say who runs a script and where programs lie, which its result does not show."""
 
 
-def surroundings(outer: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+def conditions(outer: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     """By name, sorted: what has to be the same for a result to be the same.
 
     `outer` is the environment of the tool.

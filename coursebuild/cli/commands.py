@@ -1,0 +1,154 @@
+"""One function for each command: its arguments → pipeline → exit status.
+
+Nothing heavy is imported before the command that needs it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from coursebuild.cli.output import CLEAN, look, print_report, report_text, style_of, write
+
+if TYPE_CHECKING:
+    from coursebuild.pipeline.options import Options
+    from coursebuild.report import Report
+
+
+def _options(arguments: argparse.Namespace) -> Options:
+    from coursebuild.pipeline.options import Options, find_course, open_executor, open_store
+
+    jobs = getattr(arguments, "jobs", None) or available_cores()
+    root = find_course(arguments.root)
+    store = None
+    if hasattr(arguments, "cache"):
+        fresh = arguments.no_cache
+        store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
+    where = getattr(arguments, "executor", None)
+    executor = None if where is None else open_executor(where)
+    return Options(root, jobs, arguments.quiet, store, executor)
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
+
+
+def check_command(arguments: argparse.Namespace) -> int:
+    """Verify, publish nothing."""
+
+    def work(options: Options) -> Report:
+        from coursebuild.pipeline.check import check
+        from coursebuild.pipeline.shards import read_shard
+
+        part = read_shard(arguments.shard, arguments.timings)
+        lessons = tuple(arguments.lessons)
+        return check(options, lessons, shard=part, timings=arguments.write_timings)
+
+    # Machines are told how long it took.
+    parts = arguments.shard or arguments.timings or arguments.write_timings
+    if arguments.format != "text" or parts:
+        options = _options(arguments)
+        return print_report(work(options), arguments.format, options)
+    command = ("check", *arguments.lessons)
+    return _unless_unchanged(arguments, command, ("examples",), work)
+
+
+def build_command(arguments: argparse.Namespace) -> int:
+    """Verify everything and publish the site."""
+
+    def work(options: Options) -> Report:
+        from pathlib import Path
+
+        from coursebuild.pipeline.build import build
+
+        return build(options, Path(arguments.out))
+
+    return _unless_unchanged(arguments, ("build", arguments.out), ("examples", arguments.out), work)
+
+
+def _unless_unchanged(
+    arguments: argparse.Namespace,
+    command: tuple[str, ...],
+    made: tuple[str, ...],
+    work: Callable[[Options], Report],
+) -> int:
+    """Do the work, unless all is as it was when it was last done and all was well.
+
+    `made` is what the command leaves behind. Nothing is imported before it is needed.
+    """
+    from coursebuild.effects.place import course_above
+    from coursebuild.effects.stamp import Watcher, unchanged
+
+    colour, columns = look(sys.stdout)
+    shared = arguments.cache or os.environ.get("COURSEBUILD_CACHE", "")
+    command = (*command, str(arguments.quiet), str(colour), str(columns), shared)
+    root = arguments.root or course_above(".")
+    said = None
+    if root and not arguments.no_cache:
+        said = unchanged(os.path.realpath(root), command)
+    if said is not None:
+        return write(said, CLEAN)
+    options = _options(arguments)
+    watcher = Watcher(str(options.root), command)
+    report = work(options)
+    status = print_report(report, "text", options)
+    if report.ok and report.depends is not None:
+        from coursebuild.report import unchanged_report
+
+        remark = f"nothing has changed since the last {command[0]}"
+        watcher.keep(report_text(unchanged_report(report, remark), options), report.depends, made)
+    return status
+
+
+def update_command(arguments: argparse.Namespace) -> int:
+    """Bring recorded outputs up to date."""
+    from coursebuild.pipeline.update import update
+
+    options = _options(arguments)
+    return print_report(
+        update(options, tuple(arguments.lessons), dry_run=arguments.dry_run), "text", options
+    )
+
+
+def extract_command(arguments: argparse.Namespace) -> int:
+    """Write the scripts to `examples/`."""
+    from coursebuild.pipeline.extract import extract
+
+    options = _options(arguments)
+    return print_report(extract(options, adopt=arguments.adopt), "text", options)
+
+
+def serve_command(arguments: argparse.Namespace) -> int:
+    """Preview."""
+    from coursebuild.pipeline.serve import serve
+
+    options = _options(arguments)
+    try:
+        serve(options, arguments.port)
+    finally:
+        options.store.close()
+    return CLEAN
+
+
+def explain_command(arguments: argparse.Namespace) -> int:
+    """Say why something would run again, and what depends on it."""
+    from coursebuild.pipeline.explain import explain
+    from coursebuild.report.explained import explained_json, explained_text
+
+    explanation = explain(_options(arguments), arguments.path)
+    if arguments.format == "json":
+        return write(explained_json(explanation), CLEAN)
+    return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
+
+
+def schema_command(arguments: argparse.Namespace) -> int:
+    """Print a JSON Schema."""
+    from coursebuild.syntax.schemas import json_schema
+
+    return write(json_schema(arguments.name).decode(), CLEAN)

@@ -1,0 +1,99 @@
+"""What the command line writes, and the exit status that says the same.
+
+Entry points: `write`, `say`, `fail`; `print_report`, `report_text`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from typing import TYPE_CHECKING, TextIO
+
+from coursebuild.effects.errors import reason
+
+if TYPE_CHECKING:
+    from coursebuild.pipeline.options import Options
+    from coursebuild.report import Report, Style
+
+CLEAN, WRONG, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+
+
+def fail(status: int, message: str, help: str = "") -> int:
+    """Say what is wrong on standard error; gives the status."""
+    return say(status, f"coursebuild: {message}" + (f"\n  help: {help}" if help else ""))
+
+
+def say(status: int, text: str) -> int:
+    """Write a text to standard error; gives the status."""
+    if sys.stderr is not None:  # print would take standard output in its place
+        with contextlib.suppress(OSError):  # nobody reads it; the status says it too
+            print(text, file=sys.stderr, flush=True)
+    return status
+
+
+def write(text: str, status: int) -> int:
+    """Write to standard output; gives the status, another one where the text cannot be written."""
+    if sys.stdout is None:  # closed by whoever started us
+        return status
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has seen enough; what was found is as it was
+        _forget_stdout()
+    except OSError as error:
+        _forget_stdout()
+        return fail(WRONG, f"standard output cannot be written: {reason(error)}")
+    return status
+
+
+def _forget_stdout() -> None:
+    """Python writes what is left once more when it ends, and would complain."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
+
+
+def print_report(report: Report, form: str, options: Options) -> int:
+    """Write a report in one of its formats; gives the status that says whether all is well."""
+    from coursebuild.report import FORMATS, render_report
+
+    status = CLEAN if report.ok else WRONG
+    options.store.close()
+    if form == "text":
+        return write(report_text(report, options), status)
+    chosen = next(known for known in FORMATS if known == form)
+    return write(render_report(report, chosen, style_of(sys.stdout)), status)
+
+
+def report_text(report: Report, options: Options) -> str:
+    """The report as it is printed: only what is wrong, where the user wants no more."""
+    from dataclasses import replace
+
+    from coursebuild.report import render_report
+
+    if options.quiet:
+        if not report.diagnostics:
+            return ""
+        report = replace(report, scripts=(), labs=(), remarks=())
+    return render_report(report, "text", style_of(sys.stdout))
+
+
+def look(stream: TextIO | None) -> tuple[bool, int]:
+    """Whether to colour, and how many columns there are.
+
+    Colour only on a terminal whose user does not ask for none (https://no-color.org).
+    """
+    if stream is None or not stream.isatty():
+        return False, 100
+    import shutil
+
+    colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return colour, shutil.get_terminal_size((100, 24)).columns
+
+
+def style_of(stream: TextIO | None) -> Style:
+    """How text on a stream should look."""
+    from coursebuild.report import Style
+
+    return Style(*look(stream))
