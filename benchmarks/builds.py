@@ -24,7 +24,7 @@ sys.path.insert(0, str(HERE))
 
 from benchmarks.measure.building import make_site, measure_builds  # noqa: E402
 from benchmarks.measure.process import CommandError  # noqa: E402
-from benchmarks.measure.report import describe, markdown, put_into  # noqa: E402
+from benchmarks.measure.report import BASE, describe, markdown, put_into  # noqa: E402
 from benchmarks.measure.running import jcache_version, measure_scripts  # noqa: E402
 from benchmarks.measure.serving import measure_serving  # noqa: E402
 from benchmarks.measure.tools import Places, all_tools  # noqa: E402
@@ -78,6 +78,8 @@ def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
     wanted = arguments.tools.split(",") if arguments.tools else None
     tools = [t for t in all_tools(places) if wanted is None or t.key in wanted]
     report = describe(tools, jcache_version(places))
+    if any(tool.key == BASE and tool.version is None for tool in tools):
+        raise CommandError(f"{sys.executable} cannot run coursebuild")
     there = [tool for tool in tools if tool.version is not None]
     parts = arguments.parts.split(",")
     sizes = [int(size) for size in arguments.sizes.split(",")]

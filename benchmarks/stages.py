@@ -9,6 +9,7 @@ all alike, with the median beside it; ratios are of minima.
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import platform
 import statistics
@@ -23,24 +24,40 @@ from coursebuild.checks import course_formulas
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.store import kept
 from coursebuild.effects.v8 import MathEngine
+from coursebuild.model import Course
+from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.outlines import pack
+from coursebuild.pipeline.pages import sheets
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
 from coursebuild.render.assets import Assets
+from coursebuild.render.draft import Draft
+from coursebuild.render.draw import draw
+from coursebuild.render.folding import forget_folds, imported
 from coursebuild.render.fonts import FontJob, subset_font
+from coursebuild.render.highlight import highlight_lines
+from coursebuild.render.library import Library
+from coursebuild.render.record import record
 from coursebuild.render.site import SiteOptions, render_site
+from coursebuild.results import Formula, MathError, Results
 from coursebuild.syntax.document import parse_document
+from coursebuild.values import replace
 
 
-def timed(candidates: dict[str, Callable[[], object]], repeat: int) -> dict[str, list[float]]:
+def timed(
+    candidates: dict[str, Callable[[], object]],
+    repeat: int,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, list[float]]:
     """Seconds of each candidate, interleaved."""
     seconds: dict[str, list[float]] = {name: [] for name in candidates}
     for _ in range(repeat):
         for name, work in candidates.items():
-            began = time.perf_counter()
+            began = clock()
             work()
-            seconds[name].append(time.perf_counter() - began)
+            seconds[name].append(clock() - began)
     return seconds
 
 
@@ -94,29 +111,62 @@ def scripts(root: Path, repeat: int) -> None:
     show(f"running {len(chosen)} scripts", seconds, "python, one after the other")
 
 
-def stages(root: Path, repeat: int) -> None:
+def stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The rest of a build."""
-    options = Options(root, 1, True)
-    course = load(root).course
-    assert course is not None
-    results = verify(course, options, Progress(quiet=True)).results
     assets = Assets(template_texts(), bundled_files())
 
     def subset(job: FontJob) -> bytes:
         return kept(root, "fonts", job.key, lambda: subset_font(job))
 
-    def typeset() -> None:
-        with MathEngine() as engine:
-            engine.typeset(course_formulas(course))
-
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),
-        f"typeset {len(course_formulas(course))} formulas": typeset,
+        f"typeset {len(course_formulas(course))} formulas": lambda: typeset(course),
         "render, fonts kept": lambda: render_site(
             course, results, assets, SiteOptions(subset=subset)
         ),
     }
     show("stages", timed(candidates, max(2, repeat // 2)), "load: read, parse, check")
+
+
+def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
+    """The formulas of a course with their MathML, from an engine just started."""
+    formulas = course_formulas(course)
+    with MathEngine() as engine:
+        return tuple(zip(formulas, engine.typeset(formulas), strict=True))
+
+
+def lessons(course: Course, results: Results, repeat: int) -> None:
+    """What each step costs a lesson: time of one core, nothing remembered from lesson to lesson."""
+    library = Library.of(course, results, Assets(template_texts(), bundled_files()))
+    texts = {document.source.path: document for document in course.documents}
+    drawn = [(sheet, texts[sheet.document]) for sheet in sheets(library) if sheet.document]
+    kinds = frozenset(kind.name for kind in course.callouts)
+    scripts = [script.code.text for script, _ in library.scripts.values()]
+    tools = library.tools
+
+    def draws() -> list[Draft]:
+        highlight_lines.cache_clear()
+        forget_folds()
+        return [draw(sheet, document, tools) for sheet, document in drawn]
+
+    def modules() -> list[frozenset[str]]:
+        forget_folds()
+        return [imported(script) for script in scripts]
+
+    drafts = draws()
+    documents = [document for _, document in drawn]
+    steps: dict[str, Callable[[], object]] = {
+        "parse": lambda: [parse_document(d.source, kinds, lesson=True) for d in documents],
+        "its outline": lambda: [pack(skeleton(d)) for d in documents],
+        "modules that scripts import": modules,
+        "draw": draws,
+        "settle, facts and links": lambda: [record(d, course.base_url) for d in drafts],
+    }
+    counted = timed(steps, max(2, repeat), time.process_time)
+    print(f"\nof each of {len(drawn)} lessons and pages, one core")
+    for name, values in counted.items():
+        low, middle = min(values) / len(drawn), statistics.median(values) / len(drawn)
+        print(f"  {name:<44} {1e3 * low:9.3f} ms  median {1e3 * middle:9.3f}")
 
 
 def main() -> None:
@@ -127,12 +177,18 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=9)
     arguments = parser.parse_args()
     root = arguments.course.resolve()
+    gc.set_threshold(200_000, 50, 50)  # as for a command
     print(f"{platform.platform()}, {len(os.sched_getaffinity(0))} cores, {platform.processor()}")
     names = ("markdown-it-py", "mujoco", "numpy")
     print(f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in names))
     parsing(root, arguments.repeat)
     scripts(root, arguments.repeat)
-    stages(root, arguments.repeat)
+    course = load(root).course
+    assert course is not None
+    results = verify(course, Options(root, 1, True), Progress(quiet=True)).results
+    results = replace(results, formulas=typeset(course))
+    stages(course, results, root, arguments.repeat)
+    lessons(course, results, arguments.repeat)
 
 
 if __name__ == "__main__":

@@ -54,8 +54,9 @@ class Trace:
     """
 
     files: tuple[str, ...]
-    """Files of the project that it read, or tried to read and that were not there. Its own file and
-    files that it wrote itself before are not among them."""
+    """Files of the project that it read, or tried to read and that were not there, such as what
+    would have been imported instead of another folder's module. Its own file and files that it
+    wrote itself before are not among them; a compiled module stands as its source."""
     folders: tuple[str, ...]
     """Folders of the project that it listed."""
     outside: tuple[str, ...]

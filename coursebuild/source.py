@@ -152,8 +152,12 @@ class Excerpt:
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""
-        i = bisect_right(self.pieces, at, key=_text_offset) - 1
-        text_at, source_at = self.pieces[max(i, 0)]
+        pieces = self.pieces
+        if len(pieces) == 1:
+            text_at, source_at = pieces[0]
+        else:
+            i = bisect_right(pieces, at, key=_text_offset) - 1
+            text_at, source_at = pieces[max(i, 0)]
         return min(source_at + (at - text_at), len(self.source.text))
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
@@ -166,6 +170,8 @@ class Excerpt:
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
         end = len(self.text) if end is None else end
+        if len(self.pieces) == 1:
+            return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)),))
         first = bisect_right(self.pieces, start, key=_text_offset)
         last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
         inner = ((t - start, s) for t, s in self.pieces[first:last])

@@ -34,7 +34,7 @@ class Site:
     places: Places
     edits: int = 0
     failed: str = ""
-    """What went wrong, if something did: then its figures are incomplete."""
+    """At what something went wrong, if it did: then its figures are incomplete."""
     found: dict[str, list[float]] = field(default_factory=dict)
 
     @property
@@ -65,7 +65,11 @@ class Site:
     def command(self) -> list[str]:
         """The command for a build."""
         assert self.tool.build is not None
-        return self.tool.build
+        return self.filled(self.tool.build)
+
+    def filled(self, command: list[str]) -> list[str]:
+        """A command with the folder of the course in it."""
+        return [part.replace("{folder}", str(self.folder)) for part in command]
 
     def built(self) -> float:
         """Build; gives seconds."""
@@ -113,24 +117,26 @@ def measure_builds(
     sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build is not None]
     for site in sites:
         say(f"{lessons} lessons, first build: {site.tool.title}")
-        attempt(site, first_build, say)
+        attempt(site, COLD, first_build, say)
     for turn in range(rounds):
         for site in sites:
             say(f"{lessons} lessons, round {turn + 1} of {rounds}: {site.tool.title}")
-            attempt(site, one_round, say)
+            attempt(site, "builds", one_round, say)
     for site in sites:
         if not site.tool.only_incremental:
-            attempt(site, memory, say)
+            attempt(site, MEMORY, memory, say)
     return sites
 
 
-def attempt(site: Site, work: Callable[[Site], None], say: Callable[[str], None]) -> None:
+def attempt(
+    site: Site, what: str, work: Callable[[Site], None], say: Callable[[str], None]
+) -> None:
     """Do something with a site; one that fails is told of and left out from there on."""
     if not site.failed:
         try:
             work(site)
         except CommandError as fault:
-            site.failed = str(fault)
+            site.failed = what
             say(f"{site.tool.title} FAILED: {fault}")
 
 

@@ -58,7 +58,7 @@ class Report:
         """Take over what was found at one size."""
         for site in sites:
             if site.failed:
-                self.failed.append(f"{site.tool.title} at {lessons} lessons")
+                self.failed.append(f"{site.tool.title} ({site.failed}, {lessons} lessons)")
             for row, values in site.found.items():
                 self.figures.append(Figure(row, lessons, site.tool.title, values))
 

@@ -30,7 +30,7 @@ def measure_serving(sites: list[Site], rounds: int, edits: int, say: Callable[[s
         for site in sites:
             if site.tool.serve is not None:
                 say(f"preview, round {turn + 1} of {rounds}: {site.tool.title}")
-                attempt(site, functools.partial(one_server, edits=edits), say)
+                attempt(site, SERVED, functools.partial(one_server, edits=edits), say)
 
 
 def one_server(site: Site, edits: int) -> None:
@@ -39,7 +39,7 @@ def one_server(site: Site, edits: int) -> None:
     port = free_port()
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(
-            site.tool.serve(port),
+            site.filled(site.tool.serve(port)),
             cwd=site.folder,
             env=environment(site.places),
             stdin=subprocess.DEVNULL,

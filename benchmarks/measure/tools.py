@@ -112,7 +112,13 @@ def said_version(command: list[str] | None) -> str | None:
     if command is None:
         return None
     done = subprocess.run(
-        command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=60
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": str(HERE)},
     )
     match = re.search(r"\d+\.\d[\w.]*", done.stdout + done.stderr)
     return match[0] if match and done.returncode == 0 else None
@@ -237,7 +243,8 @@ def hugo(places: Places) -> list[Tool]:
     """Hugo with formulas in the build, and without."""
     program = places.python_tool("hugo") or shutil.which("hugo")
     version = said_version(asked(program, "version"))
-    serving = ["server", "--bind", "127.0.0.1", "--disableLiveReload=false", "--port"]
+    kept = ["--cacheDir", "{folder}/.cache"]  # with formulas in it: a cold build has none
+    serving = ["server", "--bind", "127.0.0.1", *kept, "--port"]
     return [
         Tool(
             key,
@@ -246,8 +253,8 @@ def hugo(places: Places) -> list[Tool]:
             math,
             version,
             "layouts of a few lines; " + how,
-            [program or "", "build", "--quiet"],
-            ("public", "resources", ".hugo_build.lock"),
+            [program or "", "build", "--quiet", *kept],
+            ("public", "resources", ".cache", ".hugo_build.lock"),
             lambda name: f"public/lessons/{dashed(name)}/index.html",
             lambda name: f"content/lessons/{name}.md",
             lambda port: [program or "", *serving, str(port), "--baseURL", "http://127.0.0.1/"],

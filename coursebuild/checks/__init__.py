@@ -17,6 +17,7 @@ from coursebuild.checks.formulas import document_formulas as document_formulas
 from coursebuild.checks.formulas import formula_findings as formula_findings
 from coursebuild.checks.labs import check_labs, lab_findings
 from coursebuild.checks.links import Places as Places
+from coursebuild.checks.links import anchors as anchors
 from coursebuild.checks.links import check_links, document_links
 from coursebuild.checks.links import places as places
 from coursebuild.checks.quizzes import check_quizzes, quiz_findings

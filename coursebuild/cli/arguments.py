@@ -15,6 +15,7 @@ from coursebuild.cli.commands import (
     extract_command,
     schema_command,
     serve_command,
+    stability_command,
     update_command,
 )
 
@@ -35,7 +36,9 @@ def parser() -> argparse.ArgumentParser:
         help="the course's folder (default: the nearest one with content/course.toml)",
     )
     parser.add_argument("--version", action="version", version=f"coursebuild {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(
+        title="commands", metavar="COMMAND", required=True, prog=parser.prog
+    )
     build = _command(commands, "build", build_command, "verify everything and publish the site")
     build.add_argument(
         "--out",
@@ -91,6 +94,20 @@ def parser() -> argparse.ArgumentParser:
         "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
     )
     explain.set_defaults(command=explain_command, quiet=False)
+    stability = _command(
+        commands,
+        "stability",
+        stability_command,
+        "measure MuJoCo on hard cases, beside theory",
+        runs=False,
+    )
+    stability.add_argument(
+        "problems", nargs="*", metavar="PROBLEM", help="a hard case or a family (default: all)"
+    )
+    stability.add_argument(
+        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
+    )
+    _cache(stability)
     schema = commands.add_parser(
         "schema", help="print a JSON Schema for an editor", allow_abbrev=False
     )

@@ -147,6 +147,21 @@ def explain_command(arguments: argparse.Namespace) -> int:
     return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
 
 
+def stability_command(arguments: argparse.Namespace) -> int:
+    """Measure MuJoCo on hard cases, beside theory."""
+    from coursebuild.pipeline.stability import stability
+    from coursebuild.report.stability import stability_json, stability_text
+
+    options = _options(arguments)
+    try:
+        reports = stability(options, tuple(arguments.problems))
+    finally:
+        options.store.close()
+    if arguments.format == "json":
+        return write(stability_json(reports), CLEAN)
+    return write(stability_text(reports, style_of(sys.stdout)), CLEAN)
+
+
 def schema_command(arguments: argparse.Namespace) -> int:
     """Print a JSON Schema."""
     from coursebuild.syntax.schemas import json_schema

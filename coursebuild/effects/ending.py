@@ -30,7 +30,9 @@ class Ending:
         """Whether the script leaves alone what tells of its end."""
         self._streams = tuple(getattr(sys, name) for name in _STREAMS)
         self._normal = False
-        self._libc = ctypes.PyDLL(None)
+        libc = ctypes.PyDLL(None)
+        # At the end there are no builtins any more, which looking up a function would need.
+        self._exit, self._write_out, self._vanish = libc.exit, libc.fflush, libc._exit
 
     def check(self) -> None:
         """The last exit function: whether the script ran to its end.
@@ -53,9 +55,9 @@ class Ending:
         """Exit, if the status is known; native code that the script loaded sees it."""
         if self._normal and self._flushed():
             if self._tracer.native:
-                self._libc.exit(0)
-            self._libc.fflush(None)
-            self._libc._exit(0)
+                self._exit(0)
+            self._write_out(None)
+            self._vanish(0)
 
     def _flushed(self) -> bool:
         """Write out what the script has printed; `False` where Python will have to complain."""

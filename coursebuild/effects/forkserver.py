@@ -68,9 +68,15 @@ class Loaded(TypedDict):
     """The files and folders whose change says that other versions are installed."""
 
 
-def serve(recorder: Recorder, control: int) -> None:
-    """Serve the tool until it closes the socket; only a script's process returns."""
-    server = _Server(recorder, socket.socket(fileno=control))
+def serve(recorder: Recorder, control: int, said: int) -> None:
+    """Serve the tool until it closes the socket; only a script's process returns.
+
+    Args:
+        recorder: what was imported until now.
+        control: the socket's descriptor.
+        said: a file that takes what this process prints.
+    """
+    server = _Server(recorder, socket.socket(fileno=control), said)
     me = os.getpid()
     try:
         if not server.work():
@@ -80,14 +86,15 @@ def serve(recorder: Recorder, control: int) -> None:
     except BaseException:
         text = traceback.format_exc()
         if os.getpid() == me:
-            server.control.send(json.dumps({"failed": text}).encode())
+            with contextlib.suppress(OSError):
+                server.control.send(json.dumps({"failed": text}).encode())
         else:
             os.write(2, text.encode())
         os._exit(70)
 
 
 class _Server:
-    def __init__(self, recorder: Recorder, control: socket.socket) -> None:
+    def __init__(self, recorder: Recorder, control: socket.socket, said: int) -> None:
         self.recorder = recorder
         self.control = control
         self.scratch: set[str] = set()
@@ -98,9 +105,9 @@ class _Server:
         except Exception as error:
             self.trouble = str(error)
         self.has_library = library_is_installed()
-        self.said = os.memfd_create("said")
-        for fd in (1, 2):  # a script's pipes take their place
-            os.dup2(self.said, fd)
+        self.said = said
+        if self._has_printed():
+            self.trouble = "this Python prints something when it starts"
         self.awake, wake = os.pipe()
         os.set_blocking(wake, False)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
@@ -118,7 +125,10 @@ class _Server:
                 os.read(self.awake, 4096)
                 self._reap(os.WNOHANG)
             if self.control.fileno() in ready:
-                data, fds, _, _ = socket.recv_fds(self.control, 1 << 16, 2)
+                try:
+                    data, fds, _, _ = socket.recv_fds(self.control, 1 << 16, 2)
+                except ConnectionResetError:  # closed, with answers that were not read
+                    break
                 if not data:
                     break
                 request: Request = json.loads(data)
@@ -132,6 +142,11 @@ class _Server:
                 with contextlib.suppress(OSError):
                     Path(folder).rmdir()
         return False
+
+    def _has_printed(self) -> bool:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        return os.fstat(self.said).st_size > 0
 
     def _answer(self, answer: Mapping[str, object]) -> None:
         with contextlib.suppress(OSError):
@@ -160,10 +175,10 @@ class _Server:
         self.recorder.settle()
         if "mujoco" in names and "mujoco" in sys.modules:
             mujoco_tracing.wrap(sys.modules["mujoco"], re)
-        sys.stdout.flush()
-        sys.stderr.flush()
+        gc.collect()
+        gc.freeze()  # a script's collector shall not look at, and so copy, what it did not make
         changed = [k for k, v in _surroundings().items() if v != before[k]]
-        if not self.trouble and os.fstat(self.said).st_size:
+        if not self.trouble and self._has_printed():
             self.trouble = "an import printed something"
         if not self.trouble and changed:
             self.trouble = f"an import changed the process ({', '.join(changed)})"
@@ -182,8 +197,7 @@ class _Server:
         slot = Slot(
             fds[0], fds[1], None if self.trouble else _Forker(self), has_library=self.has_library
         )
-        gc.collect()
-        gc.freeze()  # a script's collector shall not look at, and so copy, what it did not make
+        gc.freeze()
         if not slot.work():
             os._exit(0)
         return True

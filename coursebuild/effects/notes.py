@@ -76,7 +76,7 @@ class _Collected:
         elif kind == "n":
             folder, _, name = about.partition("\t")
             self._imported(folder.removeprefix(self._root[:-1]).lstrip("/"), name, bool(folder))
-        elif not self.opaque:
+        elif kind == "o" and not self.opaque:
             self.opaque = about
 
     def _file(self, path: str) -> None:

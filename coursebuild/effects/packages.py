@@ -16,6 +16,7 @@ from pathlib import Path
 from coursebuild.effects.store import Store
 from coursebuild.results import OutputFile
 
+_FOLDERS = ("site-packages", "dist-packages")
 _TICK = 2_000_000_000
 """The coarsest clock of a file system, ns."""
 
@@ -54,9 +55,11 @@ def kept_distributions(store: Store, modules: Iterable[str]) -> tuple[tuple[str,
 
 
 def _signature() -> str | None:
-    """The folders in which packages are looked for, as they are now; none while they change."""
+    """The folders with packages, as they are now; none while they change."""
     parts = [sys.version]
     for folder in sys.path:
+        if not folder.endswith(_FOLDERS):  # other places change often, and no package is put there
+            continue
         try:
             status = Path(folder).stat()
         except OSError:

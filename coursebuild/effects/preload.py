@@ -232,7 +232,8 @@ class Finder:
         import _imp
 
         self._told = told
-        self._modules = {name: sys.modules[name] for name in recorder.bare} | recorder.modules
+        self._modules = {name: sys.modules[name] for name in recorder.bare - _NEEDED}
+        self._modules |= recorder.modules
         self._recorder = recorder
         self._bare_path = frozenset(bare_path)
         self._restored: set[str] = set()
@@ -275,7 +276,7 @@ class Finder:
 
         What every Python has is taken too, but for what that end needs. All can be imported again.
         """
-        for name in (*self._restored, *self._recorder.bare - _NEEDED):
+        for name in (*self._restored, *self._recorder.bare):
             if name in sys.modules and sys.modules[name] is self._modules.get(name):
                 del sys.modules[name]
         self._restored.clear()

@@ -1,6 +1,6 @@
 """Keeping the store within its limit: what was used least recently goes first.
 
-Entry points: `prune_if_due`, `prune`.
+Entry points: `prune_if_due`, `prune`, `remove_abandoned`.
 
 Only files named by a hash are entries, and only they are counted and removed, with the temporary
 files of writers that were killed. Other processes may write, read and prune meanwhile: whoever
@@ -67,6 +67,15 @@ def prune(folder: Path, limit: int) -> int:
             os.unlink(file.path)  # noqa: PTH108 - ten thousand of them
             removed += 1
     return removed
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files in a folder whose writers were killed."""
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(TEMPORARY):
+                with contextlib.suppress(OSError):
+                    _remove_if_abandoned(entry.path)
 
 
 def _entries(folder: Path) -> Iterator[_File]:

@@ -6,7 +6,6 @@ Entry point: `missing_modules`.
 from __future__ import annotations
 
 import contextlib
-import importlib
 import importlib.machinery
 import sys
 from collections.abc import Sequence
@@ -18,8 +17,17 @@ def missing_modules(names: Sequence[str], folder: Path | None, library: str) -> 
     if not names:
         return []
     path = [*([str(folder)] if folder else []), *sys.path, *([library] if library else [])]
-    importlib.invalidate_caches()
+    _look_again()
     return [name for name in names if not _exists(name, path)]
+
+
+def _look_again() -> None:
+    """Forget what folders held; `importlib.invalidate_caches` would import much to do the same."""
+    for entry, finder in list(sys.path_importer_cache.items()):
+        if finder is None:
+            del sys.path_importer_cache[entry]
+        elif hasattr(finder, "invalidate_caches"):
+            finder.invalidate_caches()
 
 
 def _exists(name: str, path: list[str]) -> bool:

@@ -23,7 +23,7 @@ import selectors
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
@@ -100,6 +100,8 @@ class ScriptServer:
     def __init__(self, *, fork: bool = True) -> None:
         self._fork = fork and sys.platform == "linux"
         self._server: ForkServer | None = None
+        self._idle: list[Worker] = []
+        """Supervisors that wait for the next run."""
 
     def __enter__(self) -> Self:
         return self
@@ -114,9 +116,19 @@ class ScriptServer:
 
     def close(self) -> None:
         """End the process."""
+        self._dismiss_idle()
         server, self._server = self._server, None
         if server is not None:
             server.close()
+
+    def expect(self, root: Path, paths: Iterable[str]) -> None:
+        """Begin to import what these scripts import, without waiting for it."""
+        if not self._fork:
+            return
+        environment = clean_environment(os.environ)
+        with contextlib.suppress(ServerLostError):  # which the run will find too
+            server = self._usable(environment)
+            server.expect(wanted_packages(root / path for path in paths))
 
     def run(
         self,
@@ -131,45 +143,75 @@ class ScriptServer:
         work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order)
         if not work.waiting:
             return work.results()
-        with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
-            work.scratch = _scratch()
-            stack.callback(supervisor.remove_folder, work.scratch)
-            for _ in range(min(max(parallel, 1), len(work.waiting))):
-                self._start(stack, selector, work)
-            while selector.get_map():
-                for key, _ in selector.select():
-                    worker: Worker = key.data
-                    if work.hear(worker):
-                        continue
-                    selector.unregister(worker)
-                    if worker.jobs is not None:  # it did not end because nothing is left
-                        worker.dismiss()
-                        if work.waiting:
-                            self._start(stack, selector, work)
+        busy: set[Worker] = set()
+        work.scratch = _scratch()
+        try:
+            with selectors.DefaultSelector() as selector:
+                for _ in range(min(max(parallel, 1), len(work.waiting))):
+                    self._start(busy, selector, work)
+                while busy:
+                    for key, _ in selector.select():
+                        self._hear(key.data, busy, selector, work)
+        finally:
+            for worker in busy:
+                worker.dismiss()  # all of them, before waiting for any
+            for worker in busy:
+                worker.close()
+            supervisor.remove_folder(work.scratch)
         return work.results()
 
-    def _start(
-        self, stack: contextlib.ExitStack, selector: selectors.BaseSelector, work: _Work
-    ) -> None:
+    def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
         worker = self._worker(work)
-        stack.callback(worker.close)
+        busy.add(worker)
         selector.register(worker, selectors.EVENT_READ, worker)
         work.next(worker)
+
+    def _hear(
+        self, worker: Worker, busy: set[Worker], selector: selectors.BaseSelector, work: _Work
+    ) -> None:
+        there = work.hear(worker)
+        if there and worker.job is not None:
+            return
+        selector.unregister(worker)
+        busy.remove(worker)
+        if there:
+            self._idle.append(worker)
+            return
+        worker.close()
+        if work.waiting:
+            self._start(busy, selector, work)
 
     def _worker(self, work: _Work) -> Worker:
         for _ in range(2):  # a server that dies while it is asked is replaced once
             if not self._fork:
                 break
-            if self._server is not None and not self._server.usable(work.environment):
-                self.close()
-            if self._server is None:
-                self._server = ForkServer(work.environment)
+            server = self._usable(work.environment)
             try:
-                self._server.load(work.packages())
-                return self._server.worker(work.scratch)
+                if server.load(work.packages()):
+                    self._dismiss_idle()  # they were forked before that
+                return self._idle_worker(work) or server.worker(work.scratch)
             except ServerLostError:
                 self.close()
-        return spawn_worker(work.environment)
+        return self._idle_worker(work) or spawn_worker(work.environment)
+
+    def _usable(self, environment: Mapping[str, str]) -> ForkServer:
+        if self._server is not None and not self._server.usable(environment):
+            self.close()
+        if self._server is None:
+            self._server = ForkServer(environment)
+        return self._server
+
+    def _idle_worker(self, work: _Work) -> Worker | None:
+        while self._idle:
+            worker = self._idle.pop()
+            if worker.environment == work.environment and worker.is_there():
+                return worker
+            worker.close()
+        return None
+
+    def _dismiss_idle(self) -> None:
+        while self._idle:
+            self._idle.pop().close()
 
 
 class _Work:
@@ -204,9 +246,8 @@ class _Work:
         return self._packages
 
     def next(self, worker: Worker) -> None:
-        """Hand over the next job, or let the supervisor go."""
+        """Hand over the next job, if there is one."""
         if not self.waiting:
-            worker.dismiss()
             return
         index = self.waiting.pop(0)
         self.tell(RunStarted(self.jobs[index].path, self.total))

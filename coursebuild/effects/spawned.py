@@ -37,6 +37,7 @@ def start(notes: str, tool: str, bare: frozenset[str]) -> None:
         if name != "sitecustomize":
             del sys.modules[name]
     tracer.install()
+    tracer.begin()
 
 
 class _Waiting:

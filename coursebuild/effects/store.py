@@ -27,7 +27,7 @@ from pathlib import Path
 
 from coursebuild.effects.errors import reason
 from coursebuild.effects.locks import make_private_folder, try_lock
-from coursebuild.effects.prune import HASH, TEMPORARY, prune_if_due
+from coursebuild.effects.prune import HASH, TEMPORARY, prune_if_due, remove_abandoned
 from coursebuild.effects.shared import SharedCache
 
 FOLDER = ".coursebuild"
@@ -77,6 +77,7 @@ class Store:
         self._waiting: list[str] = []
         self._tell: Callable[[str], None] = self._waiting.append
         self._written = 0
+        self._tidied: set[Path] = set()
 
     def listen(self, tell: Callable[[str], None]) -> None:
         """Be told what is wrong with the store, a line each; also what was found before."""
@@ -190,11 +191,20 @@ class Store:
                 make_private_folder(self.folder)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 _write(path, entry)
+            self._tidy(path.parent)
         except OSError as error:
             self.say(f"results cannot be kept in {FOLDER}: {reason(error)}")
             return
         with self._lock:
             self._written += len(entry)
+
+    def _tidy(self, folder: Path) -> None:
+        """Where something is written for the first time, what killed writers left goes."""
+        with self._lock:
+            if folder in self._tidied:
+                return
+            self._tidied.add(folder)
+        remove_abandoned(folder)
 
     # --- shared
 

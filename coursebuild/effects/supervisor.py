@@ -1,7 +1,7 @@
 """The process that runs scripts for `runner` and sees to it that nothing stays behind.
 
-Entry points: `work`, in a process that `forkserver` has forked; or run as a file by `runner`, where
-there is no fork server. It imports nothing but the standard library.
+Entry points: `Slot`, in a process that `forkserver` has forked; `main`, in one that `workers` has
+started, where there is no fork server. It imports nothing but the standard library.
 
 It runs one script after another, each in a session of its own, so that
 
@@ -171,12 +171,9 @@ class Slot:
         return _spawn(job, environment)
 
 
-def main() -> None:
-    """Serve the process that started this one, by standard input and output."""
-    reports = os.dup(1)
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 1)  # whatever prints here must not end up between the reports
-    os.close(null)
+def main(reports: int) -> None:
+    """Serve the process that started this one, by standard input and this descriptor."""
+    os.set_inheritable(reports, False)
     tool = os.getppid()
     slot = Slot(0, reports, has_library=library_is_installed())
     try:
@@ -241,8 +238,14 @@ def _spawn(job: Job, environment: Mapping[str, str]) -> Launched:
         os.close(stdout)
         os.close(stderr)
     process.returncode = 0  # who watches the script reaps it
-    read = functools.partial(read_notes, b"", notes, job["root"], job["path"])
+    read = functools.partial(_notes_of_spawned, notes, job["root"], job["path"])
     return Launched(process.pid, out, err, read)
+
+
+def _notes_of_spawned(folder: str, root: str, path: str) -> Notes | None:
+    if not os.path.isdir(folder):  # noqa: PTH112
+        return None
+    return read_notes(b"", folder, root, path)
 
 
 def _before_exec(parent: int) -> Callable[[], None]:
@@ -269,10 +272,11 @@ def die_with(parent: int, libc: ctypes.CDLL | None) -> None:
 
 
 def _finished(
-    run: Watched, notes: Callable[[], Notes] | None
+    run: Watched, notes: Callable[[], Notes | None]
 ) -> tuple[Report, bytes, bytes, bytes]:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
-    trace = json.dumps(notes()).encode() if notes is not None else b""
+    noted = notes()
+    trace = b"" if noted is None else json.dumps(noted).encode()
     report: Report = {
         "end": run.over,
         "status": run.exit_status(),
@@ -344,7 +348,3 @@ def _send(fd: int, header: bytes, *blobs: bytes) -> None:
     rest = memoryview(b"".join((LENGTH.pack(len(header)), header, *blobs)))
     while rest:
         rest = rest[os.write(fd, rest) :]
-
-
-if __name__ == "__main__":
-    main()

@@ -2,8 +2,9 @@
 
 Entry points: `tool_digest()`; `engine_digest()`, of what typesets formulas.
 
-The files' sizes and times tell one tool from another, so that none of them need be read. A tool
-that was installed anew makes everything once more, though it may be the same.
+What it imports belongs to it, by the versions that are installed. The files' sizes and times tell
+one tool from another, so that none of them need be read. A tool that was installed anew makes
+everything once more, though it may be the same.
 """
 
 from __future__ import annotations
@@ -31,8 +32,40 @@ def engine_digest() -> str:
     return _digest(str(assets_dir() / "temml"), os.path.join(_PACKAGE, "effects"))  # noqa: PTH118
 
 
+_LIBRARIES = (
+    "brotli",
+    "fonttools",
+    "jinja2",
+    "markdown_it_py",
+    "markupsafe",
+    "mdit_py_plugins",
+    "mdurl",
+    "mini_racer",
+    "msgspec",
+    "pygments",
+)
+"""What outputs are made with, as the folders with their versions in the name begin."""
+
+
+@functools.cache
+def _libraries() -> str:
+    """The versions of the libraries, by the folders that installing them leaves."""
+    found: list[str] = []
+    for folder in sys.path:
+        try:
+            names = os.listdir(folder or ".")  # noqa: PTH208
+        except OSError:
+            continue
+        found += sorted(
+            name
+            for name in names
+            if name.endswith(".dist-info") and name.lower().partition("-")[0] in _LIBRARIES
+        )
+    return "\0".join(found)
+
+
 def _digest(*folders: str) -> str:
-    digest = hashlib.sha256(sys.version.encode())
+    digest = hashlib.sha256(f"{sys.version}\0{_libraries()}\0".encode())
     for folder in folders:
         for line in _lines(folder, ""):
             digest.update(line.encode("utf-8", "surrogateescape"))

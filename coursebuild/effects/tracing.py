@@ -11,6 +11,7 @@ that MuJoCo opens without Python's knowing.
 
 A record is a letter and what it is about, in bytes:
 
+- `b`: notes are taken
 - `r` and a path: a file was read, or was to be and was not there
 - `l` and a path: a folder was listed
 - `m` and a name: a module was imported that is not Python's own, nor of the project
@@ -157,6 +158,10 @@ class Tracer:
                     pass
 
         sys.addaudithook(hook)
+
+    def begin(self) -> None:
+        """Say that notes are taken."""
+        self._note("b")
 
     def read(self, path: object) -> None:
         """A file was opened for reading, or an attempt was made."""
@@ -339,7 +344,9 @@ class Tracer:
             try:
                 self._sink.write(data)
             except ValueError:
-                self._spill(f"o{TOO_MUCH}\0".encode())
+                if TOO_MUCH not in self._noted:
+                    self._noted.add(TOO_MUCH)
+                    self._spill(f"o{TOO_MUCH}\0".encode())
         else:
             self._spill(data)
 

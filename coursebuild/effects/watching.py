@@ -34,8 +34,8 @@ class Launched(NamedTuple):
     pid: int
     stdout: int
     stderr: int
-    notes: Callable[[], Notes] | None
-    """What it looked at, once it has ended."""
+    notes: Callable[[], Notes | None]
+    """What it looked at, once it has ended; `None` where nobody took notes."""
 
 
 class Watched:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import select
 import selectors
 import socket
 import subprocess
@@ -26,7 +27,7 @@ _WARM = Path(__file__).with_name("warm")
 _SUPERVISOR = (
     "import sys; sys.path.insert(0, sys.argv[1])\n"
     "from coursebuild.effects import supervisor\n"
-    "sys.path.pop(0); supervisor.main()"
+    "sys.path.pop(0); supervisor.main(int(sys.argv[2]))"
 )
 
 
@@ -37,7 +38,9 @@ class ServerLostError(Exception):
 class Worker:
     """A supervisor: it is given jobs and sends reports."""
 
-    def __init__(self, jobs: int, reports: int) -> None:
+    def __init__(self, environment: Mapping[str, str], jobs: int, reports: int) -> None:
+        self.environment = environment
+        """What it was started with."""
         self.jobs: int | None = jobs
         self.reports = reports
         self.job: int | None = None
@@ -56,6 +59,10 @@ class Worker:
         with contextlib.suppress(BrokenPipeError):  # it died; reading tells
             while rest:
                 rest = rest[os.write(self.jobs, rest) :]
+
+    def is_there(self) -> bool:
+        """Whether it waits for a job: while it does it says nothing, unless it ends."""
+        return self.job is None and not select.select([self.reports], [], [], 0)[0]
 
     def dismiss(self) -> None:
         """Give it no more jobs; it ends, and kills what it runs."""
@@ -111,8 +118,14 @@ class Worker:
 
 
 class _SpawnedWorker(Worker):
-    def __init__(self, process: subprocess.Popen[bytes], jobs: int, reports: int) -> None:
-        super().__init__(jobs, reports)
+    def __init__(
+        self,
+        environment: Mapping[str, str],
+        process: subprocess.Popen[bytes],
+        jobs: int,
+        reports: int,
+    ) -> None:
+        super().__init__(environment, jobs, reports)
         self._process = process
 
     def status(self) -> int:
@@ -127,29 +140,30 @@ class _SpawnedWorker(Worker):
 def spawn_worker(environment: Mapping[str, str]) -> Worker:
     """A supervisor with an interpreter of its own, which starts one for each script."""
     theirs, jobs = os.pipe()
+    reports, theirs_too = os.pipe()
     try:
         process = subprocess.Popen(
             # -E and -P: its search path is a script's, without the script's folder.
-            [sys.executable, "-E", "-P", "-c", _SUPERVISOR, library_folder()],
+            [sys.executable, "-E", "-P", "-c", _SUPERVISOR, library_folder(), str(theirs_too)],
             stdin=theirs,
-            stdout=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            pass_fds=(theirs_too,),
             env=dict(environment),
             start_new_session=True,  # Ctrl-C is for this process, which then ends it
         )
     except BaseException:
         os.close(jobs)
+        os.close(reports)
         raise
     finally:
         os.close(theirs)
-    assert process.stdout is not None
-    reports = os.dup(process.stdout.fileno())
-    process.stdout.close()
-    return _SpawnedWorker(process, jobs, reports)
+        os.close(theirs_too)
+    return _SpawnedWorker(environment, process, jobs, reports)
 
 
 class _ForkedWorker(Worker):
     def __init__(self, server: ForkServer, pid: int, jobs: int, reports: int) -> None:
-        super().__init__(jobs, reports)
+        super().__init__(server.environment, jobs, reports)
         self._server = server
         self._pid = pid
 
@@ -170,6 +184,8 @@ class ForkServer:
         self.trouble = ""
         """Why it starts scripts instead of forking them, in words."""
         self.loaded: frozenset[str] = frozenset()
+        self._asked: frozenset[str] | None = None
+        """Packages that it is importing now, or was when the tool last listened."""
         self._stamps: dict[str, object] = {}
         self._ended: dict[int, int] = {}
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -188,19 +204,34 @@ class ForkServer:
             assert pipe is not None
             pipe.close()  # a script's streams are like these; the server writes nothing to them
 
-    def load(self, names: Sequence[str]) -> None:
-        """Have packages imported.
+    def load(self, names: Sequence[str]) -> bool:
+        """Have packages imported; whether any was not yet.
 
         Raises:
             ServerLostError: that ended it.
         """
-        if self.loaded.issuperset(names):
-            return
-        answer = self._ask({"load": list(names)}, [], "fork")
-        self.trouble = answer["fork"]
-        self.loaded |= frozenset(names)
-        for path in answer["files"]:
-            self._stamps.setdefault(path, _stamp(path))
+        news = False
+        while self._asked is not None or not self.loaded.issuperset(names):
+            self.expect(names)
+            answer = self._receive_until("fork")
+            assert self._asked is not None
+            self.loaded |= self._asked
+            self._asked = None
+            self.trouble = answer["fork"]
+            for path in answer["files"]:
+                self._stamps.setdefault(path, _stamp(path))
+            news = True
+        return news
+
+    def expect(self, names: Sequence[str]) -> None:
+        """Have packages imported, without waiting for it.
+
+        Raises:
+            ServerLostError: it has gone.
+        """
+        if self._asked is None and not self.loaded.issuperset(names):
+            self._send({"load": list(names)}, [])
+            self._asked = frozenset(names)
 
     def worker(self, scratch: str) -> Worker:
         """A supervisor, forked from it.
@@ -211,7 +242,8 @@ class ForkServer:
         theirs, jobs = os.pipe()
         reports, theirs_too = os.pipe()
         try:
-            answer = self._ask({"scratch": scratch}, [theirs, theirs_too], "slot")
+            self._send({"scratch": scratch}, [theirs, theirs_too])
+            answer = self._receive_until("slot")
         except BaseException:
             os.close(jobs)
             os.close(reports)
@@ -248,11 +280,13 @@ class ForkServer:
             self._process.kill()
             self._process.wait()
 
-    def _ask(self, request: forkserver.Request, fds: list[int], key: str) -> dict[str, Any]:
+    def _send(self, request: forkserver.Request, fds: list[int]) -> None:
         try:
             socket.send_fds(self._control, [json.dumps(request).encode()], fds)
         except OSError:
             raise ServerLostError from None
+
+    def _receive_until(self, key: str) -> dict[str, Any]:
         while True:
             answer = self._receive()
             if key in answer:

@@ -1,16 +1,18 @@
 """Whether a simulation went well: divergence never passes as success.
 
-Entry points: `Observation`, `observe`, `judge`.
+Entry points: `Peaks`, `Observation`, `observe`, `judge`.
 
 1. MuJoCo resets a state that has become huge or no number, and carries on: a run that blew up can
    end in its initial state, with no error at all. Only the warning counters and the clock tell.
 2. A slow growth raises no warning for a long time: the state is compared with what can be.
-3. Bodies that were pushed deep into each other raise none either.
+3. A state may shoot up and come back: the most that was seen on the way counts, not only the end.
+4. Bodies that were pushed deep into each other raise none either.
 """
 
 from __future__ import annotations
 
 import enum
+import math
 from typing import Any
 
 import mujoco
@@ -105,42 +107,64 @@ def judge(seen: Observation) -> Judgement:
 _WORSE = (Status.OK, Status.SLOW_GROWTH, Status.DIVERGED, Status.RESET)
 
 
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """The most that was seen on the way."""
+
+    position: float = 0.0
+    """Largest |qpos|, m or rad; no number once one of them is none."""
+    velocity: float = 0.0
+    """Largest |qvel|, m/s or rad/s; no number once one of them is none."""
+    penetration: float = 0.0
+    """Deepest contact, m."""
+
+    @property
+    def finite(self) -> bool:
+        """Whether all positions and velocities were numbers."""
+        return math.isfinite(self.position) and math.isfinite(self.velocity)
+
+
+NO_BOUNDS = Peaks(float("inf"), float("inf"), float("inf"))
+
+
+def peaks(data: Any, before: Peaks) -> Peaks:
+    """The most that was seen, with what is there now."""
+    return Peaks(
+        _more(before.position, data.qpos),
+        _more(before.velocity, data.qvel),
+        max(before.penetration, deepest_contact(data)),
+    )
+
+
+def _more(before: float, values: Array) -> float:
+    now = float(np.abs(values).max(initial=0.0))
+    return before if before >= now or math.isnan(before) else now
+
+
 def observe(
     model: Any,
     data: Any,
     elapsed: float,
     *,
-    qpos: Array | None = None,
-    qvel: Array | None = None,
-    bounds: tuple[float, float] = (float("inf"), float("inf")),
-    penetration: float | None = None,
-    deepest: float = float("inf"),
+    seen: Peaks | None = None,
+    bounds: Peaks = NO_BOUNDS,
 ) -> Observation:
-    """What is to be seen of a run when it has ended.
+    """What is to be seen of a run when it has ended, after `elapsed` s.
 
-    `qpos` and `qvel` are all states seen on the way, (n, nq) and (n, nv), where there are any;
-    `bounds` the largest |qpos| (m, rad) and |qvel| (m/s, rad/s) that can be; `penetration` the
-    deepest contact seen on the way, m, and `deepest` the deepest that is no fault.
+    `seen` is the most that was seen on the way, `bounds` the most that can be.
     """
-    seen_qpos = data.qpos if qpos is None else qpos
-    seen_qvel = data.qvel if qvel is None else qvel
-    depth = deepest_contact(data) if penetration is None else penetration
-    finite = bool(np.isfinite(seen_qpos).all() and np.isfinite(seen_qvel).all())
+    most = peaks(data, Peaks() if seen is None else seen)
     counts = [int(data.warning[int(kind)].number) for kind in BAD]
     return Observation(
         warnings=(counts[0], counts[1], counts[2]),
         clock=float(data.time),
         elapsed=elapsed,
         timestep=float(model.opt.timestep),
-        finite=finite,
-        position=_largest(seen_qpos) / bounds[0],
-        velocity=_largest(seen_qvel) / bounds[1],
-        penetration=depth / deepest,
+        finite=most.finite,
+        position=most.position / bounds.position,
+        velocity=most.velocity / bounds.velocity,
+        penetration=most.penetration / bounds.penetration,
     )
-
-
-def _largest(values: Array) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
 
 
 def deepest_contact(data: Any) -> float:

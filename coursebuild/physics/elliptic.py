@@ -66,7 +66,7 @@ def _jacobi(u: Array, m1: float) -> tuple[Array, Array, Array]:
         kc = math.sqrt(kc)
     x = c * u
     sn, cn = np.sin(x), np.cos(x)
-    small = np.abs(sn) < 1e-300
+    small = np.abs(sn) < 1e-150  # whose square is no number: sn u = u there
     safe = np.where(small, 1.0, sn)
     ratio = cn / safe
     c_ratio = c * ratio
@@ -80,7 +80,7 @@ def _jacobi(u: Array, m1: float) -> tuple[Array, Array, Array]:
     sn_out = np.where(safe >= 0, size, -size)
     cn_out = c_ratio * sn_out
     return (
-        np.where(small, sn, sn_out),
+        np.where(small, u, sn_out),
         np.where(small, 1.0, cn_out),
         np.where(small, 1.0, dn),
     )

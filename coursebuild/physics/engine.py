@@ -1,6 +1,6 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `simulate`, `advance`.
+Entry points: `compiled`, `simulate`, `advance`, `watched`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
@@ -19,9 +19,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.physics.detector import Judgement, deepest_contact, judge, observe
+from coursebuild.physics.detector import Judgement, Peaks, deepest_contact, judge, observe, peaks
 from coursebuild.physics.problem import Array, Integrator, Motion, Problem, whole_number
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, replace
 
 _CODE = {
     Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
@@ -31,6 +31,10 @@ _CODE = {
     Integrator.RK4: mujoco.mjtIntegrator.mjINT_RK4,
     Integrator.DISCRETE: mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
+
+
+_WATCHED = 8
+"""Steps from one look at the state to the next."""
 
 
 @lru_cache(maxsize=64)
@@ -61,6 +65,26 @@ def advance(model: Any, data: Any, steps: int = 1) -> None:
         mujoco.mj_step(model, data, steps)
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+def watched(model: Any, data: Any, steps: int, seen: Peaks) -> tuple[Peaks, int]:
+    """Make so many steps, and no more once the state is no number.
+
+    Gives the most that was seen, with what was `seen` before, and how many steps were made. Looks
+    at every eighth state: what shoots up takes longer to come back.
+    """
+    done = 0
+    while done < steps and seen.finite:
+        part = min(_WATCHED, steps - done)
+        advance(model, data, part)
+        done += part
+        seen = peaks(data, seen)
+    return seen, done
+
+
+def bounds_of(problem: Problem) -> Peaks:
+    """The most that can be in a problem."""
+    return Peaks(problem.position_bound, problem.velocity_bound, problem.penetration_bound)
 
 
 def _ignore(_: str) -> None:
@@ -109,34 +133,24 @@ def simulate_model(problem: Problem, model: Any) -> Run:
     qpos = np.empty((len(times), model.nq))
     qvel = np.empty((len(times), model.nv))
     kept = [invariants(model, other, data.qpos, data.qvel)]
-    depth = deepest_contact(other)
-    holds = held(problem)
+    seen = Peaks(penetration=deepest_contact(other))
+    holds, steps = held(problem), 0
     for index in range(len(times)):
         if scenario.controls:
             data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
-        advance(model, data, every)
-        qpos[index], qvel[index] = data.qpos, data.qvel
-        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+        seen, done = watched(model, data, every, seen)
+        steps += done
+        if not seen.finite:
             qpos[index:], qvel[index:] = np.nan, np.nan
-            times_done = index + 1
             break
+        qpos[index], qvel[index] = data.qpos, data.qvel
         kept.append(invariants(model, other, data.qpos, data.qvel))
-        depth = max(depth, deepest_contact(other))
-    else:
-        times_done = len(times)
-    seen = observe(
-        model,
-        data,
-        times_done * every * step,
-        qpos=qpos,
-        qvel=qvel,
-        bounds=(problem.position_bound, problem.velocity_bound),
-        penetration=depth,
-        deepest=problem.penetration_bound,
-    )
+        # Where a step ends, its contacts are still those of its beginning.
+        seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
+    judgement = judge(observe(model, data, steps * step, seen=seen, bounds=bounds_of(problem)))
     kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
     table = np.array(kept)
-    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], depth, judge(seen))
+    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement)
 
 
 def begun(problem: Problem, model: Any) -> Any:

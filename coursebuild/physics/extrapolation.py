@@ -86,19 +86,16 @@ def integrate(
 
 def _extrapolated(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, float]:
     """The change of y over a step, and its estimated error relative to 1 + |y|."""
-    slope = rate(y)
-    rows: list[State] = []
-    substeps: list[int] = []
-    for j in range(1, columns + 1):
-        n = 2 * j
-        substeps.append(n)
-        new = [_midpoint(rate, y, slope, step, n)]
-        for k in range(1, j):
-            a, b = n * n, substeps[j - 1 - k] ** 2
-            new.append(new[-1] + (new[-1] - rows[k - 1]) * b / (a - b))
-        rows = new
-    size = 1.0 + np.abs(y.astype(float))
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # a step too long is made again
+        slope = rate(y)
+        rows: list[State] = []
+        for j in range(1, columns + 1):
+            new = [_midpoint(rate, y, slope, step, 2 * j)]
+            for k in range(1, j):
+                more, fewer = j * j, (j - k) * (j - k)
+                new.append(new[-1] + (new[-1] - rows[k - 1]) * fewer / (more - fewer))
+            rows = new
+        size = 1.0 + np.abs(y.astype(float))
         error = np.max(np.abs((rows[-1] - rows[-2]).astype(float)) / size)
     return rows[-1], float(error)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from coursebuild.physics.detector import Judgement
 from coursebuild.physics.engine import Run, compiled, motion_of, simulate
-from coursebuild.physics.problem import Array, Integrator, Motion, Problem, Reference
+from coursebuild.physics.problem import STANDARD, Array, Integrator, Motion, Problem, Reference
 from coursebuild.physics.rotation import angle_between
 from coursebuild.values import dataclass
 
@@ -95,8 +95,8 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> Measur
         run.judgement,
         found,
         floor,
-        energy_drift(run),
-        momentum_drift(run),
+        energy_drift(run) if problem.energy_conserved else None,
+        momentum_drift(run) if problem.momentum_conserved else None,
         run.penetration,
     )
 
@@ -187,8 +187,14 @@ class Orders:
     velocity: Order | None
 
 
-def orders(found: Sequence[Measurement], floor: float) -> Orders:
-    """Orders from measurements of one integrator at several timesteps; lost runs do not count."""
+def orders(problem: Problem, found: Sequence[Measurement]) -> Orders:
+    """Orders from measurements of one integrator at several timesteps; lost runs do not count.
+
+    None where the problem is not smooth: a slope would say nothing there.
+    """
+    if problem.reference is None or not problem.smooth:
+        return Orders(None, None, None)
+    floor = problem.reference.floor
 
     def fitted(part: str) -> Order | None:
         pairs = [
@@ -199,3 +205,13 @@ def orders(found: Sequence[Measurement], floor: float) -> Orders:
         return order([h for h, _ in pairs], [error for _, error in pairs], floor)
 
     return Orders(fitted("position"), fitted("attitude"), fitted("velocity"))
+
+
+def ladder(problem: Problem) -> dict[Integrator, tuple[Measurement, ...]]:
+    """The problem's timesteps under every integrator; nothing where it has none."""
+    if not problem.timesteps:
+        return {}
+    return {
+        integrator: tuple(measure(problem, integrator, h) for h in problem.timesteps)
+        for integrator in STANDARD
+    }

@@ -161,5 +161,12 @@ class Problem:
     """Steps after which what grows must have shown itself."""
     penetration_bound: float = float("inf")
     """Deepest contact that is no fault, m."""
+    smooth: bool = True
+    """Whether errors follow a power of the timestep: not with contact, nor where the model's own
+    error remains."""
+    energy_conserved: bool = False
+    """Whether potential and kinetic energy together do not change."""
+    momentum_conserved: bool = False
+    """Whether the angular momentum about the centre of mass does not change."""
     note: str = ""
     """What to know when reading the figures."""

@@ -1,7 +1,7 @@
 """Quaternions of attitudes, as MuJoCo has them: (w, x, y, z), body to world.
 
-Entry points: `multiply`, `from_axis_angle`, `from_matrix`, `angle_between`, `rate_of`. Arrays of any
-leading shape; the last axis holds the components.
+Entry points: `multiply`, `rotate`, `from_axis_angle`, `from_matrix`, `angle_between`, `rate_of`.
+Arrays of any leading shape; the last axis holds the components.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ def multiply(p: Array, q: Array) -> Array:
 
 def conjugate(q: Array) -> Array:
     """The inverse of unit quaternions, (…, 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    turned: Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return turned
 
 
 def from_axis_angle(axis: Array, angle: Array) -> Array:
@@ -80,7 +81,7 @@ def rate_of(q: Array, omega: Array) -> Array:
 
 
 def angle_between(p: Array, q: Array) -> Array:
-    """The angle in radians of the rotation from p to q, (…); 0 to π, exact also where it is tiny."""
+    """The angle of the rotation from p to q, (…) rad, 0 to π; exact also where it is tiny."""
     turn = multiply(conjugate(p), q)
     angle: Array = 2 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
     return angle

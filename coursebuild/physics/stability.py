@@ -12,12 +12,11 @@ Entry points: `boundary(problem, integrator)`, `survey(problem)`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from coursebuild.physics.detector import Judgement, Status, deepest_contact, judge, observe
-from coursebuild.physics.engine import advance, begun, compiled
+from coursebuild.physics.detector import Peaks, Status, judge, observe
+from coursebuild.physics.engine import begun, bounds_of, compiled, watched
 from coursebuild.physics.problem import INTEGRATORS, STANDARD, Integrator, Limit, Problem
 from coursebuild.values import dataclass
 
@@ -73,16 +72,15 @@ class Boundary:
         return self.largest / self.theory.timestep - 1
 
 
-def survey(
-    problem: Problem, tell: Callable[[Integrator], None] = lambda _: None
-) -> tuple[Boundary, ...]:
-    """The boundaries of all integrators for which they may differ; `tell` hears what is next."""
+def survey(problem: Problem) -> tuple[Boundary, ...]:
+    """The boundaries of all integrators for which they may differ.
+
+    None where the problem names no timesteps to look between.
+    """
+    if problem.search is None:
+        return ()
     chosen = INTEGRATORS if _damped(problem) else STANDARD
-    found = []
-    for integrator in chosen:
-        tell(integrator)
-        found.append(boundary(problem, integrator))
-    return tuple(found)
+    return tuple(boundary(problem, integrator) for integrator in chosen)
 
 
 def _damped(problem: Problem) -> bool:
@@ -110,9 +108,7 @@ def boundary(problem: Problem, integrator: Integrator) -> Boundary:
     largest = 0.0
     if first > 0:
         largest = _bisected(problem, integrator, grid[first - 1], grid[first])
-    return Boundary(
-        integrator, largest, not islands, islands, trials[first], theory, (low, high)
-    )
+    return Boundary(integrator, largest, not islands, islands, trials[first], theory, (low, high))
 
 
 def _bisected(problem: Problem, integrator: Integrator, low: float, high: float) -> float:
@@ -131,29 +127,22 @@ def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Trial:
     data = begun(problem, model)
     chunk = max(1, problem.steps // _LOOKS)
     sizes: list[float] = []
-    depth = 0.0
-    judgement = Judgement(Status.OK)
-    for look in range(_LOOKS):
-        advance(model, data, chunk)
-        sizes.append(_size(data))
-        depth = max(depth, deepest_contact(data))
-        seen = observe(
-            model,
-            data,
-            (look + 1) * chunk * timestep,
-            bounds=(problem.position_bound, problem.velocity_bound),
-            penetration=depth,
-            deepest=problem.penetration_bound,
-        )
-        judgement = judge(seen)
-        if not judgement.ok:
+    seen, steps = Peaks(), 0
+    for _ in range(_LOOKS):
+        seen, done = watched(model, data, chunk, seen)
+        steps += done
+        if not seen.finite:
             break
+        sizes.append(_size(data))
+    elapsed = steps * timestep
+    judgement = judge(observe(model, data, elapsed, seen=seen, bounds=bounds_of(problem)))
     return Trial(timestep, judgement.status, _growth(sizes, chunk))
 
 
 def _size(data: object) -> float:
     velocity: object = data.qvel  # type: ignore[attr-defined]
-    return float(np.linalg.norm(np.asarray(velocity)))
+    with np.errstate(over="ignore"):
+        return float(np.linalg.norm(np.asarray(velocity)))
 
 
 def _growth(sizes: list[float], chunk: int) -> float:

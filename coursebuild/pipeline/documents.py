@@ -21,12 +21,13 @@ from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Document
 from coursebuild.pipeline.outlines import Outline, Task, pack, unpack, unpacked
-from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Read, Request
+from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Read, Request
 from coursebuild.source import Source
 
 if TYPE_CHECKING:
     from coursebuild.effects.pool import Pool
     from coursebuild.pipeline.reading import Reader
+    from coursebuild.render.fonts import FontJob
     from coursebuild.render.record import PageRecord
 
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
@@ -36,8 +37,8 @@ def _silent(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-_MAPS = "maps"
-"""The kind of entries that hold course maps."""
+_MAPS, _FONTS = "maps", "fonts"
+"""Kinds of entries in the store: course maps, and cut fonts."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
 
@@ -66,8 +67,7 @@ class Documents:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self._pool is not None:
-            self._pool.close()
+        self._rest()
         if self._reader is not None:
             self._reader.__exit__(kind, error, traceback)
 
@@ -90,6 +90,10 @@ class Documents:
         if not missing:
             return
         requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in missing]
+        if len(requests) >= _MANY:
+            from coursebuild.pipeline.reading import import_all
+
+            import_all()
         answers, readers = self._work("reading lessons and pages", requests)
         for task, data, reader in zip(missing, answers, readers, strict=True):
             assert isinstance(data, bytes)
@@ -135,6 +139,27 @@ class Documents:
         answers, _ = self._work("drawing pages", requests)
         return [answer for answer in answers if not isinstance(answer, bytes)]
 
+    def cut(self, jobs: Sequence[FontJob]) -> Callable[[FontJob], bytes]:
+        """Fonts, cut already or cut now; gives them."""
+        from coursebuild.effects.prepared import prepared_cut
+
+        found: dict[str, bytes] = {}
+        for job in jobs:
+            data = prepared_cut(job.key) or self._store.load(_FONTS, job.key)
+            if data is not None:
+                found[job.key] = data
+        # The largest first, so that none of them is left for the end.
+        missing = sorted((j for j in jobs if j.key not in found), key=lambda j: -len(j.data))
+        if missing:
+            self._rest()  # which have seen everything; what cuts fonts needs room
+            requests: list[tuple[int | None, Request]] = [(None, Cut(job)) for job in missing]
+            answers, _ = self._work("cutting fonts", requests, many=2)
+            for job, made in zip(missing, answers, strict=True):
+                assert isinstance(made, bytes)
+                found[job.key] = made
+                self._store.keep(_FONTS, job.key, made)
+        return lambda job: found[job.key]
+
     def drawn(self, page: Draw) -> tuple[PageRecord, str]:
         """A page and its body, drawn here and now."""
         return self._here().draw(page)
@@ -144,20 +169,30 @@ class Documents:
         return None if data is None else unpacked(data, task.source)
 
     def _work(
-        self, name: str, requests: Sequence[tuple[int | None, Request]]
+        self, name: str, requests: Sequence[tuple[int | None, Request]], *, many: int = _MANY
     ) -> tuple[list[Answer], list[int | None]]:
+        """The answers to requests, from copies of this process where there are many requests."""
         reader = self._here()
         if self._pool is None:
-            from coursebuild.effects.pool import Pool, can_fork
+            few = len(requests) < many or self._jobs == 1
+            if not few:
+                from coursebuild.effects.pool import Pool, can_fork
 
-            if len(requests) < _MANY or self._jobs == 1 or not can_fork():
+            if few or not can_fork():
                 with self._stage(name):
                     answers = [reader.answer(request) for _, request in requests]
                 return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
-            self._pool = Pool(reader.answer, min(self._jobs, len(requests) // (_MANY // 2)))
+            self._pool = Pool(reader.answer, min(self._jobs, -(-2 * len(requests) // many)))
         with self._stage(name):
             return self._pool.run(requests)
+
+    def _rest(self) -> None:
+        """End the copies; what they remember is gone."""
+        if self._pool is not None:
+            self._pool.close()
+            self._pool = None
+            self._readers.clear()
 
     def _here(self) -> Reader:
         """What reads and draws in this process."""

@@ -1,6 +1,6 @@
-"""Templates and words in the form in which they are used, kept in the store.
+"""What is made of the tool's own files, and small findings, kept in the store from run to run.
 
-Entry points: `CompiledTemplates`, `words_for`.
+Entry points: `CompiledTemplates`, `words_for`; `KeptBindings`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.render.strings import Strings
 
-_TEMPLATES, _WORDS = "templates", "words"
+_TEMPLATES, _WORDS, _BINDINGS = "templates", "words", "bindings"
 
 
 class CompiledTemplates:
@@ -44,3 +44,34 @@ def words_for(store: Store, texts: tuple[tuple[str, str], ...], language: str) -
     words = strings_for(texts, language)
     store.keep(_WORDS, key, json.dumps(dict(words.entries)).encode(), local=True)
     return words
+
+
+class KeptBindings:
+    """Bound numbers in which nothing is wrong, by a hash of all that this depends on.
+
+    Those of the last run are kept, and no others.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._key = hashlib.sha256(f"bindings\0{tool_digest()}".encode()).hexdigest()
+        data = None if store.fresh else store.peek(_BINDINGS, self._key)
+        self._before = frozenset(data.decode("ascii").split()) if data is not None else frozenset()
+        self._now: set[str] = set()
+
+    def __contains__(self, key: str, /) -> bool:
+        """Whether nothing was wrong in the last run."""
+        if key in self._before:
+            self._now.add(key)
+            return True
+        return False
+
+    def add(self, key: str, /) -> None:
+        """That nothing is wrong."""
+        self._now.add(key)
+
+    def save(self) -> None:
+        """Keep what was found."""
+        if self._now != self._before:
+            data = " ".join(sorted(self._now)).encode("ascii")
+            self._store.keep(_BINDINGS, self._key, data, local=True)

@@ -22,7 +22,7 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.requests import PAGES, Draw
 from coursebuild.render import lesson, pages
-from coursebuild.render.frame import Names, frame_around
+from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.links import all_lead_somewhere
 from coursebuild.render.record import PageRecord
@@ -72,11 +72,12 @@ class Pages:
     def files(self, names: Names) -> Iterator[KeptFile]:
         """The pages in their frames."""
         frame = hashlib.sha256(self._frame(names).encode()).hexdigest()
+        frames = Frames(self._library, names)
         for page in self._pages:
             key = hashlib.sha256(f"{page.request.key}{frame}".encode()).hexdigest()
 
             def make(page: _Page = page) -> bytes:
-                return self._framed(page, names)
+                return self._framed(page, frames)
 
             yield KeptFile(page.record.draft.path, key, make)
 
@@ -147,13 +148,13 @@ class Pages:
         data = None if self._store.fresh else self._store.peek(PAGES, key)
         return None if data is None else _unpickled(data)
 
-    def _framed(self, page: _Page, names: Names) -> bytes:
+    def _framed(self, page: _Page, frames: Frames) -> bytes:
         data = self._store.peek(PAGES, page.request.key)
         kept = None if data is None else _unpickled(data)
         if kept is None:  # it was damaged, or the store cannot be written
             kept = self._documents.drawn(page.request)
         record, body = kept
-        before, after = frame_around(self._library, record.draft, names, live=record.live)
+        before, after = frames.around(record.draft, live=record.live)
         return f"{before}{body}{after}".encode()
 
 

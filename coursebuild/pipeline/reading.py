@@ -14,6 +14,7 @@ What draws is imported when there is something to draw.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import pickle
 from collections import OrderedDict
@@ -33,7 +34,7 @@ from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
 from coursebuild.pipeline.outlines import Outline, Task, packed
-from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Draw, Read, Request
+from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Cut, Draw, Read, Request
 from coursebuild.render.record import PageRecord, record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
@@ -42,6 +43,7 @@ from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.v8 import MathEngine
+    from coursebuild.render.fonts import FontJob
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
@@ -58,6 +60,21 @@ class _Whole:
     document: Document
     diagnostics: tuple[Diagnostic, ...]
     formulas: dict[Formula, str | MathError]
+
+
+_HEAVY = (
+    "coursebuild.render.draw",
+    "coursebuild.render.highlight",
+    "coursebuild.syntax.document",
+    "coursebuild.syntax.quiz",
+    "jinja2",
+)
+
+
+def import_all() -> None:
+    """Import what reading and drawing need, so that copies of this process share it."""
+    for name in _HEAVY:
+        importlib.import_module(name)
 
 
 class Reader:
@@ -80,8 +97,13 @@ class Reader:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._rest()
+
+    def _rest(self) -> None:
+        """Free the memory of the engine, until it is needed again."""
         if self._engine is not None:
             self._engine.close()
+            self._engine = None
 
     def answer(self, request: Request) -> Answer:
         """Do what is asked."""
@@ -89,7 +111,10 @@ class Reader:
             case Read():
                 return self._read(request.task)
             case Draw():
+                self._rest()
                 return self._draw(request)
+            case Cut():
+                return cut_font(request.job)
             case _:
                 assert_never(request)
 
@@ -188,6 +213,15 @@ class Reader:
         if language not in self._tools:
             self._tools[language] = drawing_tools(self._store, language)
         return self._tools[language]
+
+
+def cut_font(job: FontJob) -> bytes:
+    """A font, cut from a smaller one where there is one that has all it needs."""
+    from coursebuild.effects.prepared import prepared_source
+    from coursebuild.render.fonts import VERSION, subset_font
+
+    source = prepared_source(job.data, job.characters, VERSION)
+    return subset_font(job if source is None else replace(job, data=source))
 
 
 def drawing_tools(store: Store, language: str) -> Tools:

@@ -17,7 +17,6 @@ import hashlib
 import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import assert_never
 
@@ -226,11 +225,10 @@ class Memory:
             match need.kind:
                 case Kind.FILE | Kind.LISTING:
                     path = str(self.states.root / need.name)
-                case Kind.SOUGHT:
-                    path = str(self.states.root / sought(need.name)[0])
                 case Kind.OUTSIDE:
                     path = need.name
-                case Kind.MODULE | Kind.PLACE:
+                # Of folders in which modules are sought other scripts may make use meanwhile.
+                case Kind.SOUGHT | Kind.MODULE | Kind.PLACE:
                     continue
                 case _:
                     assert_never(need.kind)
@@ -266,6 +264,8 @@ class Memory:
             return [(key, self.store.load(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
 
         found: list[Record] = []
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
             for inputs, entries in zip(wanted, pool.map(fetch, wanted), strict=True):
                 for key, data in entries:

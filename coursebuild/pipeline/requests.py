@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from coursebuild.pipeline.outlines import Task
+from coursebuild.render.fonts import FontJob
 from coursebuild.render.record import PageRecord
 from coursebuild.render.sheet import Sheet
 from coursebuild.values import dataclass
@@ -37,6 +38,13 @@ class Draw:
     """Under which it is kept."""
 
 
-Request: TypeAlias = Read | Draw
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Cut a font."""
+
+    job: FontJob
+
+
+Request: TypeAlias = Read | Draw | Cut
 Answer: TypeAlias = bytes | PageRecord
-"""The outline of what was read, as bytes; the record of the page that was drawn."""
+"""The outline of what was read, or the font, as bytes; the record of the page that was drawn."""

@@ -2,7 +2,7 @@
 
 Entry point: `serve(options, port)`.
 
-1. A server answers at once; the course is read, and its pages are drawn when they are asked for.
+1. The course is read; its pages are drawn when they are asked for.
 2. A thread takes saves (`preview.follow`): the page that was saved is new within milliseconds.
 3. The main thread does the rest behind it (`preview.behind`): scripts, labs, fonts, whole checks.
 
@@ -22,6 +22,7 @@ from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
 from coursebuild.effects.watch import Watcher
 from coursebuild.model import Course
+from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.preview.behind import Behind
 from coursebuild.pipeline.preview.follow import follow
@@ -87,8 +88,9 @@ def serve(options: Options, port: int) -> None:
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH)
     try:
-        server.start()
         print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        _first_reading(live, options, progress)
+        server.start()
         watcher.start()
         _work(live, watcher, options, progress, server.url)
     except KeyboardInterrupt:
@@ -107,14 +109,23 @@ def live_course(options: Options) -> LiveCourse:
         return options.store.kept("fonts", job.key, lambda: subset_font(job))
 
     assets = Assets(template_texts(), bundled_files())
-    return LiveCourse(options.root, assets, subset, functools.partial(_surroundings, options))
+    around = functools.partial(_surroundings, options)
+    # Later readings are few, and no copies are made of a process with threads.
+    return LiveCourse(options.root, assets, subset, around, Documents(options.store, 1))
+
+
+def _first_reading(live: LiveCourse, options: Options, progress: Progress) -> None:
+    """Read the course on all cores, while this process has no threads."""
+    later = live.documents
+    with Documents(options.store, options.jobs, progress.stage) as live.documents:
+        live.reread()
+    live.documents = later
 
 
 def _work(
     live: LiveCourse, watcher: Watcher, options: Options, progress: Progress, url: str
 ) -> None:
-    """Read the course, then follow it; ends by an exception only."""
-    live.reread()
+    """Follow a course that was read; ends by an exception only."""
     progress.say(f"ready: {url}")
     behind = Behind(live, options, progress)
     watcher.wait()
@@ -130,7 +141,10 @@ def _work(
             behind.fail(error)
 
     threading.Thread(target=run, name="saves", daemon=True).start()
-    behind.follow()
+    try:
+        behind.follow()
+    finally:
+        behind.close()
 
 
 def _surroundings(options: Options, course: Course) -> Surroundings:

@@ -107,13 +107,10 @@ class _Site:
         ]
 
     def _make_shared(self, together: PageFacts) -> tuple[Names, dict[str, bytes]]:
-        from coursebuild.render.fonts import FontJob, subset_font
-        from coursebuild.render.shared import shared_files
+        from coursebuild.render.shared import needed_fonts, shared_files
 
-        def subset(job: FontJob) -> bytes:
-            return self.store.kept("fonts", job.key, lambda: subset_font(job))
-
-        made, names = shared_files(self.assets, subset, together)
+        jobs = needed_fonts(self.assets, together)
+        made, names = shared_files(self.assets, self.documents.cut(jobs), together)
         return names, {file.path: file.data for file in (*made, *self._copies(made))}
 
     def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:

@@ -25,6 +25,7 @@ from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.effects.write import remove_leftovers
 from coursebuild.model import Course, Lab, OutputQuestion, Quiz, document_blocks
+from coursebuild.pipeline.kept import KeptBindings
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory, longest_first
@@ -48,7 +49,7 @@ from coursebuild.scripts.repeat import repeat_findings
 from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
-    from coursebuild.effects.runner import RunEvent
+    from coursebuild.effects.runner import RunEvent, ScriptServer
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +103,9 @@ def verify(
         runs = scripts()
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]
-    found += script_findings(course, chosen, runs, verdicts)
+    held = KeptBindings(options.store)
+    found += script_findings(course, chosen, runs, verdicts, held)
+    held.save()
     found += repeat_findings(course, chosen, memory.differing)
     found += check_output_lines(course, runs)
     versions = python_version(), engine_version()
@@ -203,11 +206,12 @@ def run(
     progress: Progress,
     stage: str = "running scripts",
     memory: Memory | None = None,
+    server: ScriptServer | None = None,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
     What begins and ends is told. `memory` is what is remembered; another one than that of the
-    options where everything is to run.
+    options where everything is to run. `server` is one that stays warm from run to run.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
@@ -216,7 +220,7 @@ def run(
     inputs = {job.path: memory.inputs(job, texts[job.path]) for job in todo if not job.norun}
     done = memory.recall(tuple(inputs.values()))
     left = [job for job in todo if job.path not in done]
-    for finished in _run(left, inputs, options, progress, stage, memory):
+    for finished in _run(left, inputs, options, progress, stage, memory, server):
         done[finished.path] = finished
     return tuple(done[job.path] for job in todo)
 
@@ -228,6 +232,7 @@ def _run(
     progress: Progress,
     stage: str,
     memory: Memory,
+    server: ScriptServer | None,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
@@ -260,7 +265,8 @@ def _run(
 
             runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
         else:
-            runs = run_scripts(options.root, ordered, parallel=options.jobs, on_event=told)
+            run_all = run_scripts if server is None else server.run
+            runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
     memory.close()
     return runs
 

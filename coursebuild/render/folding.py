@@ -79,6 +79,11 @@ def _read(code: str, count: int) -> _Outline:
     return _Outline(_cut(body, code.removesuffix("\n").split("\n")), _imported(body))
 
 
+def forget_folds() -> None:
+    """Forget what was parsed, for whoever wants to know how long it takes."""
+    _read.cache_clear()
+
+
 def _imported(body: list[ast.stmt]) -> frozenset[str]:
     """The modules that are imported by statements, at any depth."""
     found: set[str] = set()

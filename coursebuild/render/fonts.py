@@ -33,7 +33,7 @@ WEIGHTS = {TEXT: (400, 700), CODE: (400, 700)}
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
 
-_VERSION = 1
+VERSION = 1
 """Part of a job's key: to be raised when the way of cutting changes."""
 
 
@@ -63,7 +63,7 @@ class FontJob:
     def key(self) -> str:
         """A name for the result: the same key, the same bytes."""
         digest = hashlib.sha256(self.data)
-        digest.update(f"{_VERSION}/{WEIGHTS.get(self.face.family)}/{self.characters}".encode())
+        digest.update(f"{VERSION}/{WEIGHTS.get(self.face.family)}/{self.characters}".encode())
         return digest.hexdigest()
 
 

@@ -1,7 +1,8 @@
 """A page without its frame, and the frame: head, site navigation, foot.
 
 Entry points: `Draft`, what the modules of the single kinds of page make; `frame(library, draft,
-names)`, the finished text; `frame_around`, what stands before and after the body.
+names)`, the finished text; `frame_around`, what stands before and after the body; `Frames`, the
+same for many pages.
 
 Pages are drawn in two steps because a page's head names the style sheet by its content, and the
 style sheet holds the fonts' names, which depend on every character of every page.
@@ -11,9 +12,10 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Mapping
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from coursebuild.render import meta, urls
 from coursebuild.render.characters import visible
@@ -96,19 +98,41 @@ _HERE = Markup("<!--here-->")
 
 def frame_around(library: Library, draft: Draft, names: Names, *, live: bool) -> tuple[str, str]:
     """What stands before and after the body of a page; `live`: whether labs run on it."""
+    own = _own_values(library, draft)
+    shared = _shared_values(library, draft, names, live=live)
+    return _cut(library.render("base.html", **own, **shared))
+
+
+def _cut(html: str) -> tuple[str, str]:
+    # Nothing else has angle brackets there: texts are escaped, and so is the structured data.
+    before, _, after = visible(html).partition(_HERE)
+    return before, f"{after}\n"
+
+
+def _own_values(library: Library, draft: Draft) -> dict[str, object]:
+    """What the frame of one page shows, and none of another."""
     course = library.course
-    place = place_of(library, draft.path)
-    values: Mapping[str, object] = {
-        "kind": draft.kind,
-        "body": _HERE,
-        "language": course.language or "en",
+    return {
         "policy": policy(draft.json_ld),
         "head_title": meta.head_title(course, draft.title, draft.kind),
         "description": draft.description,
-        "robots": "" if draft.indexed else "noindex",
         "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
         "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
         "json_ld": draft.json_ld,
+    }
+
+
+def _shared_values(
+    library: Library, draft: Draft, names: Names, *, live: bool
+) -> dict[str, object]:
+    """What the frames of pages of one kind in one folder show, where no menu has these pages."""
+    course = library.course
+    place = place_of(library, draft.path)
+    return {
+        "kind": draft.kind,
+        "body": _HERE,
+        "language": course.language or "en",
+        "robots": "" if draft.indexed else "noindex",
         "icon": place.href(names.icon),
         "style": place.href(names.style),
         "theme_script": place.href(names.theme_script),
@@ -122,9 +146,61 @@ def frame_around(library: Library, draft: Draft, names: Names, *, live: bool) ->
         "results": library.results,
         "page_words": _page_words(library, live=live),
     }
-    # Nothing else has angle brackets there: texts are escaped, and so is the structured data.
-    before, _, after = visible(library.render("base.html", **values)).partition(_HERE)
-    return before, f"{after}\n"
+
+
+_ALIKE = ("lesson", "stub", "level", "model")
+"""Kinds of pages that no menu has, so that their frames differ in their own values alone."""
+_SLOT = re.compile("\ue000([a-z_]+[0-9]*)\ue001")
+
+
+class Frames:
+    """The frames of many pages: those that are alike are put together from the same pieces."""
+
+    def __init__(self, library: Library, names: Names) -> None:
+        self._library = library
+        self._names = names
+        self._pieces: dict[object, tuple[list[str], list[str]]] = {}
+
+    def around(self, draft: Draft, *, live: bool) -> tuple[str, str]:
+        """See `frame_around`."""
+        if draft.kind not in _ALIKE:
+            return frame_around(self._library, draft, self._names, live=live)
+        own = _own_values(self._library, draft)
+        slots, filled = _slots(own)
+        folder = draft.path.rpartition("/")[0]
+        key = (draft.kind, folder, draft.indexed, live, repr(slots))
+        if key not in self._pieces:
+            shared = _shared_values(self._library, draft, self._names, live=live)
+            before, after = _cut(self._library.render("base.html", **slots, **shared))
+            self._pieces[key] = _SLOT.split(before), _SLOT.split(after)
+        before, after = (_joined(pieces, filled) for pieces in self._pieces[key])
+        return before, after
+
+
+def _slots(own: Mapping[str, object]) -> tuple[dict[str, object], dict[str, str]]:
+    """Values that stand for those of one page, and what goes in their places, as HTML."""
+    slots: dict[str, object] = {}
+    filled: dict[str, str] = {}
+
+    def slot(name: str, value: object) -> Markup | str:
+        if not value:
+            return ""
+        filled[name] = visible(escape(value))
+        return Markup(f"\ue000{name}\ue001")
+
+    for name, value in own.items():
+        if isinstance(value, tuple):
+            slots[name] = tuple(
+                (key, slot(f"{name}{number}", text)) for number, (key, text) in enumerate(value)
+            )
+        else:
+            slots[name] = slot(name, value)
+    return slots, filled
+
+
+def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
+    """Every second piece is the name of a slot."""
+    return "".join(filled[p] if number % 2 else p for number, p in enumerate(pieces))
 
 
 def _page_words(library: Library, *, live: bool) -> tuple[str, ...]:

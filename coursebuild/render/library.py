@@ -81,7 +81,8 @@ class Library:
     """Where a model is used, by its name, in the order of the course."""
     labs: PublishedLabs
     _formulas: Mapping[Formula, str | MathError]
-    _verdicts: Mapping[tuple[str, int], Verdict]
+    verdicts: Mapping[tuple[str, int], Verdict]
+    """By `place`."""
 
     @classmethod
     def of(
@@ -137,10 +138,10 @@ class Library:
             order=course.lessons,
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
-            uses=_uses(course, models_of),
+            uses=uses_of(course, models_of),
             labs=labs,
             _formulas=formulas,
-            _verdicts=verdicts,
+            verdicts=verdicts,
         )
 
     @property
@@ -154,7 +155,7 @@ class Library:
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """How a recorded output compared with the run; `None` where nobody compared it."""
-        return self._verdicts.get(place(recording))
+        return self.verdicts.get(place(recording))
 
     def callout_label(self, kind: str) -> str:
         """The label of a kind of callout: the course's own, else that of the interface."""
@@ -241,9 +242,10 @@ def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
     return {id: tuple(lessons) for id, lessons in found.items()}
 
 
-def _uses(
+def uses_of(
     course: Course, models_of: Callable[[Document], NamedModels]
 ) -> dict[str, tuple[ModelUse, ...]]:
+    """Where each model is used."""
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
     for owner in owners(course) if found else ():
         if owner.document is None:

@@ -207,19 +207,21 @@ def _read(html: str) -> _Page:
     return _Page(frozenset(ids), tuple(addresses))
 
 
-_TAG = re.compile(r"""<([a-z][a-z0-9]*)((?:\s[\w:-]+(?:="[^"<>]*")?)*)\s*/?>""")
+_TAGS = re.compile(
+    r"""(?:[^<]++|</|<[a-z][a-z0-9]*+(?:>|(?:\s[\w:-]++(?:="[^"<>]*+")?)*+\s*/?>))*+"""
+)
+_WITH_ATTRIBUTES = re.compile(r"<([a-z][a-z0-9]*)(\s[^<>]+)>")
 _ATTRIBUTE = re.compile(r"""\s([\w:-]+)="([^"<>]*)\"""")
 _RAW_TEXT = re.compile(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
 
 
 def _quickly_read(html: str) -> _Page | None:
     """The same as `_read` but for the lines, where all tags are written as we write them."""
-    tags = _TAG.findall(html)
-    if len(tags) + html.count("</") != html.count("<") or _RAW_TEXT.search(html):
+    if not _TAGS.fullmatch(html) or _RAW_TEXT.search(html):
         return None
     ids: set[str] = set()
     addresses: list[_Address] = []
-    for tag, attributes in tags:
+    for tag, attributes in _WITH_ATTRIBUTES.findall(html):
         wanted = _ADDRESSES.get(tag, ())
         if not wanted and ' id="' not in attributes:
             continue

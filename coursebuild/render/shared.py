@@ -38,30 +38,34 @@ class PageFacts:
 
 def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
     """A page without styles in its elements, and the declarations that were there."""
-    body, found = styles.hoist(formulas.glue(draft.body))
+    body, found = styles.hoist(formulas.glue(str(draft.body)))
     return replace(draft, body=Markup(body)), found
 
 
-_FORMULA = re.compile(r"<math\b.*?</math>", re.DOTALL)
+_FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
 _TAGS = re.compile(r"<[^>]*>")
 _REFERENCE = re.compile(r"&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)")
 """What may be a character reference, as in `html.unescape`."""
+_ASCII = "".join(map(chr, range(128)))
+_OTHERS = re.compile(r"[^\x00-\x7f]")
 
 
 def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
     """The facts of a settled page."""
-    text = {*draft.title, *_characters(_FORMULA.sub("", draft.body))}
-    mathematics = _characters("\n".join(_FORMULA.findall(draft.body))) - {"\n"}
+    parts = _FORMULA.split(draft.body)
+    text = {*draft.title, *_characters("".join(parts[::2]))}
+    mathematics = _characters("\n".join(parts[1::2])) - {"\n"}
     return PageFacts(frozenset(text), frozenset(mathematics), declarations)
 
 
 def _characters(html: str) -> set[str]:
     """The characters of the text of a piece of HTML."""
     text = _TAGS.sub("", html)
-    found = set(_REFERENCE.sub("", text))
-    for reference in set(_REFERENCE.findall(text)):
-        found.update(unescape(reference))
-    return found
+    references = set(_REFERENCE.findall(text))
+    if references:
+        text = _REFERENCE.sub("", text)
+    found = {character for character in _ASCII if character in text}
+    return found.union(_OTHERS.findall(text), *map(unescape, references))
 
 
 def common_characters(library: Library) -> frozenset[str]:
@@ -75,6 +79,14 @@ def common_characters(library: Library) -> frozenset[str]:
     return frozenset(text)
 
 
+def needed_fonts(assets: Assets, facts: PageFacts) -> tuple[fonts.FontJob, ...]:
+    """The fonts to cut for pages with these facts, taken together."""
+    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
+    given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
+    text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
+    return fonts.font_jobs(given, text, mathematics)
+
+
 def shared_files(
     assets: Assets, subset: Callable[[fonts.FontJob], bytes], facts: PageFacts
 ) -> tuple[tuple[OutputFile, ...], Names]:
@@ -86,11 +98,7 @@ def shared_files(
         files.append(OutputFile(name, data))
         return name
 
-    text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
-    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
-    jobs = fonts.font_jobs(
-        ((face, assets.file(f"fonts/{face.file}")) for face in faces), text, mathematics
-    )
+    jobs = needed_fonts(assets, facts)
     fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
     own = styles.style_rules(facts.declarations)

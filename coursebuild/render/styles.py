@@ -25,6 +25,12 @@ _PIECE = re.compile(
 """A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
 for one."""
 
+_PLAIN = re.compile(
+    r"(?:[^<]++|</"
+    r"|<(?!(?:script|style|textarea|title)\b)[a-z][a-z0-9]*+"
+    r"""(?: (?!style[ />])[a-z0-9_:-]++(?:="[^"<>]*+")?)*+ ?/?>)*+"""
+)
+"""HTML as we and Temml write it: there, what looks like a style in a tag is one."""
 _OTHERS = re.compile(
     r"""(?:[^<]++|<(?![a-z]|!--)"""
     r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
@@ -38,6 +44,8 @@ _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>
 
 def hoist(html: str) -> tuple[str, frozenset[str]]:
     """The page with classes in place of `style` attributes, and what they stand for."""
+    if _PLAIN.fullmatch(html):
+        return _hoist_plain(html)
     found: set[str] = set()
     parts: list[str] = []
     at = 0
@@ -55,6 +63,26 @@ def hoist(html: str) -> tuple[str, frozenset[str]]:
             parts += (html[at:end], tag)
             at = piece.end()
     return "".join(parts), frozenset(found)
+
+
+def _hoist_plain(html: str) -> tuple[str, frozenset[str]]:
+    """The same, where the page is as `_PLAIN` says."""
+    found: set[str] = set()
+    parts: list[str] = []
+    at = 0
+    style = html.find(' style="')
+    while style >= 0:
+        start, end = html.rfind("<", at, style), html.find(">", style)
+        if start < 0 or html.find(">", start, style) >= 0:  # it stands in a text
+            style = html.find(' style="', style + 1)
+            continue
+        tag, declaration = _without_style(html[start + 1 : end])
+        if declaration:
+            found.add(declaration)
+        parts += (html[at:start], tag)
+        at = end + 1
+        style = html.find(' style="', at)
+    return "".join((*parts, html[at:])), frozenset(found)
 
 
 @functools.lru_cache(maxsize=4096)

@@ -14,8 +14,10 @@ Entry points: `check_bindings` (a document), `leaning_on` (who leans on what has
 
 from __future__ import annotations
 
+import hashlib
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
@@ -69,6 +71,10 @@ class Printed:
         """The paths of all scripts."""
         return self._scripts | self._runs.keys() | self._by_script.keys()
 
+    def __contains__(self, path: str) -> bool:
+        """Whether there is a script of this path."""
+        return path in self._scripts or path in self._runs or path in self._by_script
+
     def run(self, path: str) -> ScriptRun | None:
         """The run of a script."""
         return self._runs.get(path)
@@ -96,20 +102,59 @@ def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
     return tuple(i for i in document_inlines(document) if isinstance(i, NumberBinding))
 
 
-def check_bindings(document: Document, printed: Printed) -> tuple[Diagnostic, ...]:
+class Held(Protocol):
+    """Remembers bindings in which nothing is wrong."""
+
+    def __contains__(self, key: str, /) -> bool:
+        """Whether nothing is wrong, by a hash of all that this depends on."""
+
+    def add(self, key: str, /) -> None:
+        """That nothing is wrong."""
+
+
+def check_bindings(
+    document: Document, printed: Printed, held: Held | None = None
+) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
     Nothing is said of bindings that lean on a script that failed: its failure is reported.
     """
-    found = (_check(binding, printed) for binding in document_bindings(document))
-    return tuple(diagnostic for diagnostic in found if diagnostic is not None)
+    found: list[Diagnostic] = []
+    for binding in document_bindings(document):
+        key = _leans_on(binding, printed) if held is not None else ""
+        if held is not None and key in held:
+            continue
+        diagnostic = _check(binding, printed)
+        if diagnostic is not None:
+            found.append(diagnostic)
+        elif held is not None:
+            held.add(key)
+    return tuple(found)
+
+
+def _leans_on(binding: NumberBinding, printed: Printed) -> str:
+    """A hash of everything that decides whether a binding holds."""
+    verdicts = printed.recorded(binding)
+    path = binding.script or (verdicts[0].recording.script if verdicts else None)
+    run = printed.run(path) if path is not None else None
+    parts = [binding.text, binding.script or "", str(path is not None and path in printed)]
+    parts += ["-"] if run is None else [run.outcome.value, run.stdout]
+    for verdict in verdicts:
+        recording = verdict.recording
+        body = recording.body
+        if isinstance(body, Table):
+            parts += [recording.prefix, recording.body_span.text]
+        else:
+            parts.append(body.text)
+        parts += [repr(verdict.comparison), str(isinstance(body, Table))]
+    return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     run = printed.run(path) if path is not None else None
-    if path is None or path not in printed.scripts():
+    if path is None or path not in printed:
         return _orphan(binding, printed)
     if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
         return None

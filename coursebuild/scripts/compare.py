@@ -82,9 +82,12 @@ def compare(
     """The verdict on one recording, given what its script printed."""
     if comparison.mode is Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
-    ran = Side.of(stdout, filters)
     if isinstance(recording.body, Table):
+        ran = Side.of(stdout, filters)
         return compare_table(recording, recording.body, comparison, filters, ran)
+    if stdout in (recording.body.text, f"{recording.body.text}\n"):  # as it nearly always is
+        return Verdict(recording, comparison, "verified")
+    ran = Side.of(stdout, filters)
     recorded = Side.of(recording.body.text, filters)
     if same_lines(recorded, ran, comparison):
         return Verdict(recording, comparison, "verified")

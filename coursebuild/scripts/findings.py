@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course
 from coursebuild.results import Outcome, ScriptRun, Verdict
-from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
+from coursebuild.scripts.bindings import Held, Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
 from coursebuild.scripts.drift import drift_diagnostic
 from coursebuild.scripts.extract import Extraction, extract, owners
@@ -23,6 +23,7 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
+    held: Held | None = None,
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
@@ -47,5 +48,5 @@ def script_findings(
             leaning = leaning_on(verdict, course.documents, printed)
             found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
     for document in course.documents:
-        found += check_bindings(document, printed)
+        found += check_bindings(document, printed, held)
     return tuple(found)

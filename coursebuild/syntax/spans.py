@@ -14,7 +14,7 @@ Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose to
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -76,8 +76,11 @@ class BlockState(StateBlock):
         return "".join(row.text for row in self.rows)
 
     def _row(self, line: int, indent: int, line_end: bool) -> Row:
-        src, first, shift = self.src, self.bMarks[line], self.tShift[line]
+        src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
+        if indent <= 0:
+            return Row(src[first:last], first)
+        shift = self.tShift[line]
         begin, column = first, 0
         while column < indent and first < last:
             char = src[first] if first < len(src) else ""
@@ -134,12 +137,14 @@ class InlineState(StateInline):
         return token
 
 
-def locate(base: Excerpt, rows: Iterable[Row]) -> Excerpt:
+def locate(base: Excerpt, rows: Sequence[Row]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
     texts: list[str] = []
     pieces: list[tuple[int, int]] = []
     at, shift = 0, None
     single = len(base.pieces) == 1
+    if single and len(rows) == 1 and not rows[0].padding:
+        return Excerpt(base.source, rows[0].text, ((0, base.pieces[0][1] + rows[0].at),))
     for text, offset, padding in rows:
         for i in range(padding):
             pieces.append((at + i, base.offset(offset - 1)))

@@ -53,7 +53,7 @@ from coursebuild.syntax.recording import (
     record_table,
 )
 from coursebuild.syntax.session import Session
-from coursebuild.syntax.spans import Placed, Placer, locate, normalized, trimmed
+from coursebuild.syntax.spans import Placed, Placer, Row, locate, normalized, trimmed
 from coursebuild.syntax.tables import read_table
 
 
@@ -309,6 +309,11 @@ _READERS: dict[str, Callable[[TextReader, Placed], Block | None]] = {
 }
 
 
+def _is_line(text: str) -> bool:
+    """Whether a text is one line, and no mark of a block stands at its beginning."""
+    return text[:1].isalpha() and "\n" not in text
+
+
 class Texts:
     """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
 
@@ -317,24 +322,30 @@ class Texts:
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
-        return self._session.apart(lambda: self._reader(normalized(excerpt)).read())
+        base = normalized(excerpt)
+        read = self._line if _is_line(base.text) else self._text
+        return self._session.apart(lambda: read(base))
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trimmed(normalized(excerpt))
 
-        def read() -> tuple[Inline, ...]:
-            balance = Balance(self._session.report)
-            links = self._definitions()
-            reader = InlineReader(
-                content, links, self._session.notes, balance, self._session.report
-            )
-            return reader.read(content)
+        return self._session.apart(lambda: self._inlines(content, content))
 
-        return self._session.apart(read)
+    def _text(self, base: Excerpt) -> tuple[Block, ...]:
+        return TextReader(base, self._session, self._definitions(), nested=True).read()
 
-    def _reader(self, base: Excerpt) -> TextReader:
-        return TextReader(base, self._session, self._definitions(), nested=True)
+    def _line(self, base: Excerpt) -> tuple[Block, ...]:
+        """The same for a line that can only be a paragraph, without looking for anything else."""
+        content = trimmed(locate(base, [Row(base.text, 0)]))
+        return (Paragraph(content.span(), self._inlines(base, content)),)
+
+    def _inlines(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
+        balance = Balance(self._session.report)
+        links, notes = self._definitions(), self._session.notes
+        inlines = InlineReader(base, links, notes, balance, self._session.report).read(content)
+        balance.finish()
+        return inlines
 
     def _definitions(self) -> Definitions:
         """The document's link definitions; those that a text adds are its own."""

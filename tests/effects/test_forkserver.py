@@ -517,6 +517,17 @@ class TestServer:
         expected = "3.141592653589793 warn None False True True True 1000 0.6666666666666666\n"
         assert [run.stdout for run in runs] == ["", expected] * 2
 
+    def test_what_is_expected_is_imported_meanwhile(self, root: Path) -> None:
+        job = self.script(root, "import mujoco, time\nprint(mujoco.mj_version() > 0)")
+        other = self.script(root, "import numpy\nprint(numpy.pi > 3)", "examples/y.py")
+        with ScriptServer() as server:
+            server.expect(root, [job.path])
+            server.expect(root, [other.path, "examples/none.py"])
+            runs = server.run(root, [other, job], parallel=2)
+            server.expect(root, [job.path])
+            runs += server.run(root, [other], parallel=2)
+        assert [run.stdout for run in runs] == ["True\n"] * 3
+
     def test_order(self, root: Path) -> None:
         jobs = [self.script(root, f"print({i})", f"examples/{i}.py") for i in range(4)]
         started: list[str] = []
@@ -565,6 +576,55 @@ class TestServer:
         with ScriptServer() as server:
             assert server.run(root, [self.script(root, WHO)], parallel=1)[0].outcome is Outcome.OK
             assert server._server is not None and not server._server.trouble
+
+
+RUN_BOTH_WAYS = """
+import sys
+from pathlib import Path
+from coursebuild.effects.runner import ScriptServer
+from coursebuild.results import ScriptJob
+for fork in (True, False):
+    with ScriptServer(fork=fork) as server:
+        (run,) = server.run(Path(sys.argv[1]), [ScriptJob("x.py", (), 30.0, (), False)], parallel=1)
+    print(run.outcome.name, repr(run.stdout), repr(run.stderr), run.trace.modules)
+"""
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import sys, json\nsys.marked = json.dumps(1)",
+        "import no_such_module",
+        "import sys\nsys.modules.pop('sitecustomize')",
+        "1 / 0",
+        "print('said', flush=True)",
+        None,
+    ],
+)
+def test_an_installation_with_its_own_start(tmp_path: Path, code: str | None) -> None:
+    venv = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
+    if code is not None:
+        (folder,) = venv.glob("lib/python*/site-packages")
+        (folder / "sitecustomize.py").write_text(code)
+    (tmp_path / "x.py").write_text(
+        "import sys\nprint(getattr(sys, 'marked', None), 'sitecustomize' in sys.modules)"
+    )
+    done = subprocess.run(
+        [venv / "bin/python", "-c", RUN_BOTH_WAYS, tmp_path],
+        cwd=library_folder(),
+        capture_output=True,
+        text=True,
+    )
+    bare = subprocess.run(
+        [venv / "bin/python", "x.py"],
+        cwd=tmp_path,
+        env=clean_environment(os.environ),
+        capture_output=True,
+        text=True,
+    )
+    expected = f"OK {bare.stdout!r} {bare.stderr!r} ()"
+    assert done.stdout.splitlines()[-2:] == [expected] * 2, done.stderr
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,7 @@ def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
         raise importlib.metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(importlib.metadata, "version", none)
+    monkeypatch.setattr(sys, "path", ["/nowhere"])
     with pytest.raises(EffectError, match="MuJoCo is not installed"):
         versions.engine_version()
 

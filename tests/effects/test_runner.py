@@ -1,4 +1,4 @@
-"""Running scripts, well-behaved and not."""
+"""Running scripts, well-behaved and not, forked and each with an interpreter of its own."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,12 +22,21 @@ from coursebuild.effects.runner import (
     RunFinished,
     RunStarted,
     clean_environment,
-    run_scripts,
 )
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
 SOURCE_TREE = Path(runner.__file__).parents[2]
 Run = Callable[..., ScriptRun]
+way = {"fork": True}
+
+
+@pytest.fixture(autouse=True, params=[True, False], ids=["forked", "spawned"])
+def _way(request: pytest.FixtureRequest) -> None:
+    way["fork"] = request.param
+
+
+def run_scripts(*args: Any, **options: Any) -> tuple[ScriptRun, ...]:
+    return runner.run_scripts(*args, **way, **options)
 
 
 def job(
@@ -348,7 +358,7 @@ class TestSurroundings:
         )
         code = "import signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n" + TOOL
         done = subprocess.run(
-            [sys.executable, "-c", code, root, "1"],
+            [sys.executable, "-c", code, root, "1", str(way["fork"])],
             capture_output=True,
             text=True,
             cwd=SOURCE_TREE,
@@ -396,7 +406,8 @@ from coursebuild.effects.runner import run_scripts
 from coursebuild.results import ScriptJob
 jobs = [ScriptJob(f"examples/x.py", (), 60.0, (), False)] * int(sys.argv[2])
 try:
-    for run in run_scripts(Path(sys.argv[1]), jobs, parallel=2):
+    fork = sys.argv[3] == "True"
+    for run in run_scripts(Path(sys.argv[1]), jobs, parallel=2, fork=fork):
         print(run.outcome, run.stdout)
 except KeyboardInterrupt:
     print("interrupted")
@@ -456,7 +467,7 @@ class TestNothingStaysBehind:
     def tool(self, root: Path, code: str) -> subprocess.Popen[str]:
         (root / "examples/x.py").write_text(code)
         return subprocess.Popen(
-            [sys.executable, "-c", TOOL, root, "1"],
+            [sys.executable, "-c", TOOL, root, "1", str(way["fork"])],
             stdout=subprocess.PIPE,
             text=True,
             cwd=SOURCE_TREE,

@@ -153,9 +153,14 @@ def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_pat
         assert len(list(folder.iterdir())) == 1, "its writer lives"
         process.kill()
         process.wait()
-    assert Store(tmp_path).load("kind", KEY) is None
+    store = Store(tmp_path)
+    assert store.load("kind", KEY) is None
+    left = list(folder.iterdir())
+    store.keep("kind", key(2), b"")
+    assert [path.name for path in folder.iterdir()] == [key(2)], "the next writer tidies up"
+    left[0].write_bytes(b"x" * 100)
     prune(tmp_path / ".coursebuild", 1 << 30)
-    assert list(folder.iterdir()) == []
+    assert [path.name for path in folder.iterdir()] == [key(2)]
 
 
 # --- places that take nothing

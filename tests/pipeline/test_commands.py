@@ -341,6 +341,7 @@ def test_quiet_keeps_warnings(make: Make) -> None:
 def test_plain_lines_say_what_runs_and_what_ran(make: Make) -> None:
     done = make(FIRST, SECOND).main("check", "--jobs", "1")
     assert without_seconds(done.err) == (
+        "reading lessons and pages\n"
         "running scripts (2)\n"
         "  examples/one.py\n"
         "  examples/one.py: ok after # s\n"

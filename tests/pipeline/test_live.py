@@ -13,8 +13,7 @@ from coursekit import GOOD, ROOT, Folder, block
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.effects.runner import run_scripts
-from coursebuild.pipeline import verify
+from coursebuild.effects.runner import ScriptServer
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.preview.behind import Behind
 from coursebuild.pipeline.preview.live import LiveCourse
@@ -56,6 +55,10 @@ class Live:
         found = {path: self.course.find(path) for path in self.course.pages.paths()}
         return {path: data for path, data in found.items() if data is not None}
 
+    def close(self) -> None:
+        self.behind.close()
+        self.course.parts.close()
+
     def wrong(self) -> list[str]:
         return sorted(d.rule for d in self.course.diagnostics() if d.severity.value == "error")
 
@@ -70,7 +73,7 @@ def live() -> Iterator[Callable[[Folder], Live]]:
 
     yield make
     for one in made:
-        one.course.parts.close()
+        one.close()
 
 
 def share(folder: Folder, trials: Path) -> None:
@@ -266,11 +269,15 @@ def test_scripts_run_behind_and_only_those_that_changed(
 ) -> None:
     started: list[str] = []
 
-    def noted(root: Path, todo: Sequence[ScriptJob], **how: Any) -> tuple[ScriptRun, ...]:
-        started.extend(job.path for job in todo)
-        return run_scripts(root, todo, **how)
+    ordinary = ScriptServer.run
 
-    monkeypatch.setattr(verify, "run_scripts", noted)
+    def noted(
+        server: ScriptServer, root: Path, todo: Sequence[ScriptJob], **how: Any
+    ) -> tuple[ScriptRun, ...]:
+        started.extend(job.path for job in todo)
+        return ordinary(server, root, todo, **how)
+
+    monkeypatch.setattr(ScriptServer, "run", noted)
     folder = make(*(f"## Lesson\n\n{block(f'{name}.py', 'print(1)', '1')}" for name in "ab"))
     running = live(folder)
     running.site()
@@ -411,4 +418,4 @@ def test_after_any_edits_it_is_what_a_clean_build_gives(
                 assert running.wrong() == []
                 assert differences(site, built) == []
     finally:
-        running.course.parts.close()
+        running.close()

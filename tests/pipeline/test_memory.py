@@ -334,6 +334,16 @@ def test_a_script_edited_while_it_ran(desk: Desk) -> None:
     assert desk.recall() is None
 
 
+def test_a_file_made_beside_the_script_while_it_ran(desk: Desk) -> None:
+    """By another script: only one with the name of a module that this one imports would count."""
+    sought = tuple(f"examples/{name}" for name in ("json.py", "json/__init__.py"))
+    trace = Trace(sought, (), (), (), "")
+    desk.run(trace, during=lambda: desk.write("examples/picture.png", b"x"))
+    assert desk.recall() is not None
+    desk.write("examples/json.py", b"x")
+    assert desk.recall() is None
+
+
 def test_something_else_saved_while_the_script_ran(desk: Desk) -> None:
     desk.run(LOOKED, during=lambda: desk.write("content/lessons/1.1-a.md", b"prose"))
     assert desk.recall() is not None

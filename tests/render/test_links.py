@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from coursebuild.render import BrokenLink, check_links
+from coursebuild.render.links import _quickly_read, _read, all_lead_somewhere, page_references
 from coursebuild.results import OutputFile
 
 
@@ -76,3 +80,55 @@ def test_a_site_below_a_path() -> None:
         ("/index.html", "the address leads out of the site"),
         ("https://h.org/course/levels/", "no file `levels/index.html` in the site"),
     ]
+
+
+TAGS = [
+    '<a href="x.html#y">',
+    "</a>",
+    '<p id="a&amp;b">',
+    '<img src="../assets/x.png" srcset="a.png 1x, b.png 2x">',
+    '<a name="old" href="?q=1&amp;r=2#%C3%BC">',
+    '<math display="block"><mi id="m">x</mi></math>',
+    '<div class="x" hidden>',
+    "text &lt;a href=&quot;no&quot;&gt; and more",
+    'a href="no"',
+    "<br>",
+    "<hr />",
+    '<A HREF="upper.html" ID=big>',
+    "<a href='single.html'>",
+    "<!-- <a href='hidden'> -->",
+    '<a title="a>b" href="after.html">',
+    '<script src="x.js">"<a href=no>"</script>',
+    "<",
+    "&",
+    "<p id=bare>",
+]
+
+
+@given(st.lists(st.sampled_from(TAGS), max_size=8))
+def test_what_is_read_quickly_is_what_a_parser_reads(parts: list[str]) -> None:
+    """Where it can be read quickly at all."""
+    html = "\n".join(parts)
+    quick, slow = _quickly_read(html), _read(html)
+    if quick is not None:
+        assert quick.ids == slow.ids
+        assert [a.url for a in quick.addresses] == [a.url for a in slow.addresses]
+
+
+def test_what_we_write_can_be_read_quickly() -> None:
+    assert _quickly_read("\n".join(TAGS[:11])) is not None
+    for tag in TAGS[11:]:
+        assert _quickly_read(f"<p>{tag}</p>") is None or tag == "&"
+
+
+@given(st.lists(st.sampled_from([*TAGS, '<a href="#here">', '<p id="here">']), max_size=6))
+def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str]) -> None:
+    page = "".join(parts)
+    files = site(page)
+    pages = {
+        f.path: page_references(f.path, f.data.decode(), "") for f in files if "html" in f.path
+    }
+    ids = {path: found[0] for path, found in pages.items()}
+    references = pages["lessons/a.html"][1]
+    broken = [b for b in check_links(files) if b.page == "lessons/a.html"]
+    assert all_lead_somewhere(references, {f.path for f in files}, ids) == (not broken)

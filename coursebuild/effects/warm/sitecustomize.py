@@ -4,8 +4,8 @@ Entry point: Python's own start, with this folder first in PYTHONPATH.
 
 The tool's folder is taken off the search path and out of the environment. Then the process either
 becomes the fork server (see `forkserver`), of which copies come back from `serve` to become
-scripts; or it is a script that was started on its own, and only what watches it is set up. That
-this file ends with an ImportError is how `site` learns that there is no `sitecustomize`, so that
+scripts; or it is a script that was started on its own, and only what watches it is set up. Mostly
+this file ends with the ImportError by which `site` learns that there is no `sitecustomize`, so that
 nothing of it stays behind.
 """
 
@@ -26,28 +26,32 @@ def _forget_folder() -> None:
         del os.environ["PYTHONPATH"]
 
 
-def _import_real_one() -> bool:
-    """Import the installation's own `sitecustomize`, if it has one, as `site` would have."""
+def _import_real_one() -> Exception | None:
+    """Import the installation's own `sitecustomize`; what that raises is what `site` is to see."""
     own = sys.modules.pop(__name__)
     try:
         import sitecustomize  # type: ignore[import-not-found]  # noqa: F401
-    except ImportError as error:
-        if error.name != "sitecustomize":
-            raise
+    except Exception as error:
         sys.modules[__name__] = own
-        return False
-    return True
+        return error
+    return None
 
 
-def _start() -> None:
-    bare = frozenset(sys.modules) - {__name__}
+def _catch_output() -> int:
+    """Let what is printed from now on go to a file without a name; a script's pipes replace it."""
+    said = os.memfd_create("said")
+    os.dup2(said, 1)
+    os.dup2(said, 2)
+    return said
+
+
+def _start(bare: frozenset[str]) -> None:
     root = os.path.dirname(os.path.dirname(os.path.dirname(_HERE)))  # noqa: PTH120
     sys.path.insert(0, root)
-    trace = os.environ.pop("COURSEBUILD_TRACE", None)
-    if trace is not None:
+    if _TRACE is not None:
         from coursebuild.effects import spawned
 
-        spawned.start(trace, root, bare)
+        spawned.start(_TRACE, root, bare)
         return
     from coursebuild.effects import preload
 
@@ -55,11 +59,13 @@ def _start() -> None:
     with recorder:
         from coursebuild.effects import forkserver
     sys.path.remove(root)
-    forkserver.serve(recorder, int(sys.argv[1]))
+    forkserver.serve(recorder, int(sys.argv[1]), _SAID)
 
 
 _forget_folder()
-if not _import_real_one():
-    _start()
-    raise ImportError("there is none", name="sitecustomize")
-_start()
+_TRACE = os.environ.pop("COURSEBUILD_TRACE", None)
+_SAID = _catch_output() if _TRACE is None else -1
+_error = _import_real_one()
+_start(frozenset(sys.modules) - ({__name__} if _error else set()))
+if _error:
+    raise _error

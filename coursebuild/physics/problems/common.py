@@ -56,5 +56,3 @@ def free_body_motion(inertia: Array, omega: Array, times: Array) -> Motion:
     attitude = states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True)
     still = np.zeros((len(times), 3))
     return Motion(times, still, attitude[:, None], np.concatenate([still, states[:, 4:]], axis=1))
-
-

@@ -16,7 +16,6 @@ import numpy as np
 from coursebuild.physics.elliptic import complete_k, jacobi
 from coursebuild.physics.engine import advance, begun, compiled
 from coursebuild.physics.problem import (
-    STANDARD,
     Array,
     Figure,
     Integrator,
@@ -26,6 +25,7 @@ from coursebuild.physics.problem import (
     Scenario,
 )
 from coursebuild.physics.problems.common import NO_CONTACT, NO_GRAVITY, free_body_motion
+from coursebuild.physics.quadrature import cumulative
 from coursebuild.physics.rotation import from_matrix
 from coursebuild.values import dataclass, replace
 
@@ -110,7 +110,8 @@ class Tumbling:
         """Quaternions (n, 4), body to world; at the beginning the identity."""
         angles = self._precession(times)
         start = self._frame(np.zeros(1), np.zeros(1))[0]
-        return from_matrix(start.T @ self._frame(times, angles))
+        matrices: Array = start.T @ self._frame(times, angles)
+        return from_matrix(matrices)
 
     def _frame(self, times: Array, angles: Array) -> Array:
         """Rotation matrices (n, 3, 3) from the body to a frame whose z is the angular momentum.
@@ -126,35 +127,29 @@ class Tumbling:
         z = np.broadcast_to(np.array([0.0, 0.0, 1.0]), along.shape)
         node = np.stack([-np.sin(angles), np.cos(angles), np.zeros_like(angles)], axis=1)
         world = np.stack([z, node, np.cross(z, node)], axis=2)
-        return world @ np.swapaxes(body, 1, 2)
+        turned: Array = world @ np.swapaxes(body, 1, 2)
+        return turned
 
     def _precession(self, times: Array) -> Array:
         """How far the axis of the least moment has gone about L (n,), rad: Gauss's quadrature.
 
         It goes at L (I₂ω₂² + I₃ω₃²)/(I₂²ω₂² + I₃²ω₃²).
         """
-        nodes, weights = np.polynomial.legendre.leggauss(20)
-        edges = np.concatenate([[0.0], times])
-        parts = max(1, math.ceil(float(np.max(np.diff(edges))) * self.rate / 0.5))
-        cuts = np.concatenate([np.linspace(a, b, parts + 1)[:-1] for a, b in _pairs(edges)])
-        widths = np.repeat(np.diff(edges) / parts, parts)
-        at = cuts[:, None] + widths[:, None] * (nodes + 1) / 2
         _, i2, i3 = moments()
-        omega = self.omega(at.ravel())
-        second, third = i2 * omega[:, 1] ** 2, i3 * omega[:, 2] ** 2
-        speed = self.momentum * (second + third) / (i2 * second + i3 * third)
-        pieces = speed.reshape(at.shape) @ weights * widths / 2
-        return np.cumsum(pieces.reshape(-1, parts).sum(axis=1))
+
+        def speed(at: Array) -> Array:
+            omega = self.omega(at)
+            second, third = i2 * omega[:, 1] ** 2, i3 * omega[:, 2] ** 2
+            found: Array = self.momentum * (second + third) / (i2 * second + i3 * third)
+            return found
+
+        return cumulative(speed, times, 0.5 / self.rate)
 
     def motion(self, times: Array) -> Motion:
         """Everything, at the times (n,) in s."""
         still = np.zeros((len(times), 3))
         velocity = np.concatenate([still, self.omega(times)], axis=1)
         return Motion(times, still, self.attitude(times)[:, None], velocity)
-
-
-def _pairs(edges: Array) -> list[tuple[float, float]]:
-    return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
 
 def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e-3) -> float:
@@ -247,7 +242,9 @@ def problem() -> Problem:
             *(_flip(one) for one in NUDGES),
         ),
         search=(1e-4, 1.0),
-        note="later flips are ill-conditioned for nudges below 1e-5",
+        energy_conserved=True,
+        momentum_conserved=True,
+        note="Euler is stable at no timestep: what is measured is where 10 000 steps show it",
     )
 
 
@@ -258,5 +255,5 @@ def _flip(nudge: float) -> Figure:
         lambda _: Tumbling(nudge, SPIN).flip_interval,
         lambda integrator: 2 * measured_crossing(integrator, nudge),
         "2 K(m)/λ",
-        STANDARD,
+        (Integrator.EULER, Integrator.IMPLICITFAST, Integrator.RK4),
     )

@@ -3,8 +3,8 @@
 Entry point: `Behind.follow()`, which the main thread runs, so that Ctrl-C ends whatever is running
 as it ends any other command.
 
-1. When nothing was saved for a moment, the whole course is read again: what the fast way took for
-   unchanged may not be.
+1. When nothing was saved for a moment, the whole course is read again, if what was saved may
+   concern more than its own page.
 2. Models are compiled. The scripts that changed run, then all that have no remembered result; those
    of which the output is another than recorded run once more, so that it is known whether a new
    output can be offered. Labs are tried.
@@ -26,6 +26,7 @@ from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
+from coursebuild.effects.runner import ScriptServer
 from coursebuild.model import Course, Document
 from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.labs import Engines, labs_of, try_labs
@@ -72,6 +73,7 @@ class Behind:
         self._runnable: set[str] = set()
         self._tried: dict[str, Document] = {}
         self._lab_findings: dict[str, tuple[Diagnostic, ...]] = {}
+        self._server = ScriptServer()
         self._printed: str | None = None
         self._failure: BaseException | None = None
 
@@ -80,6 +82,10 @@ class Behind:
         with self._live.changed:
             self._everything = True
             self._live.changed.notify_all()
+
+    def close(self) -> None:
+        """End the process of scripts."""
+        self._server.close()
 
     def fail(self, error: BaseException) -> None:
         """End `follow` by an exception of another thread."""
@@ -120,7 +126,8 @@ class Behind:
     def once(self) -> None:
         """Everything, now, as far as nothing is saved meanwhile."""
         live = self._live
-        live.reread()
+        if live.due or self._everything:
+            live.reread()
         with live.changed:
             self._seen, course = live.edits, live.course
             everything, self._everything = self._everything, False
@@ -143,6 +150,7 @@ class Behind:
         self._done()
 
     def _check(self) -> None:
+        self._live.calm.wait(LONGEST)
         if self._live.edits != self._seen or self._everything:
             raise _SupersededError
 
@@ -231,7 +239,7 @@ class Behind:
         options = self._options
         memory = Memory(options.root, options.store, fresh=True) if again else None
         stage = "running scripts again" if again else "running scripts"
-        runs = run(batch, options, self._progress, stage, memory)
+        runs = run(batch, options, self._progress, stage, memory, self._server)
         taken: list[Ran] = []
         for ran, done in zip(batch, runs, strict=True):
             new = Ran(jobs([ran])[0], ran.text, done)

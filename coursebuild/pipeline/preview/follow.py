@@ -44,7 +44,12 @@ def follow(
         paths = watcher.get(1.0)
         if paths:
             began = time.monotonic()
-            if _take(live, watcher, paths, began, notice):
+            live.calm.clear()
+            try:
+                taken = _take(live, watcher, paths, began, notice)
+            finally:
+                live.calm.set()
+            if taken:
                 said(paths, time.monotonic() - began)
 
 
@@ -75,8 +80,7 @@ def _take(
 
 def _whole(plan: Plan) -> bool:
     """Whether no document became empty."""
-    empty = {d.source.path for d in plan.course.documents if not d.source.text.strip()}
-    return empty.isdisjoint(plan.found)
+    return all(document.source.text.strip() for document in plan.documents.values())
 
 
 def _elsewhere(live: LiveCourse) -> frozenset[str]:

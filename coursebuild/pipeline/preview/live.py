@@ -16,24 +16,31 @@ Everything is under one lock, `changed`; what takes long is done outside of it.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
-from coursebuild.checks import Places, check_document, places
-from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.checks import Places, anchors, check_document, places
+from coursebuild.diagnostics import Diagnostic, Parsed, Severity
 from coursebuild.effects.read import read_sources
-from coursebuild.model import Course, Document, Lesson
+from coursebuild.model import Course, Document, Lesson, Page, Quiz, Script, document_blocks
+from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
-from coursebuild.pipeline.preview.memo import Parsing
+from coursebuild.pipeline.preview.memo import Parsing, PerDocument
 from coursebuild.pipeline.preview.pages import Drawn, Pages, draw, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
 from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.frame import Names
-from coursebuild.render.library import Library, owners
+from coursebuild.render.library import Library, Owner, owners
 from coursebuild.results import CompileResult, LabResult, ScriptRun
+from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 
+_Asked: TypeAlias = tuple[str, frozenset[str], bool]
+"""A text and how it is to be parsed."""
+_WHOLES = 64
+"""Documents whose text is remembered though nobody edits them."""
 MOST = 8
 """Documents saved at once that are taken one by one; more are read with the whole course."""
 
@@ -55,6 +62,8 @@ class Plan:
     """Of the shared files that these texts name."""
     stale: frozenset[str]
     """Pages that show something of it as well."""
+    documents: Mapping[str, Document]
+    """Those that changed, by path."""
 
 
 class LiveCourse:
@@ -66,27 +75,45 @@ class LiveCourse:
         assets: Assets,
         subset: Callable[[fonts.FontJob], bytes],
         surroundings: Callable[[Course], zips.Surroundings],
+        documents: Documents,
     ) -> None:
+        """`documents` gives the skeletons of those that nobody has edited since."""
         self.root = root
+        self.documents = documents
         self.changed = threading.Condition(threading.RLock())
         self.version = 0
         """Grows with everything that an open page may show."""
         self.edits = 0
         """Grows with everything that an author did."""
+        self.calm = threading.Event()
+        """Set as long as nobody is saving: what is done behind makes room for a save."""
+        self.calm.set()
         self.course: Course | None = None
         self.parts = Parts(assets)
-        self.pages = Pages(root, assets, subset, surroundings, self._ready)
+        self.pages = Pages(root, assets, subset, surroundings, self._ready, self._whole)
         self.behind: dict[str, tuple[Diagnostic, ...]] = {}
         """What the slow stages found, by stage."""
         self.busy = "reading the course"
         """What is still done behind, in words; empty where everything is known."""
         self.trouble = ""
         """Why the work behind could not be done, if it could not."""
-        self._parse = Parsing()
+        self.due = True
+        """Whether the course as a whole may be told something else than is known."""
+        self._saved = Parsing()
+        """Documents that were saved since the course was first read."""
+        self._wholes = Parsing(_WHOLES)
+        """Others that were drawn."""
+        self._skeletons: dict[str, tuple[_Asked, Parsed[Document]]] = {}
+        """What `documents` gave, by path."""
+        self._offers = PerDocument(_offers)
         self._reading = threading.Lock()
         self._found: dict[str, tuple[Diagnostic, ...]] = {}
         """What reading and checking found, by file."""
         self._known: Places | None = None
+        self._ids: dict[str, str] = {}
+        """Ids of lessons and pages, by the path of their file."""
+        self._sites: dict[str, str] = {}
+        """Site paths, by the same."""
 
     # --- what may be asked
 
@@ -135,44 +162,56 @@ class LiveCourse:
         with self.changed:
             if self.course is None or self._known is None or len(paths) > MOST:
                 return None
-            course = self.course
-            fresh: list[Document] = []
+            fresh: list[Owner] = []
             found: dict[str, list[Diagnostic]] = {}
-            by_path = {owner.path: owner for owner in owners(course)}
-            callouts = frozenset(kind.name for kind in course.callouts)
+            callouts = frozenset(kind.name for kind in self.course.callouts)
             for path in sorted(paths):
-                owner = by_path.get(path)
+                owner = self._owner(path)
                 read = read_sources(self.root, [path])
                 if owner is None or owner.document is None or not read.value:
                     return None
-                is_lesson = isinstance(owner, Lesson)
-                parsed = self._parse(read.value[0], callouts, lesson=is_lesson)
-                if parsed.value is not owner.document:
-                    fresh.append(parsed.value)
+                source, is_lesson = read.value[0], isinstance(owner, Lesson)
+                if source != owner.document.source or self._found.get(path):
+                    parsed = self._saved(source, callouts, lesson=is_lesson)
+                    fresh.append(replace(owner, document=parsed.value))
                     found[path] = [*read.diagnostics, *parsed.diagnostics]
-            return self._planned(_with_documents(course, fresh), fresh, found)
+            return self._planned(fresh, found)
 
-    def _planned(
-        self, course: Course, fresh: list[Document], found: dict[str, list[Diagnostic]]
-    ) -> Plan:
-        old, known = self.course, self._known
-        assert old is not None and known is not None
-        library = self.parts.library(course)
-        known = _renewed(known, course, fresh, library)
+    def _owner(self, path: str) -> Owner | None:
+        """The lesson or page whose file this is."""
+        id = self._ids.get(path)
+        library = self.library
+        if library is None or id is None:
+            return None
+        return library.lessons.get(id) or library.pages.get(id)
+
+    def _planned(self, fresh: list[Owner], found: dict[str, list[Diagnostic]]) -> Plan:
+        old, known, before = self.course, self._known, self.library
+        assert old is not None and known is not None and before is not None
+        if not fresh:
+            return Plan(self.edits, old, before, known, {}, {}, None, frozenset(), {})
+        course = _with_owners(old, fresh)
+        library = self.parts.renewed(before, course, fresh)
+        known = _renewed(known, fresh, library)
         scripts = {path: script for path, (script, _) in library.scripts.items()}
-        self.parts.typeset(fresh)
+        documents = {o.path: o.document for o in fresh if o.document is not None}
+        self.parts.typeset(documents.values())
         drawn: dict[str, tuple[Drawn, bytes]] = {}
-        paths = site_paths(course)
-        for document in fresh:
-            path = document.source.path
+        for path, document in documents.items():
             found[path] += check_document(course, document, known, scripts)
             if not _wrong(found[path]) and not _wrong(self.parts.formula_mistakes(document)):
-                page = draw(self.pages.painter(paths[path]), library)
-                drawn[paths[path]] = page, self.pages.framed(page, library)
-        stale = self._stale(old, course, library) if fresh else set()
+                page = draw(self.pages.painter(self._sites[path]), library)
+                drawn[self._sites[path]] = page, self.pages.framed(page, library)
+        pairs = [(self._document(path), document) for path, document in documents.items()]
+        stale = frozenset(self._stale(pairs, course, library))
         told = {path: tuple(diagnostics) for path, diagnostics in found.items()}
         names = self.pages.names
-        return Plan(self.edits, course, library, known, told, drawn, names, frozenset(stale))
+        return Plan(self.edits, course, library, known, told, drawn, names, stale, documents)
+
+    def _document(self, path: str) -> Document:
+        owner = self._owner(path)
+        assert owner is not None and owner.document is not None
+        return owner.document
 
     def commit(self, plan: Plan) -> bool:
         """Take over what was planned, unless something else changed in between."""
@@ -180,6 +219,10 @@ class LiveCourse:
             if plan.edits != self.edits:
                 return False
             if plan.found:
+                self.due |= self._concerns_others(plan)
+                for path in plan.documents:
+                    if self._sites[path] not in plan.drawn:
+                        self.pages.hold(self._sites[path])
                 self.course, self._known = plan.course, plan.known
                 self._found |= plan.found
                 self.pages.renew(plan.library, plan.stale)
@@ -188,14 +231,59 @@ class LiveCourse:
                 self._edited()
             return True
 
+    def _concerns_others(self, plan: Plan) -> bool:
+        """Whether other documents may be wrong now, or be so no longer."""
+        return any(
+            bool(self._found.get(path))
+            or bool(plan.found[path])
+            or self._offers(self._document(path)) != self._offers(document)
+            for path, document in plan.documents.items()
+        )
+
     def _ready(self, path: str) -> bool:
         """Make what drawing a page needs; `False` for one that has a mistake."""
         document = self.pages.document(path)
         if document is None:
             return True
-        self.parts.typeset([document])
-        found = self._found.get(document.source.path, ())
-        return not _wrong(found) and not _wrong(self.parts.formula_mistakes(document))
+        if _wrong(self._found.get(document.source.path, ())):
+            return False
+        whole = self._whole(document)
+        self.parts.typeset([whole])
+        return not _wrong(self.parts.formula_mistakes(whole))
+
+    def _whole(self, document: Document) -> Document:
+        """A document with its text, given that or what others look at in it."""
+        course, source = self.course, document.source
+        assert course is not None
+        callouts = frozenset(kind.name for kind in course.callouts)
+        owner = self._owner(source.path)
+        lesson = isinstance(owner, Lesson)
+        saved = self._saved.known(source, callouts, lesson=lesson)
+        return (saved or self._wholes(source, callouts, lesson=lesson)).value
+
+    def _parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
+        """A document as far as others look at it; the same text gives the very same document."""
+        saved = self._saved.known(source, callouts, lesson=lesson)
+        if saved is not None:
+            return saved
+        asked = source.text, callouts, lesson
+        known = self._skeletons.get(source.path)
+        if known is None or known[0] != asked:
+            known = asked, self.documents.parse(source, callouts, lesson=lesson)
+            self._skeletons[source.path] = known
+        return known[1]
+
+    def _ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
+        """Have those read that are others than before, all at once."""
+        new = [
+            (source, lesson)
+            for source, lesson in sources
+            if self._saved.known(source, callouts, lesson=lesson) is None
+            and self._skeletons.get(source.path, (None,))[0] != (source.text, callouts, lesson)
+        ]
+        self.documents.ahead(new, callouts)
+        paths = {source.path for source, _ in sources}
+        self._skeletons = {path: known for path, known in self._skeletons.items() if path in paths}
 
     # --- everything
 
@@ -203,8 +291,9 @@ class LiveCourse:
         """Read the whole course; whether anything was not as it was thought to be."""
         with self._reading:
             while True:
+                self.due = False
                 edits = self.edits
-                loaded = load(self.root, self._parse)
+                loaded = load(self.root, self._parse, self._ahead, self.documents.course_map)
                 known = places(loaded.course) if loaded.course is not None else None
                 with self.changed:
                     if edits == self.edits:
@@ -220,31 +309,36 @@ class LiveCourse:
         moved = new is not None and (old is None or not _same(old, new))
         if not moved and static == told_before:
             return False
+        for path, told in static.items():
+            if _wrong(told) and path in self._sites:
+                self.pages.hold(self._sites[path])
         self._found = static
         if new is not None and moved:
             library = self.parts.library(new)
             stale = None
+            self._ids = {owner.path: owner.id for owner in owners(new)}
+            self._sites = site_paths(new)
             if old is not None and _same_frame(old, new):
-                stale = self._stale(old, new, library)
+                pairs = zip(old.documents, new.documents, strict=True)
+                changed = [(one, two) for one, two in pairs if one is not two]
+                stale = self._stale(changed, new, library)
             self.course, self._known = new, known
             self.pages.renew(library, stale)
         elif new is not None and self.library is not None:
             # A page may be drawn now that something else was mended.
             wrong = {d.span.path for told in told_before.values() for d in told}
-            paths = site_paths(new)
-            self.pages.renew(self.library, {paths[path] for path in wrong if path in paths})
+            self.pages.renew(self.library, {self._sites[p] for p in wrong if p in self._sites})
         self._edited()
         return True
 
-    def _stale(self, old: Course, new: Course, library: Library) -> set[str]:
+    def _stale(
+        self, changed: Iterable[tuple[Document, Document]], new: Course, library: Library
+    ) -> set[str]:
         """The pages that other documents, in the same map, make stale."""
-        before = {document.source.path: document for document in old.documents}
-        paths = site_paths(new)
         stale: set[str] = set()
-        for document in new.documents:
-            path = document.source.path
-            if before[path] is not document:
-                stale |= {paths[path], *self._models_of_both(before[path], document)}
+        for before, document in changed:
+            site = self._sites[document.source.path]
+            stale |= {site, *self._models_of_both(before, document)}
         drawn_from = self.library
         if drawn_from is not None:
             stale |= self._leaning(new, _changed_keys(drawn_from.runs, library.runs))
@@ -263,9 +357,8 @@ class LiveCourse:
 
     def _leaning(self, course: Course, scripts: frozenset[str]) -> set[str]:
         """The pages that show what one of these scripts printed, or how it did."""
-        paths = site_paths(course) if scripts else {}
         return {
-            paths[document.source.path]
+            self._sites[document.source.path]
             for document in (course.documents if scripts else ())
             if not scripts.isdisjoint(self.parts.leans_on(document))
         }
@@ -300,45 +393,41 @@ class LiveCourse:
             if self.course is None or self.library is None:
                 return
             library = self.parts.library(self.course)
-            paths = site_paths(self.course)
             documents = (d for d in self.course.documents if self.parts.has_labs(d))
-            self.pages.renew(library, {paths[d.source.path] for d in documents})
+            self.pages.renew(library, {self._sites[d.source.path] for d in documents})
             self.tell()
+
+
+def _offers(document: Document) -> tuple[object, ...]:
+    """What other documents may refer to, or clash with."""
+    blocks = tuple(document_blocks(document))
+    quizzes = tuple(block.id for block in blocks if isinstance(block, Quiz))
+    scripts = tuple((block.path, block.norun) for block in blocks if isinstance(block, Script))
+    return anchors(document), quizzes, scripts
 
 
 def _wrong(diagnostics: Iterable[Diagnostic]) -> bool:
     return any(d.severity is Severity.ERROR for d in diagnostics)
 
 
-def _with_documents(course: Course, fresh: Iterable[Document]) -> Course:
-    """The course with other documents in the places of those with their paths."""
-    by_path = {document.source.path: document for document in fresh}
-    if not by_path:
-        return course
+def _with_owners(course: Course, fresh: Iterable[Owner]) -> Course:
+    """The course with other lessons and pages in the places of those with their ids."""
+    lessons = {owner.id: owner for owner in fresh if isinstance(owner, Lesson)}
+    pages = {owner.id: owner for owner in fresh if isinstance(owner, Page)}
+    touched = {lesson.level for lesson in lessons.values()}
     levels = tuple(
-        replace(
-            level,
-            lessons=tuple(
-                replace(entry, document=by_path[entry.path]) if entry.path in by_path else entry
-                for entry in level.lessons
-            ),
-        )
-        if any(entry.path in by_path for entry in level.lessons)
+        replace(level, lessons=tuple(lessons.get(old.id, old) for old in level.lessons))
+        if level.id in touched
         else level
         for level in course.levels
     )
-    pages = tuple(
-        replace(page, document=by_path[page.path]) if page.path in by_path else page
-        for page in course.pages
-    )
-    return replace(course, levels=levels, pages=pages)
+    return replace(course, levels=levels, pages=tuple(pages.get(p.id, p) for p in course.pages))
 
 
-def _renewed(known: Places, course: Course, fresh: list[Document], library: Library) -> Places:
+def _renewed(known: Places, fresh: Iterable[Owner], library: Library) -> Places:
     """What there is to link to, now that some documents are others."""
-    paths = {document.source.path for document in fresh}
-    lessons = {o.id: o.document for o in course.lessons if o.path in paths}
-    pages = {o.id: o.document for o in course.pages if o.path in paths}
+    lessons = {owner.id: owner.document for owner in fresh if isinstance(owner, Lesson)}
+    pages = {owner.id: owner.document for owner in fresh if isinstance(owner, Page)}
     return replace(
         known,
         lessons={**known.lessons, **lessons},

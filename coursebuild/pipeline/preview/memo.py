@@ -53,8 +53,10 @@ class Parsing:
     Safe to call from several threads.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int | None = None) -> None:
+        """`most`: of so many files the results are remembered, those that were used last."""
         self._kept: dict[str, tuple[_Entry, ...]] = {}
+        self._most = most
         self._lock = threading.Lock()
 
     def __call__(
@@ -62,11 +64,26 @@ class Parsing:
     ) -> Parsed[Document]:
         """Parse a text; see `parse_document`."""
         with self._lock:
-            kept = self._kept.get(source.path, ())
-            for entry in kept:
-                if (entry.text, entry.callouts, entry.lesson) == (source.text, callouts, lesson):
-                    return entry.parsed
-            parsed = parse_document(source, callouts, lesson=lesson)
-            new = _Entry(source.text, callouts, lesson, parsed)
-            self._kept[source.path] = (new, *kept[:1])
-            return parsed
+            found = self._find(source, callouts, lesson)
+            if found is None:
+                found = parse_document(source, callouts, lesson=lesson)
+                new = _Entry(source.text, callouts, lesson, found)
+                self._kept[source.path] = (new, *self._kept.pop(source.path, ())[:1])
+                while self._most is not None and len(self._kept) > self._most:
+                    del self._kept[next(iter(self._kept))]
+            return found
+
+    def known(
+        self, source: Source, callouts: frozenset[str], *, lesson: bool
+    ) -> Parsed[Document] | None:
+        """What parsing a text gave, if it is remembered."""
+        with self._lock:
+            return self._find(source, callouts, lesson)
+
+    def _find(
+        self, source: Source, callouts: frozenset[str], lesson: bool
+    ) -> Parsed[Document] | None:
+        for entry in self._kept.get(source.path, ()):
+            if (entry.text, entry.callouts, entry.lesson) == (source.text, callouts, lesson):
+                return entry.parsed
+        return None

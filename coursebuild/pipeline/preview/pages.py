@@ -33,13 +33,14 @@ from coursebuild.values import dataclass
 
 Painter: TypeAlias = Callable[[Library], Draft]
 
-_NO_FACTS = PageFacts(frozenset(), frozenset(), frozenset())
 _ANYTHING = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
     frozenset(),
 )
 """For the first pages, which are shown before the others are known."""
+_DRAWN = 64
+"""Pages that are kept drawn."""
 _GENERATIONS = 3
 """How many sets of shared files stay available."""
 
@@ -52,18 +53,18 @@ class Drawn:
     declarations: frozenset[str]
 
 
-def painters(course: Course) -> dict[str, Painter]:
+def painters(course: Course, whole: Callable[[Document], Document]) -> dict[str, Painter]:
     """How each page is drawn, by its site path, in the order of a build."""
     found: dict[str, Painter] = {urls.HOME: pages.home_draft}
     for level in course.levels:
         found[urls.level_path(level)] = functools.partial(_level, level.id)
     for entry in course.lessons:
-        found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id)
+        found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id, whole)
     for model in course.models:
         found[urls.model_page_path(model.name)] = functools.partial(_model, model)
     for page in course.pages:
         if page.document is not None:
-            found[urls.page_path(page)] = functools.partial(_page, page.id)
+            found[urls.page_path(page)] = functools.partial(_page, page.id, whole)
     found[urls.NOT_FOUND] = pages.not_found_draft
     return found
 
@@ -72,21 +73,21 @@ def _level(id: str, library: Library) -> Draft:
     return pages.level_draft(library, library.levels[id])
 
 
-def _lesson(id: str, library: Library) -> Draft:
+def _lesson(id: str, whole: Callable[[Document], Document], library: Library) -> Draft:
     entry = library.lessons[id]
     if entry.document is None:
         return lesson.stub_draft(library, entry)
-    return lesson.lesson_draft(library, entry, entry.document)
+    return lesson.lesson_draft(library, entry, whole(entry.document))
 
 
 def _model(model: MjcfModel, library: Library) -> Draft:
     return pages.model_draft(library, model)
 
 
-def _page(id: str, library: Library) -> Draft:
+def _page(id: str, whole: Callable[[Document], Document], library: Library) -> Draft:
     page = library.pages[id]
     assert page.document is not None, "a page without a document has no painter"
-    return pages.page_draft(library, page, page.document)
+    return pages.page_draft(library, page, whole(page.document))
 
 
 def site_paths(course: Course) -> dict[str, str]:
@@ -105,8 +106,13 @@ class Pages:
         subset: Callable[[fonts.FontJob], bytes],
         surroundings: Callable[[Course], zips.Surroundings],
         ready: Callable[[str], bool],
+        whole: Callable[[Document], Document],
     ) -> None:
-        """`ready` makes all that drawing a page needs; it says no to one with a mistake."""
+        """`ready` makes all that drawing a page needs; it says no to one with a mistake.
+
+        `whole` gives a document with its text, which one that nobody edited may lack.
+        """
+        self._whole = whole
         self._root = root
         self._ready = ready
         self._assets = assets
@@ -114,12 +120,17 @@ class Pages:
         self._surroundings = surroundings
         self._library: Library | None = None
         self._painters: dict[str, Painter] = {}
-        self._documents: dict[str, Document] = {}
+        self._ids: dict[str, str] = {}
+        """Of lessons and pages, by site path."""
         self._drawn: dict[str, Drawn] = {}
+        """The pages drawn last; others are drawn again when they are asked for."""
+        self._held: set[str] = set()
+        """Pages that are older than their documents, which have mistakes."""
         self._facts: dict[str, PageFacts] = {}
         self._stale: set[str] = set()
         self._texts: dict[str, bytes] = {}
-        self._files: dict[str, Callable[[], bytes]] = {}
+        self._files: dict[str, Callable[[], bytes]] | None = None
+        """Everything else, listed when it is first asked for."""
         self._shared_facts: PageFacts | None = None
         self._generations: list[dict[str, bytes]] = []
         self._names: Names | None = None
@@ -130,21 +141,21 @@ class Pages:
         """Take what the course is now; `stale` are the pages to draw anew, `None` means all."""
         self._library = library
         if stale is None:
-            self._painters = painters(library.course)
+            self._painters = painters(library.course, self._whole)
             self._stale = set(self._painters)
-            for gone in self._drawn.keys() - self._painters.keys():
-                del self._drawn[gone]
+            for gone in (self._drawn.keys() | self._facts.keys()) - self._painters.keys():
+                self._drawn.pop(gone, None)
                 self._facts.pop(gone, None)
+                self._held.discard(gone)
             self._texts.clear()  # each has the menu of all
+            course = library.course
+            self._ids = {
+                site: owner.id
+                for owner, site in zip(owners(course), site_paths(course).values(), strict=True)
+            }
         else:
             self._stale.update(stale)
-        course = library.course
-        self._documents = {
-            site: document
-            for owner, site in zip(owners(course), site_paths(course).values(), strict=True)
-            if (document := owner.document) is not None
-        }
-        self._files = dict(self._other_files(library))
+        self._files = None
         if self._names is None:
             self._share(_ANYTHING, lambda job: job.data)
 
@@ -153,9 +164,19 @@ class Pages:
         assert self._names is not None, "there are shared files since the course was first read"
         return frame(library, drawn.draft, self._names).encode()
 
+    def hold(self, path: str) -> None:
+        """Draw a page, and keep it until it is drawn again: what comes now is not to be shown."""
+        if path in self._painters and self._page(path) is not None:
+            self._held.add(path)
+
     def put(self, path: str, drawn: Drawn, text: bytes | None = None) -> None:
         """Take a page that was drawn, and maybe framed, from the library as it is now."""
+        self._held.discard(path)
         self._drawn[path] = drawn
+        if len(self._drawn) > _DRAWN + len(self._held):
+            oldest = next(p for p in self._drawn if p not in self._held)
+            del self._drawn[oldest]
+            self._texts.pop(oldest, None)
         self._facts.pop(path, None)
         self._texts.pop(path, None)
         self._stale.discard(path)
@@ -218,12 +239,16 @@ class Pages:
 
     def document(self, path: str) -> Document | None:
         """The document that a page shows, as it was last read."""
-        return self._documents.get(path)
+        library, id = self._library, self._ids.get(path)
+        if library is None or id is None:
+            return None
+        owner = library.lessons.get(id) or library.pages.get(id)
+        return None if owner is None else owner.document
 
     def paths(self) -> tuple[str, ...]:
         """The site paths of everything that a build would publish, sorted."""
         newest = self._generations[-1].keys() if self._generations else ()
-        return tuple(sorted({*self._painters, *self._files, *newest}))
+        return tuple(sorted({*self._painters, *self._others(), *newest}))
 
     def has_page(self, path: str) -> bool:
         """Whether there is a page, or would be but for its mistakes."""
@@ -233,15 +258,19 @@ class Pages:
         """A file of the site, if there is one and it can be had."""
         if path in self._painters:
             return self._text(path)
-        if path in self._files:
-            try:
-                return self._files[path]()
-            except EffectError:
-                return None  # gone since the course was read
         for files in reversed(self._generations):
             if path in files:
                 return files[path]
-        return None
+        make = self._others().get(path)
+        try:
+            return None if make is None else make()
+        except EffectError:
+            return None  # gone since the course was read
+
+    def _others(self) -> dict[str, Callable[[], bytes]]:
+        if self._files is None:
+            self._files = dict(self._other_files(self._library)) if self._library else {}
+        return self._files
 
     def _text(self, path: str) -> bytes | None:
         drawn = self._page(path)
@@ -253,14 +282,18 @@ class Pages:
         return self._texts[path]
 
     def _page(self, path: str) -> Drawn | None:
-        if path in self._stale and self._ready(path):
+        old = self._drawn.get(path)
+        if (old is None or path in self._stale) and self._ready(path):
             assert self._library is not None
-            old = self._drawn.get(path)
             new = draw(self._painters[path], self._library)
             if new == old:
                 self._stale.discard(path)
+                self._held.discard(path)
             else:
+                noted = self._facts.get(path) if path not in self._stale else None
                 self.put(path, new)
+                if noted is not None:  # it is what it was, and was only forgotten
+                    self._facts[path] = noted
         return self._drawn.get(path)
 
     def painter(self, path: str) -> Painter:
@@ -281,13 +314,13 @@ class Pages:
 
     def unnoted(self) -> tuple[str, ...]:
         """The pages of which that is not noted yet."""
-        return tuple(path for path in self._drawn if path not in self._facts)
+        return tuple(path for path in self._painters if path not in self._facts)
 
     def needed(self) -> PageFacts | None:
         """The facts for new shared files, where those that there are do not do any more."""
         if self._library is None:
             return None
-        facts = all_facts(self._library, (self._facts.get(p, _NO_FACTS) for p in self._drawn))
+        facts = all_facts(self._library, self._facts.values())
         return None if facts == self._shared_facts else facts
 
     def make_shared(self, facts: PageFacts) -> tuple[tuple[OutputFile, ...], Names]:

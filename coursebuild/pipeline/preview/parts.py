@@ -7,7 +7,7 @@ made from.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from coursebuild.checks import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
@@ -17,6 +17,7 @@ from coursebuild.model import (
     Course,
     Document,
     Lab,
+    Lesson,
     Mjcf,
     OutputQuestion,
     Page,
@@ -30,12 +31,14 @@ from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import LabFiles, PublishedLabs, lab_files
 from coursebuild.render.library import (
     Library,
+    NamedModels,
     Owner,
     course_scripts,
     document_scripts,
     named_models,
     owners,
     place,
+    uses_of,
 )
 from coursebuild.results import (
     CompileResult,
@@ -121,16 +124,93 @@ class Parts:
             for verdict in self._verdicts_of(course, document, runs)
         )
 
+    def renewed(self, library: Library, course: Course, fresh: Sequence[Owner]) -> Library:
+        """The library of a course of which only the documents of some owners are others.
+
+        It costs no more for a large course than for a small one.
+        """
+        old = tuple(library.lessons.get(o.id) or library.pages[o.id] for o in fresh)
+        before, after = (
+            [script.path for o in owners for script in self._scripts(o)] for owners in (old, fresh)
+        )
+        scripts: Mapping[str, tuple[Script, Owner]]
+        if before == after:
+            scripts = {**library.scripts}
+            for owner in fresh:
+                for script in self._scripts(owner):
+                    if library.scripts[script.path][1].id == owner.id:
+                        scripts[script.path] = script, owner
+        else:
+            scripts = course_scripts(course, self._scripts_of)
+        runs = {path: run for path, run in library.runs.items() if path in scripts}
+        for path in {*before, *after} & scripts.keys():
+            run = self._run_of(*scripts[path])
+            runs.pop(path, None)
+            if run is not None:
+                runs[path] = run
+        changed = {p for p in {*before, *after} if library.runs.get(p) is not runs.get(p)}
+        documents = [o.document for o in fresh if o.document is not None]
+        if changed:
+            known = {document.source.path for document in documents}
+            others = (d for d in course.documents if d.source.path not in known)
+            documents += [d for d in others if not changed.isdisjoint(self.leans_on(d))]
+        verdicts = self._renewed_verdicts(library, course, documents, runs)
+        uses = library.uses
+        if any(self._named(one) != self._named(two) for one, two in zip(old, fresh, strict=True)):
+            uses = uses_of(course, self.models_of)
+        lessons = {o.id: o for o in fresh if isinstance(o, Lesson)}
+        levels = {o.level for o in lessons.values()}
+        return replace(
+            library,
+            course=course,
+            results=replace(library.results, runs=tuple(runs.values())),
+            lessons={**library.lessons, **lessons},
+            levels={**library.levels, **{v.id: v for v in course.levels if v.id in levels}},
+            pages={**library.pages, **{o.id: o for o in fresh if isinstance(o, Page)}},
+            order=course.lessons,
+            scripts=scripts,
+            runs=runs,
+            uses=uses,
+            labs=self._labs(course) if any(map(self._has_labs, (*old, *fresh))) else library.labs,
+            verdicts=verdicts,
+        )
+
+    def _scripts(self, owner: Owner) -> tuple[Script, ...]:
+        return () if owner.document is None else self._scripts_of(owner.document)
+
+    def _named(self, owner: Owner) -> NamedModels | None:
+        return None if owner.document is None else self.models_of(owner.document)
+
+    def _has_labs(self, owner: Owner) -> bool:
+        return owner.document is not None and self.has_labs(owner.document)
+
+    def _renewed_verdicts(
+        self,
+        library: Library,
+        course: Course,
+        documents: Iterable[Document],
+        runs: Mapping[str, ScriptRun],
+    ) -> dict[tuple[str, int], Verdict]:
+        """All verdicts, those of some documents anew."""
+        paths = {document.source.path for document in documents}
+        verdicts = {key: v for key, v in library.verdicts.items() if key[0] not in paths}
+        for document in documents:
+            found = self._verdicts_of(course, document, runs)
+            verdicts |= {place(verdict.recording): verdict for verdict in found}
+        return verdicts
+
     def current(self, course: Course) -> dict[str, ScriptRun]:
         """The runs of scripts that are still what was run."""
-        found: dict[str, ScriptRun] = {}
-        for path, (script, owner) in course_scripts(course, self._scripts_of).items():
-            ran = self.runs.get(path)
-            if ran is not None:
-                now = extraction(script, owner)
-                if ran.text == now.text and (ran.job,) == jobs([now]):
-                    found[path] = ran.run
-        return found
+        scripts = course_scripts(course, self._scripts_of).items()
+        found = ((path, self._run_of(script, owner)) for path, (script, owner) in scripts)
+        return {path: run for path, run in found if run is not None}
+
+    def _run_of(self, script: Script, owner: Owner) -> ScriptRun | None:
+        ran = self.runs.get(script.path)
+        if ran is None:
+            return None
+        now = extraction(script, owner)
+        return ran.run if ran.text == now.text and (ran.job,) == jobs([now]) else None
 
     def _verdicts_of(
         self, course: Course, document: Document, runs: Mapping[str, ScriptRun]

@@ -102,18 +102,21 @@ export class Panel {
   }
 }
 
+/** What stands between backticks is code. */
+const coded = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))
+
 function problem({ severity, rule, place, message, label, help, notes, line, start, end }) {
   const item = h('li', { class: `preview-problem preview-${severity}` })
   item.append(
-    h('p', { class: 'preview-message' }, h('strong', {}, severity === 'error' ? 'Mistake' : 'Warning'), ` ${message}`),
+    h('p', { class: 'preview-message' }, h('strong', {}, severity === 'error' ? 'Mistake' : 'Warning'), ' ', ...coded(message)),
     h('p', { class: 'preview-place' }, h('code', {}, place), ` ${rule}`),
   )
   if (line.trim()) {
     const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
     item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), marked, line.slice(Math.max(end, start + 1))))
   }
-  if (label) item.append(h('p', { class: 'preview-label' }, label))
+  if (label) item.append(h('p', { class: 'preview-label' }, ...coded(label)))
   for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
-  if (help) item.append(h('p', { class: 'preview-help' }, help))
+  if (help) item.append(h('p', { class: 'preview-help' }, ...coded(help)))
   return item
 }

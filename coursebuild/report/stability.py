@@ -1,0 +1,231 @@
+"""What was measured on the hard cases, as a table for people and as JSON.
+
+Entry points: `CaseReport`, `stability_text(reports, style)`, `stability_json(reports)`.
+
+No number is infinite or missing by a code of its own: `None` stands for what is not there, and a
+field beside it says why, so that the JSON is JSON.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+
+from coursebuild.report.text import Style
+from coursebuild.values import dataclass
+
+_BOLD, _RED, _YELLOW = "1", "1;31", "1;33"
+_BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step")
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryLine:
+    """The largest stable timestep of an integrator."""
+
+    integrator: str
+    largest: float | None
+    """s; 0 where no timestep tried is stable, `None` where all are."""
+    theory: float | None
+    """s, as `largest`; `None` also where there is no theory and so no formula."""
+    formula: str
+    """Where the theory comes from; empty where there is none."""
+    difference: float | None
+    """Measured against theory, relative."""
+    monotone: bool
+    """Whether all timesteps beyond are unstable."""
+    islands: tuple[float, ...]
+    """Those beyond that are stable all the same, s."""
+    beyond: str
+    """How the first unstable one tried went."""
+    growth: float | None
+    """By what the velocities were multiplied in a step there, where they stayed finite."""
+    searched: tuple[float, float]
+    """The timesteps between which was looked, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class FigureLine:
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    """`None` where it is not finite."""
+    exact: float | None
+    """`None` where theory does not say it."""
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLine:
+    """One run against the reference. Errors are the largest over the duration, and at its end."""
+
+    integrator: str
+    timestep: float
+    """s."""
+    status: str
+    reasons: tuple[str, ...]
+    """Why it is not `ok`."""
+    position: tuple[float, float] | None
+    """m or rad."""
+    attitude: tuple[float, float] | None
+    """rad."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s."""
+    energy_drift: float | None
+    momentum_drift: float | None
+    penetration: float
+    """m."""
+
+
+@dataclass(frozen=True, slots=True)
+class OrderLine:
+    """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
+
+    integrator: str
+    position: float | None
+    attitude: float | None
+    velocity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceLine:
+    """What the errors were measured against."""
+
+    kind: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    floor: float
+    second: str
+    """The source of the second reference; empty where there is none."""
+    agreement: float | None
+    """The largest difference of the two."""
+
+
+@dataclass(frozen=True, slots=True)
+class CaseReport:
+    """Everything that was measured on a hard case."""
+
+    name: str
+    title: str
+    case: int
+    engine: str
+    """Version of MuJoCo."""
+    note: str
+    reference: ReferenceLine | None
+    boundaries: tuple[BoundaryLine, ...]
+    figures: tuple[FigureLine, ...]
+    orders: tuple[OrderLine, ...]
+    errors: tuple[ErrorLine, ...]
+
+
+def stability_json(reports: Sequence[CaseReport]) -> str:
+    """As one JSON array."""
+    value = [dataclasses.asdict(report) for report in reports]
+    return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"
+
+
+def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
+    """As text: for each case its reference, boundaries, known quantities and orders."""
+    return "\n".join(_case(report, style) for report in reports)
+
+
+def _case(report: CaseReport, style: Style) -> str:
+    head = style.paint(f"{report.name}", _BOLD) + f"  case {report.case}: {report.title}"
+    lines = [head]
+    if report.reference is not None:
+        lines += [f"  {line}" for line in _reference(report.reference)]
+    if report.note:
+        lines.append(f"  {report.note}")
+    if report.boundaries:
+        rows = [(line.integrator, _boundary(line)) for line in report.boundaries]
+        lines += _table(_BOUNDARY, _merged(rows))
+        lines += [f"  {_islands(one, style)}" for one in report.boundaries if not one.monotone]
+    for name in dict.fromkeys(line.name for line in report.figures):
+        found = [line for line in report.figures if line.name == name]
+        rows = [(line.integrator, _figure(line)) for line in found]
+        lines += _table((name, "exact", "difference"), _merged(rows))
+    fitted: list[tuple[str, tuple[str, ...]]] = [
+        (o.integrator, (_order(o.position), _order(o.attitude), _order(o.velocity)))
+        for o in report.orders
+        if (o.position, o.attitude, o.velocity) != (None, None, None)
+    ]
+    if fitted:
+        lines += _table(("order of position", "of attitude", "of velocity"), _merged(fitted))
+    lost = [line for line in report.errors if line.status != "ok"]
+    for line in lost:
+        why = "; ".join(line.reasons)
+        told = f"  {line.integrator} at {line.timestep:g} s: {line.status}: {why}"
+        lines.append(style.paint(told, _YELLOW))
+    return "\n".join(lines) + "\n"
+
+
+def _reference(line: ReferenceLine) -> list[str]:
+    said = [f"reference ({line.kind}, known to {line.floor:.0e}): {line.source}"]
+    if line.second:
+        off = "" if line.agreement is None else f", which differs by {line.agreement:.1e}"
+        said.append(f"second: {line.second}{off}")
+    return said
+
+
+def _boundary(line: BoundaryLine) -> tuple[str, ...]:
+    theory = _seconds(line.theory) if line.theory else ""
+    if line.formula and not line.theory:
+        theory = "all" if line.theory is None else "none"
+    growth = "" if line.growth is None else f"{line.growth:.9f}"
+    difference = "" if line.difference is None else f"{100 * line.difference:+.3f} %"
+    return _largest(line), theory, difference, line.beyond, growth
+
+
+def _islands(line: BoundaryLine, style: Style) -> str:
+    shown = ", ".join(f"{h:.4g}" for h in line.islands)
+    return style.paint(f"{line.integrator} is not monotone: stable again at {shown} s", _RED)
+
+
+def _largest(line: BoundaryLine) -> str:
+    if line.largest is None:
+        return f"all to {_seconds(line.searched[1])}"
+    if line.largest == 0:
+        return f"none from {_seconds(line.searched[0])}"
+    return _seconds(line.largest)
+
+
+def _figure(line: FigureLine) -> tuple[str, ...]:
+    unit = f" {line.unit}" if line.unit else ""
+    measured = "not finite" if line.measured is None else f"{line.measured:.10g}{unit}"
+    exact = "" if line.exact is None else f"{line.exact:.10g}{unit}"
+    difference = ""
+    if line.exact is not None and line.measured is not None:
+        difference = f"{line.measured - line.exact:+.1e}"
+    return measured, exact, difference
+
+
+def _order(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.6g} s"
+
+
+def _merged(rows: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...]]:
+    """Rows with the integrators behind, those of equal rows together."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for integrator, cells in rows:
+        together.setdefault(cells, []).append(integrator)
+    return [(*cells, ", ".join(names)) for cells, names in together.items()]
+
+
+def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Rows under their titles, in columns; columns without a cell are left out."""
+    shown = [i for i in range(len(titles)) if any(row[i] for row in rows)]
+    head = tuple(titles[i] for i in shown)
+    body = [(*(row[i] for i in shown), row[-1]) for row in rows]
+    widths = [max(len(row[i]) for row in (head, *body)) for i in range(len(head))]
+    return [
+        "  "
+        + "  ".join((*(c.ljust(w) for c, w in zip(row, widths, strict=False)), *row[len(head) :]))
+        for row in (head, *body)
+    ]

@@ -1,0 +1,74 @@
+"""Cuts the fonts that come with the tool cut already: see `coursebuild/effects/prepared.py`.
+
+Run it after site/dist was made with other fonts, or after the way of cutting has changed:
+
+    python site/prepare_fonts.py
+
+`tests/render/test_prepared.py` says when that is due.
+"""
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from coursebuild.effects.prepared import FOLDER
+from coursebuild.effects.resources import Bundle
+from coursebuild.render import fonts
+
+OFTEN = (
+    *range(0x20, 0x7F),
+    *range(0xA0, 0x100),
+    *range(0x2C6, 0x2DE),  # accents
+    *range(0x300, 0x339),
+    *range(0x391, 0x3F7),  # Greek
+    *range(0x2010, 0x2065),  # punctuation
+    *range(0x20D0, 0x20F0),
+    *range(0x2100, 0x2150),  # letters in use as symbols
+    *range(0x2190, 0x2300),  # arrows, operators, relations
+    *range(0x2308, 0x230C),
+    *range(0x23B4, 0x23B6),
+    *range(0x23DC, 0x23E2),  # braces above and below
+    *(0x25A1, 0x25B3, 0x25BD, 0x25CB, 0x25EF, 0x25FB),
+    *range(0x27C0, 0x2800),
+    *range(0x2A00, 0x2A10),
+    *range(0x2A7D, 0x2AB1),
+    *range(0x1D400, 0x1D800),  # letters in the styles of mathematics
+)
+"""Code points that formulas use at all often."""
+
+
+def prepared() -> dict[str, bytes]:
+    """The files, by name."""
+    bundle = Bundle()
+    files: dict[str, bytes] = {}
+    cuts: dict[str, str] = {}
+    smaller: dict[str, dict[str, str]] = {}
+    faces = [(f, bundle[f"fonts/{f.file}"]) for f in fonts.read_faces(bundle["fonts/fonts.json"])]
+    for job in fonts.font_jobs(faces, "".join(fonts.BASE), ""):
+        files[job.face.file] = fonts.subset_font(job)
+        cuts[job.key] = job.face.file
+    for face, data in faces:
+        if face.family == fonts.MATH:
+            characters = "".join(sorted(set(map(chr, OFTEN)) & fonts.covered(data)))
+            files[face.file] = fonts.subset_font(fonts.FontJob(face, data, characters))
+            name = f"{fonts.VERSION}/{hashlib.sha256(data).hexdigest()}"
+            smaller[name] = {"file": face.file, "characters": characters}
+    listing = {"cuts": cuts, "smaller": smaller}
+    text = json.dumps(listing, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    return {**files, "fonts.json": text.encode()}
+
+
+def main() -> None:
+    """Write them."""
+    files = prepared()
+    for path in FOLDER.iterdir():
+        if path.name not in files:
+            path.unlink()
+    for name, data in files.items():
+        (FOLDER / name).write_bytes(data)
+
+
+if __name__ == "__main__":
+    main()

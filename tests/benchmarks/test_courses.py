@@ -1,0 +1,156 @@
+"""The generator of courses for benchmarks: what it writes is whole, true and always the same."""
+
+from __future__ import annotations
+
+import filecmp
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.courses import FLAVORS, names_of, write_course  # noqa: E402
+from benchmarks.measure.report import BEGIN, END, Report, markdown, put_into  # noqa: E402
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def coursebuild(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "coursebuild", "-C", str(folder), *arguments]
+    environment = {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All topics, each twice, in two levels."""
+    folder = tmp_path_factory.mktemp("course") / "course"
+    write_course(folder, 16)
+    return folder
+
+
+def test_nothing_is_wrong_in_the_course(course: Path) -> None:
+    done = coursebuild(course, "check")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "16 lessons, 16 scripts run: everything holds" in done.stdout
+
+
+def test_the_output_is_checked_by_running(course: Path, tmp_path: Path) -> None:
+    """A course whose recorded output were not that of its script would be found."""
+    folder = tmp_path / "course"
+    write_course(folder, 1)
+    (lesson,) = (folder / "content" / "lessons").iterdir()
+    text = lesson.read_text(encoding="utf-8")
+    number = re.search(r"observed order (\d\.\d+)", text)
+    assert number is not None
+    lesson.write_text(text.replace(number[1], "7.777", 1), encoding="utf-8")
+    done = coursebuild(folder, "check")
+    assert done.returncode == 1
+    assert "error[output-drift]" in done.stdout
+
+
+def test_mujoco_scripts_hold(tmp_path: Path) -> None:
+    folder = tmp_path / "course"
+    write_course(folder, 2, scripts="mujoco")
+    done = coursebuild(folder, "check")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("flavor", FLAVORS)
+def test_two_runs_write_the_same_bytes(tmp_path: Path, flavor: str) -> None:
+    for name in ("one", "two"):
+        write_course(tmp_path / name, 3, flavor)
+    assert files(tmp_path / "one") == files(tmp_path / "two")
+
+
+def test_a_lesson_does_not_depend_on_how_many_there_are(course: Path, tmp_path: Path) -> None:
+    """But for the links to neighbours, which the last ones do not have."""
+    folder = tmp_path / "longer"
+    write_course(folder, 24)
+    for name in names_of(8):
+        path = f"content/lessons/{name}.md"
+        assert filecmp.cmp(course / path, folder / path, shallow=False)
+
+
+def test_lessons_are_as_large_as_the_benchmark_says(course: Path) -> None:
+    paths = sorted((course / "content" / "lessons").iterdir())
+    assert {path.stem for path in paths} == set(names_of(16))
+    scripts = set()
+    for path in paths:
+        text = path.read_text(encoding="utf-8")
+        assert 13_000 < len(text.encode()) < 17_000
+        fences = re.findall(r"^```(\w+).*\n((?s:.*?))^```$", text, re.MULTILINE)
+        assert [kind for kind, _ in fences] == ["io", "python", "text", "quiz"]
+        assert 85 <= fences[1][1].count("\n") <= 95
+        scripts.add(fences[1][1])
+        prose = re.sub(r"^```(?s:.*?)^```$", "", text, flags=re.MULTILINE)
+        displays = re.findall(r"(?s)\$\$.+?\$\$", prose)
+        inline = re.findall(r"\$[^$\n]+\$", re.sub(r"(?s)\$\$.+?\$\$", "", prose))
+        assert len(displays) == 10
+        assert 12 <= len(inline) <= 24
+        assert text.count("\n> [!") == 4
+    assert len(scripts) == 16, "every lesson has a script of its own"
+
+
+@pytest.mark.parametrize("flavor", FLAVORS)
+def test_every_flavor_has_the_whole_lesson(tmp_path: Path, course: Path, flavor: str) -> None:
+    """Prose, formulas, code and output are there, and nothing that only coursebuild knows."""
+    folder = tmp_path / flavor
+    (name, *_) = write_course(folder, 16, flavor)
+    (ours,) = course.glob(f"content/lessons/{name}.md")
+    (theirs,) = [
+        path for path in folder.rglob("*.md") if path.stem in (name, name.replace(".", "-"))
+    ]
+    text = theirs.read_text(encoding="utf-8")
+    wanted = ours.read_text(encoding="utf-8")
+    for pattern in (r"observed order [\d.]+", r"\\frac[^$]{3,9}", r"def \w+\(", r"^## .+$"):
+        found = re.findall(pattern, wanted, re.MULTILINE)
+        assert found
+        assert set(found) <= set(re.findall(pattern, text, re.MULTILINE))
+    if flavor != "coursebuild":
+        assert "{out}" not in text
+        assert "lesson:" not in text
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(FileExistsError, match="is not empty"):
+        write_course(tmp_path, 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_tables_are_put_between_the_markers(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n\n{BEGIN}\nold\n{END}\n\nafter\n")
+    put_into(page, "new")
+    put_into(page, "newer")
+    assert page.read_text() == f"before\n\n{BEGIN}\n\nnewer\n\n{END}\n\nafter\n"
+    page.write_text("no markers")
+    with pytest.raises(ValueError, match="does not have the markers"):
+        put_into(page, "new")
+    assert page.read_text() == "no markers"
+
+
+def test_ratios_are_to_coursebuild(tmp_path: Path) -> None:
+    from benchmarks.measure.building import COLD
+    from benchmarks.measure.report import Figure
+
+    facts = dict.fromkeys(("date", "processor", "cores", "memory", "system", "python"), "x")
+    figures = [
+        Figure(COLD, 80, "coursebuild", [0.9, 5.0, 0.8]),
+        Figure(COLD, 80, "another", [1.8, 1.7, 9.9]),
+    ]
+    text = markdown(Report(facts, [], ["a third"], figures))
+    assert "| coursebuild | 0.900 |" in text
+    assert "| another | 1.80 (2.0 ×) |" in text
+    assert "not measured: a third." in text

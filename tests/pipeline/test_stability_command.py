@@ -1,0 +1,60 @@
+"""`coursebuild stability`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from coursebuild.cli import main
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    (tmp_path / "content").mkdir()
+    (tmp_path / "content" / "course.toml").write_text("")
+    return tmp_path
+
+
+def test_text_then_json_from_what_is_kept(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["-C", str(course), "stability", "projectile"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("projectile  case 4: Projectile\n")
+    assert "reference (closed, known to 1e-15): x = v₀t + gt²/2" in out
+    assert "-0.04905" in out
+    assert "projectile: measured after" in err
+    assert main(["-C", str(course), "stability", "projectile", "--format", "json", "-q"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    (report,) = json.loads(out)
+    assert report["case"] == 4
+    assert report["reference"]["agreement"] < 1e-13
+    figures = {one["integrator"]: one for one in report["figures"]}
+    assert figures["Euler"]["exact"] == -0.04905
+    assert abs(figures["Euler"]["measured"] + 0.04905) < 1e-13
+    assert {one["integrator"] for one in report["errors"]} == set(figures)
+
+
+def test_measured_again_only_when_asked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["-C", str(course), "stability", "projectile"]
+    assert main(command) == 0
+    first = capsys.readouterr()
+    assert main(command) == 0
+    second = capsys.readouterr()
+    assert second.out == first.out
+    assert "measured after" not in second.err
+    assert main([*command, "--no-cache"]) == 0
+    assert "measured after" in capsys.readouterr().err
+
+
+def test_a_family_and_a_name_that_is_none(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
+    said = capsys.readouterr().err
+    assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in said
+    assert main(["-C", str(course), "stability", "stack-1", "stack-10", "-q"]) == 0
+    out = capsys.readouterr().out
+    assert [line.split()[0] for line in out.splitlines() if line[:1] not in (" ", "")] == [
+        "stack-1",
+        "stack-10",
+    ]

@@ -1,0 +1,47 @@
+"""Frames that are put together from pieces are those that the template gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from markupsafe import Markup
+
+from coursebuild.render.draft import Draft
+from coursebuild.render.frame import Frames, Names, frame_around
+from coursebuild.render.library import Library
+
+Make = Callable[..., Any]
+NAMES = Names("assets/s.css", "assets/t.js", "assets/p.js", "assets/i.svg", "assets/c.txt")
+HOSTILE = 'a "b" <c> & \x07 d\'s \ue000title\ue001 — é'
+
+
+def drafts() -> list[Draft]:
+    one = Draft("lessons/1.1-a.html", "lesson", "One", "What it is.", Markup())
+    return [
+        one,
+        replace(one, path="lessons/1.2-b.html", title="Two", json_ld=Markup('{"a":"<"}')),
+        replace(one, path="lessons/1.3-c.html", title=HOSTILE, description=HOSTILE),
+        replace(one, path="lessons/1.4-d.html", description="", og_type="article"),
+        replace(one, path="lessons/1.5-e.html", kind="stub", indexed=False),
+        replace(one, path="levels/1.html", kind="level", description=""),
+        replace(one, path="levels/2.html", kind="level"),
+        replace(one, path="models/a/b.html", kind="model"),
+        replace(one, path="about.html", kind="page"),
+        replace(one, path="index.html", kind="home", title="Bodies & <axes>"),
+        replace(one, path="404.html", kind="notfound", indexed=False),
+    ]
+
+
+@pytest.mark.parametrize("base_url", ["", "https://example.org/course/"])
+def test_they_are_the_same(make: Make, base_url: str) -> None:
+    made = make("Text.")
+    course = replace(made.course, base_url=base_url)
+    library = Library.of(course, made.results, made.assets)
+    frames = Frames(library, NAMES)
+    for live in (False, True, False):
+        for draft in drafts():
+            expected = frame_around(library, draft, NAMES, live=live)
+            assert frames.around(draft, live=live) == expected, draft

@@ -1,0 +1,77 @@
+"""What the shared files must know of a page, and pages settled."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.render.draft import Draft
+from coursebuild.render.shared import page_facts, settled
+
+PIECES = [
+    *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),
+    *("</math>", '<span style="color:red">', "</span>", "<!--", "-->", "<p>", "</p>", "&amp;"),
+    *(
+        "&am",
+        "p;",
+        "&notit;",
+        "&#955;",
+        "&#x3bb",
+        "&amp",
+        "(",
+        "“",
+        "”,",
+        ".",
+        "é",
+        "∂",
+        "a b",
+        "\n",
+    ),
+]
+html = st.lists(st.sampled_from(PIECES), max_size=20).map("".join)
+
+
+def draft(body: str) -> Draft:
+    return Draft("x.html", "page", "Títle", "", Markup(body))
+
+
+def glued(body: str) -> str:
+    """The same as `formulas.glue`, by its definition."""
+    formula = r"((?:<math>(?:(?!</math>).)*</math>)+)"
+    touching = re.compile(rf"""([(\[“‘"']*){formula}([,.;:!?)\]’”"'…%]*)""", re.DOTALL)
+    return touching.sub(held, body)
+
+
+def held(match: re.Match[str]) -> str:
+    before, formula, after = match.groups()
+    cut = [m.end() for m in re.finditer(r"</math>(?=<math>)", formula)]
+    if not before and not after:
+        return match[0]
+    if not cut:
+        return f'<span class="held">{match[0]}</span>'
+    start, middle, end = formula[: cut[0]], formula[cut[0] : cut[-1]], formula[cut[-1] :]
+    start = f'<span class="held">{before}{start}</span>' if before else start
+    end = f'<span class="held">{end}{after}</span>' if after else end
+    return start + middle + end
+
+
+@given(html)
+def test_formulas_are_held_to_what_touches_them_and_nothing_is_escaped(body: str) -> None:
+    body = body.replace("style=", "title=")
+    page, declarations = settled(draft(body))
+    assert (str(page.body), declarations) == (glued(body), frozenset())
+
+
+@given(html)
+def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
+    facts = page_facts(draft(body), frozenset({"color:red"}))
+    formula = re.compile(r"<math\b.*?</math>", re.DOTALL)
+    text = unescape(re.sub(r"<[^>]*>", "", formula.sub("", body)))
+    inside = "".join(unescape(re.sub(r"<[^>]*>", "", m)) for m in formula.findall(body))
+    assert facts.text == {*"Títle", *text}
+    assert facts.mathematics - {"\n"} == {*inside} - {"\n"}
+    assert facts.declarations == {"color:red"}

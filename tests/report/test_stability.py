@@ -1,0 +1,96 @@
+"""The report on the hard cases, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+
+from coursebuild.report import Style
+from coursebuild.report.stability import (
+    BoundaryLine,
+    CaseReport,
+    ErrorLine,
+    FigureLine,
+    OrderLine,
+    ReferenceLine,
+    stability_json,
+    stability_text,
+)
+
+TRIED = (1e-3, 10.0)
+
+
+def boundary(integrator: str, largest: float | None, **other: object) -> BoundaryLine:
+    fields: dict[str, object] = {
+        "theory": 0.2,
+        "formula": "hω = 2",
+        "difference": None if not largest else largest / 0.2 - 1,
+        "monotone": True,
+        "islands": (),
+        "beyond": "diverged",
+        "growth": None,
+        "searched": TRIED,
+    }
+    return BoundaryLine(integrator, largest, **(fields | other))  # type: ignore[arg-type]
+
+
+REPORT = CaseReport(
+    name="spring",
+    title="A spring",
+    case=5,
+    engine="3.14.0",
+    note="begins at rest",
+    reference=ReferenceLine("closed", "a textbook", 1e-13, "another", 2e-14),
+    boundaries=(
+        boundary("Euler", 0.2),
+        boundary("implicit", 0.2),
+        boundary("RK4", 0.25, monotone=False, islands=(0.4, 0.5), beyond="slow-growth", growth=1.5),
+        boundary("discrete", None, theory=None, difference=None, beyond=""),
+        boundary("none", 0.0, theory=0.0, formula="√(1+z²)"),
+    ),
+    figures=(
+        FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),
+        FigureLine("growth", "m", "RK4", None, None, "a law"),
+    ),
+    orders=(OrderLine("Euler", 1.0, None, 0.998), OrderLine("RK4", None, None, None)),
+    errors=(
+        ErrorLine("RK4", 0.5, "diverged", ("one", "two"), None, None, None, None, None, 0.0),
+        ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0),
+    ),
+)
+TEXT = """\
+spring  case 5: A spring
+  reference (closed, known to 1e-13): a textbook
+  second: another, which differs by 2.0e-14
+  begins at rest
+  largest stable     theory  difference  beyond       growth a step
+  0.2 s              0.2 s   +0.000 %    diverged                    Euler, implicit
+  0.25 s             0.2 s   +25.000 %   slow-growth  1.500000000    RK4
+  all to 10 s        all                                             discrete
+  none from 0.001 s  none                diverged                    none
+  RK4 is not monotone: stable again at 0.4, 0.5 s
+  growth      exact  difference
+  1.25 m      1 m    +2.5e-01    Euler
+  not finite                     RK4
+  order of position  of velocity
+  1.000              0.998        Euler
+  RK4 at 0.5 s: diverged: one; two
+"""
+
+
+def test_text_puts_integrators_with_equal_figures_together() -> None:
+    assert stability_text([REPORT], Style()) == TEXT
+
+
+def test_colour_marks_what_is_not_well() -> None:
+    text = stability_text([REPORT], Style(colour=True))
+    assert "\x1b[1;31mRK4 is not monotone" in text
+    assert "\x1b[1;33m  RK4 at 0.5 s: diverged" in text
+
+
+def test_json_has_every_column_and_no_number_that_is_none() -> None:
+    (found,) = json.loads(stability_json([REPORT, REPORT]))[:1]
+    assert found["boundaries"][3]["largest"] is None
+    assert found["boundaries"][2]["islands"] == [0.4, 0.5]
+    assert found["errors"][1]["position"] == [0.1, 0.01]
+    assert found["reference"]["agreement"] == 2e-14
+    assert found["engine"] == "3.14.0"
