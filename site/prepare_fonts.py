@@ -1,20 +1,18 @@
 """Cuts the fonts that come with the tool cut already: see `coursebuild/effects/prepared.py`.
 
-Run it after site/dist was made with other fonts, or after the way of cutting has changed:
+    python site/prepare_fonts.py FOLDER [OLD]
 
-    python site/prepare_fonts.py
-
-`tests/render/test_prepared.py` says when that is due.
+`site/bundle.py` calls it with the bundle that it makes, and the one that there was, from which the
+results are taken where nothing has changed.
 """
 
 import hashlib
 import json
+import shutil
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.effects.prepared import FOLDER
-from coursebuild.effects.resources import Bundle
 from coursebuild.render import fonts
 
 OFTEN = (
@@ -39,13 +37,13 @@ OFTEN = (
 """Code points that formulas use at all often."""
 
 
-def prepared() -> dict[str, bytes]:
+def prepared(bundle: Path) -> dict[str, bytes]:
     """The files, by name."""
-    bundle = Bundle()
     files: dict[str, bytes] = {}
     cuts: dict[str, str] = {}
     smaller: dict[str, dict[str, str]] = {}
-    faces = [(f, bundle[f"fonts/{f.file}"]) for f in fonts.read_faces(bundle["fonts/fonts.json"])]
+    listed = fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes())
+    faces = [(face, (bundle / "fonts" / face.file).read_bytes()) for face in listed]
     for job in fonts.font_jobs(faces, "".join(fonts.BASE), ""):
         files[job.face.file] = fonts.subset_font(job)
         cuts[job.key] = job.face.file
@@ -55,20 +53,37 @@ def prepared() -> dict[str, bytes]:
             files[face.file] = fonts.subset_font(fonts.FontJob(face, data, characters))
             name = f"{fonts.VERSION}/{hashlib.sha256(data).hexdigest()}"
             smaller[name] = {"file": face.file, "characters": characters}
-    listing = {"cuts": cuts, "smaller": smaller}
+    listing = {"made_from": made_from(bundle), "cuts": cuts, "smaller": smaller}
     text = json.dumps(listing, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
     return {**files, "fonts.json": text.encode()}
 
 
-def main() -> None:
-    """Write them."""
-    files = prepared()
-    for path in FOLDER.iterdir():
-        if path.name not in files:
-            path.unlink()
-    for name, data in files.items():
-        (FOLDER / name).write_bytes(data)
+def made_from(bundle: Path) -> str:
+    """A hash of the fonts and of what cuts them."""
+    digest = hashlib.sha256()
+    for path in (Path(__file__), Path(fonts.__file__), *sorted((bundle / "fonts").iterdir())):
+        digest.update(f"{path.name}\0".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def main(bundle: Path, old: Path | None) -> None:
+    """Write them into the bundle."""
+    target = bundle / "prepared"
+    if old is not None and is_from(old / "prepared" / "fonts.json", made_from(bundle)):
+        shutil.copytree(old / "prepared", target)
+        return
+    target.mkdir()
+    for name, data in prepared(bundle).items():
+        (target / name).write_bytes(data)
+
+
+def is_from(listing: Path, digest: str) -> bool:
+    """Whether there are files that were made from this."""
+    try:
+        return bool(json.loads(listing.read_bytes())["made_from"] == digest)
+    except (OSError, ValueError, KeyError):
+        return False
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(Path, sys.argv[1:2]), Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from typing import Any
 
 _OWN = "coursebuild"
+_UNSEEN = {"numpy.random.bit_generator": ("threading",)}
+"""What native code of a module imports and is there already, so that nothing of it is seen."""
 _NEEDED = frozenset(("__main__", "builtins", "sys"))
 
 
@@ -59,6 +61,8 @@ class Recorder:
         self._looked_for: dict[str, frozenset[str]] = {}
         self._seen = set(sys.modules)
         self._count = len(self._seen)
+        self._pending: list[str] = []
+        """What is being imported, outermost first."""
         self._bare_cache = dict(sys.path_importer_cache)
         self._bare_path = list(sys.path)
         for name in sorted(self._seen - bare):
@@ -111,14 +115,20 @@ class Recorder:
         """Top-level names of the modules that importing this one imports, or tries to."""
         known = self._looked_for.get(name)
         if known is None:
-            known = frozenset(each.partition(".")[0] for each in self._reached(name)) - self.bare
+            reached = {each.partition(".")[0] for each in self._reached(name)} - self.bare
+            known = frozenset(
+                each
+                for each in reached  # not what C code made up
+                if each not in self.modules or getattr(self.modules[each], "__spec__", None)
+            )
             self._looked_for[name] = known
         return known
 
     def _reached(self, name: str) -> set[str]:
         found, todo = {name}, [name]
         while todo:
-            new = self._edges.get(todo.pop(), {}).keys() - found
+            each = todo.pop()
+            new = {*self._edges.get(each, ()), *_UNSEEN.get(each, ())} - found
             found |= new
             todo += new
         return found
@@ -191,9 +201,11 @@ class Recorder:
             absolute = f"{base}.{name}" if name else base
         else:
             absolute = name
+        self._pending.append(absolute)
         try:
             module = self._import(name, globals, locals, fromlist, level)
         finally:
+            self._pending.pop()
             self._notice(absolute)
             while absolute:
                 edges[absolute] = None
@@ -206,7 +218,11 @@ class Recorder:
         return module
 
     def _notice(self, importer: str) -> None:
-        """Modules that are new belong to the one that was being imported."""
+        """Modules that are new belong to the one that was being imported.
+
+        One whose body is being executed belongs to whoever asked for it, unless that was C code:
+        then it belongs to the module that was asked for last.
+        """
         if len(sys.modules) == self._count:
             return
         edges = self._edges.setdefault(importer, {})
@@ -216,6 +232,8 @@ class Recorder:
             spec = getattr(sys.modules[name], "__spec__", None)
             if name != importer and not getattr(spec, "_initializing", False):
                 edges[name] = None
+            elif self._pending and not f"{name}.".startswith(f"{self._pending[-1]}."):
+                self._edges.setdefault(self._pending[-1], {})[name] = None
         self._count = len(sys.modules)
 
     def _record_exit(self, function: Callable[..., Any], *args: Any, **keywords: Any) -> Any:

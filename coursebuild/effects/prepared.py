@@ -1,13 +1,14 @@
 """Fonts that come with the tool cut already: those that nearly every course needs.
 
-Entry points: `prepared_cut`, `prepared_source`. `site/prepare_fonts.py` makes the files.
+Entry points: `prepared_cut`, `prepared_source`. `site/prepare_fonts.py` makes the files when
+site/dist is made.
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
 2. A large font is there a second time, cut to the characters that are used at all often. What is
    cut from it is, byte for byte, what would be cut from the whole font, in less than half the time.
 
-Where the bundled fonts, or the way of cutting, are others than when the files were made, no key is
-found, and everything is cut from the whole fonts.
+Where the way of cutting is another than when the files were made, no key is found, and everything
+is cut from the whole fonts.
 """
 
 from __future__ import annotations
@@ -15,16 +16,18 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).resolve().parents[1] / "prepared"
+from coursebuild.effects.resources import assets_dir
+
+FOLDER = "prepared"
+"""In the folder of the bundled files."""
 
 
 def prepared_cut(key: str) -> bytes | None:
     """The result of a job, by its key."""
     file: str | None = _listing()["cuts"].get(key)
-    return None if file is None else (FOLDER / file).read_bytes()
+    return None if file is None else (assets_dir() / FOLDER / file).read_bytes()
 
 
 def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
@@ -36,10 +39,14 @@ def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
     if found is None or not set(characters) <= set(found["characters"]):
         return None
     file: str = found["file"]
-    return (FOLDER / file).read_bytes()
+    return (assets_dir() / FOLDER / file).read_bytes()
 
 
 @functools.cache
 def _listing() -> dict[str, Any]:
-    listing: dict[str, Any] = json.loads((FOLDER / "fonts.json").read_text(encoding="utf-8"))
+    try:
+        text = (assets_dir() / FOLDER / "fonts.json").read_text(encoding="utf-8")
+    except FileNotFoundError:  # a bundle that somebody made without
+        return {"cuts": {}, "smaller": {}}
+    listing: dict[str, Any] = json.loads(text)
     return listing

@@ -81,6 +81,8 @@ def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> No
         make_private_folder(root / ".coursebuild")
         path = _file(root, place)
         path.parent.mkdir(exist_ok=True)
+        for left in path.parent.glob(".new-*"):  # by a run that was killed
+            left.unlink(missing_ok=True)
         name = f"{path.parent}/.new-{os.urandom(8).hex()}"
         try:
             with open(name, "xb") as file:  # noqa: PTH123

@@ -123,7 +123,8 @@ class PreviewServer:
         if self.site.changed.acquire(timeout=1.0):  # whoever holds it longer is no reason to wait
             self.site.changed.notify_all()
             self.site.changed.release()
-        self._server.shutdown()
+        if self._thread.ident is not None:  # otherwise nobody would hear of it
+            self._server.shutdown()
         self._server.server_close()
 
     # --- what the handler asks

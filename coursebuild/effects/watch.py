@@ -56,6 +56,9 @@ class Watcher:
         """Watch no longer."""
         self._stop.set()
         self._events.put(frozenset())
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(1.0)
 
     def watch_also(self, paths: frozenset[str]) -> None:
         """Files elsewhere that count as well, by POSIX path relative to the course's folder."""

@@ -1,6 +1,6 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `simulate`, `advance`, `watched`.
+Entry points: `compiled`, `simulate`, `advance`, `watched`, `refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
@@ -151,6 +151,33 @@ def simulate_model(problem: Problem, model: Any) -> Run:
     kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
     table = np.array(kept)
     return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement)
+
+
+def refsafe_active(model: Any) -> bool:
+    """Whether MuJoCo may soften a constraint because the timestep is long for its time constant.
+
+    Unless `refsafe` is off it raises time constants to two timesteps: that is stable, and another
+    model. Said of geoms that can touch, equalities, limits and dry friction.
+    """
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
+        return False
+    disabled = int(model.opt.disableflags)
+    touching = (model.geom_contype | model.geom_conaffinity) != 0
+    if disabled & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
+        touching = np.zeros(model.ngeom, dtype=bool)
+    constants = np.concatenate(
+        [
+            model.geom_solref[touching, 0],
+            model.pair_solref[:, 0],
+            model.eq_solref[:, 0],
+            model.jnt_solref[model.jnt_limited != 0, 0],
+            model.dof_solref[model.dof_frictionloss > 0, 0],
+            model.tendon_solref_lim[model.tendon_limited != 0, 0],
+            model.tendon_solref_fri[model.tendon_frictionloss > 0, 0],
+        ]
+    )
+    # A constant that is not positive is a stiffness, which is taken as it is.
+    return bool(np.any((constants > 0) & (constants < 2 * model.opt.timestep * (1 - 1e-12))))
 
 
 def begun(problem: Problem, model: Any) -> Any:

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from coursebuild.physics.detector import Judgement
-from coursebuild.physics.engine import Run, compiled, motion_of, simulate
+from coursebuild.physics.engine import Run, compiled, motion_of, refsafe_active, simulate
 from coursebuild.physics.problem import STANDARD, Array, Integrator, Motion, Problem, Reference
 from coursebuild.physics.rotation import angle_between
 from coursebuild.values import dataclass
@@ -71,6 +71,8 @@ class Measurement:
     """Largest change of the angular momentum, relative to its size at the beginning."""
     penetration: float
     """Deepest contact, m."""
+    refsafe: bool
+    """Whether MuJoCo softened constraints for this timestep: what was measured is another model."""
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> Measurement:
@@ -98,6 +100,7 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> Measur
         energy_drift(run) if problem.energy_conserved else None,
         momentum_drift(run) if problem.momentum_conserved else None,
         run.penetration,
+        refsafe_active(compiled(problem.mjcf, integrator, timestep)),
     )
 
 

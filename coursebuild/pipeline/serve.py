@@ -16,6 +16,7 @@ import sys
 import threading
 
 from coursebuild.effects.errors import EffectError
+from coursebuild.effects.leaving import leave
 from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
@@ -72,7 +73,7 @@ class Site:
 
 
 def serve(options: Options, port: int) -> None:
-    """Serve until interrupted, which is how a preview ends."""
+    """Serve until interrupted, which is how a preview ends, and this process with it."""
     progress = Progress(quiet=options.quiet)
     live = live_course(options)
     bundled = dict(bundled_files())
@@ -98,8 +99,9 @@ def serve(options: Options, port: int) -> None:
     finally:
         watcher.stop()
         server.stop()
-        live.parts.close()
+        live.close()
         sys.setswitchinterval(before)
+    leave(0)
 
 
 def live_course(options: Options) -> LiveCourse:

@@ -125,6 +125,7 @@ def _measured(name: str) -> CaseReport:
             _finite(one.energy_drift),
             _finite(one.momentum_drift),
             one.penetration,
+            one.refsafe,
         )
         for rows in found.values()
         for one in rows

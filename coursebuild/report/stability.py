@@ -16,6 +16,7 @@ from coursebuild.report.text import Style
 from coursebuild.values import dataclass
 
 _BOLD, _RED, _YELLOW = "1", "1;31", "1;33"
+_ORDERS = ("order of position", "order of attitude", "order of velocity")
 _BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step")
 
 
@@ -78,6 +79,8 @@ class ErrorLine:
     momentum_drift: float | None
     penetration: float
     """m."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +156,11 @@ def _case(report: CaseReport, style: Style) -> str:
         if (o.position, o.attitude, o.velocity) != (None, None, None)
     ]
     if fitted:
-        lines += _table(("order of position", "of attitude", "of velocity"), _merged(fitted))
+        lines += _table(_ORDERS, _merged(fitted))
+    softened = sorted({line.timestep for line in report.errors if line.refsafe})
+    if softened:
+        shown = ", ".join(f"{h:g}" for h in softened)
+        lines.append(f"  refsafe softens constraints at {shown} s: that is another model")
     lost = [line for line in report.errors if line.status != "ok"]
     for line in lost:
         why = "; ".join(line.reasons)

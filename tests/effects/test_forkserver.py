@@ -28,6 +28,13 @@ PROBES = {
     "modules": "import sys\nprint(sorted(sys.modules))\n",
     "modules of numpy": "import sys, numpy\nprint(sorted(sys.modules))\n",
     "modules of mujoco": "import sys, mujoco\nprint(sorted(sys.modules))\n",
+    "modules of numpy.random": "import sys, numpy.random\nprint(sorted(sys.modules))\n",
+    "modules of numpy.random, late": """
+        import sys, numpy as np
+        before = set(sys.modules)
+        print(np.random.default_rng(1).random(2))
+        print(sorted(set(sys.modules) - before), "secrets" in sys.modules)
+    """,
     "modules one after another": """
         import sys
         for name in ("re", "json", "numpy.linalg", "logging", "numpy.testing", "mujoco",

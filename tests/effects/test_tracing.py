@@ -203,6 +203,7 @@ class TestImports:
     def test_forked_and_spawned_agree(self, root: Path) -> None:
         (root / "examples/x.py").write_text(
             "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
+            "numpy.random.rand()\n"
         )
         jobs = [ScriptJob("examples/x.py", (), 60.0, (), False)]
         traces = []

@@ -44,6 +44,11 @@ def test_the_node_for_builds_is_the_declared_one(root: Path, pyproject: dict) ->
     assert requirements(pyproject)[name] == version
 
 
+def test_fonts_are_cut_when_bundling_with_what_cuts_them_later(root: Path, pyproject: dict) -> None:
+    needed = runpy.run_path(str(root / "site" / "bundle.py"))["FONT_REQUIREMENTS"]
+    assert {*needed} <= {*pyproject["project"]["dependencies"]}
+
+
 def test_npm_requirements_are_exact(root: Path) -> None:
     declared = manifest(root)
     versions = declared["dependencies"] | declared["devDependencies"]

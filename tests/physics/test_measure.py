@@ -222,7 +222,8 @@ def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
 def test_a_cradle_that_touches_is_another_problem() -> None:
     exact = touching_cradle.integrated(np.array([0.06])).velocity[0]
     assert np.sum(exact) == pytest.approx(1.0, rel=1e-12)  # momentum
-    assert np.sum(exact**2) == pytest.approx(1.0, rel=1e-9)  # energy
+    # The contact that opens first still pushed: its part of the energy is lost.
+    assert np.sum(exact**2) == pytest.approx(0.998656, abs=1e-6)
     assert exact[0] < -0.3
     assert exact[2] < 0.75
     found = [touching_cradle.last_velocity(Integrator.RK4, ball) for ball in range(3)]

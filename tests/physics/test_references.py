@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import decimal
 import re
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coursebuild.physics.engine import compiled, motion_of
+from coursebuild.physics.extrapolation import State, integrate
 from coursebuild.physics.problem import Integrator, Problem
 from coursebuild.physics.problems import agreement, all_problems, problem_named, problem_names
 from coursebuild.physics.problems import tumbling_box as box
@@ -69,6 +72,24 @@ def test_the_boxs_closed_form_conserves_energy_and_momentum(nudge: float) -> Non
     start = np.array([nudge, box.SPIN, 0.0])
     assert np.max(np.abs(energy / (start**2 @ inertia) - 1)) < 1e-13
     assert np.max(np.abs(momentum / np.linalg.norm(start * inertia) - 1)) < 1e-13
+
+
+@pytest.mark.parametrize("nudge", box.NUDGES)
+def test_the_boxs_closed_form_agrees_with_thirty_digits(nudge: float) -> None:
+    form = box.Tumbling(nudge, box.SPIN)
+    times = np.array([0.5, 1.0, 1.5, 2.0, 2.2]) * form.first_crossing
+    with decimal.localcontext(decimal.Context(prec=30)):
+        i1, i2, i3 = (Decimal(moment) for moment in box.moments().tolist())
+        ratios = ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)
+
+        def rate(w: State) -> State:
+            products = (w[1] * w[2], w[2] * w[0], w[0] * w[1])
+            return np.array([r * p for r, p in zip(ratios, products, strict=True)], dtype=object)
+
+        start = np.array([Decimal(nudge), Decimal(box.SPIN), Decimal(0)], dtype=object)
+        exact = integrate(rate, start, times, 1e-24, columns=12).astype(float)
+    assert np.max(np.abs(form.omega(times) - exact)) < 1e-10
+    assert abs(exact[1, 1]) < 1e-10  # the first crossing
 
 
 def test_problems_are_small_models() -> None:

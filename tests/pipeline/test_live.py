@@ -57,7 +57,7 @@ class Live:
 
     def close(self) -> None:
         self.behind.close()
-        self.course.parts.close()
+        self.course.close()
 
     def wrong(self) -> list[str]:
         return sorted(d.rule for d in self.course.diagnostics() if d.severity.value == "error")

@@ -680,6 +680,17 @@ def test_it_ends_while_scripts_run(make: Make, number: int) -> None:
     wait_until_alone(folder)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_while_the_course_is_read(make: Make, number: int) -> None:
+    folder = make(*(GOOD.replace("hello.py", f"hello{n}.py") + "$x$\n" * 500 for n in range(6)))
+    with serving(folder) as preview:  # it has said where it will serve
+        preview.process.send_signal(number)
+        assert preview.process.wait(10) == 0
+        preview._reader.join(5)
+        assert preview.said[-1] == "stopped"
+        assert "Traceback" not in "\n".join(preview.said)
+
+
 def test_the_port_is_free_again(make: Make) -> None:
     folder = make(GOOD)
     with serving(folder) as preview:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from coursebuild.effects.prepared import FOLDER, prepared_cut, prepared_source
+from coursebuild.effects.resources import assets_dir
 from coursebuild.render import Assets
 from coursebuild.render.fonts import BASE, MATH, VERSION, FontJob, font_jobs, read_faces
 from coursebuild.render.fonts import subset_font as cut
@@ -17,9 +18,9 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_they_are_up_to_date() -> None:
-    """If not, run `python site/prepare_fonts.py`."""
-    made = runpy.run_path(str(ROOT / "site" / "prepare_fonts.py"))["prepared"]()
-    there = {path.name: path.read_bytes() for path in FOLDER.iterdir()}
+    """If not, run `python site/bundle.py`."""
+    made = runpy.run_path(str(ROOT / "site" / "prepare_fonts.py"))["prepared"](assets_dir())
+    there = {path.name: path.read_bytes() for path in (assets_dir() / FOLDER).iterdir()}
     assert there.keys() == made.keys()
     assert [name for name in made if made[name] != there[name]] == []
 

@@ -53,8 +53,8 @@ REPORT = CaseReport(
     ),
     orders=(OrderLine("Euler", 1.0, None, 0.998), OrderLine("RK4", None, None, None)),
     errors=(
-        ErrorLine("RK4", 0.5, "diverged", ("one", "two"), None, None, None, None, None, 0.0),
-        ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0),
+        ErrorLine("RK4", 0.5, "diverged", ("one", "two"), None, None, None, None, None, 0.0, True),
+        ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),
     ),
 )
 TEXT = """\
@@ -71,8 +71,9 @@ spring  case 5: A spring
   growth      exact  difference
   1.25 m      1 m    +2.5e-01    Euler
   not finite                     RK4
-  order of position  of velocity
-  1.000              0.998        Euler
+  order of position  order of velocity
+  1.000              0.998              Euler
+  refsafe softens constraints at 0.5 s: that is another model
   RK4 at 0.5 s: diverged: one; two
 """
 

@@ -247,8 +247,6 @@ def problems() -> tuple[Problem, ...]:
             ),
             timesteps=tuple(0.01 / n for n in (16, 32, 64, 128, 256, 512)),
             figures=_restitutions(),
-            search=(CONTACT / 100, 3 * CONTACT),
-            steps=400,
             smooth=False,
             note="an impact begins within a step: no order is to be expected",
         ),

@@ -4,7 +4,8 @@ Entry point: `problem()`.
 
 Each contact is a spring, but their forces are found together: f minimizes the solver's cost, which
 for the active contacts means (A + R) f = a_ref with A = J M⁻¹ Jᵀ, R = diag(A) (1 − d)/d and
-a_ref = −k d r for violations r. The first ball does not come to rest, and the middle one moves.
+a_ref = −k d r for violations r. The first ball does not come to rest, and the middle one moves. A
+contact that opens while the other one is loaded still pushes: 0.13 % of the energy is lost with it.
 
 1. The first reference integrates these equations, kinks and all, in small steps.
 2. The second goes from event to event: between them the motion is linear, and a matrix exponential
@@ -75,6 +76,8 @@ def integrated(times: Array) -> Motion:
     place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
     flying = times <= begin
     place[flying, 0], speed[flying, 0] = SPEED * times[flying], SPEED
+    if flying.all():
+        return motion_without_attitude(times, place, speed)
     states = integrate(_rate, start, times[~flying] - begin, 1e-14, columns=4, first=1e-6)
     place[~flying], speed[~flying] = states[:, :3], states[:, 3:]
     return motion_without_attitude(times, place, speed)

@@ -20,12 +20,21 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
-from coursebuild.checks import Places, anchors, check_document, places
-from coursebuild.diagnostics import Diagnostic, Parsed, Severity
+from coursebuild.checks import Places, check_document, places
+from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.read import read_sources
-from coursebuild.model import Course, Document, Lesson, Page, Quiz, Script, document_blocks
+from coursebuild.model import Course, Document, Lesson
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
+from coursebuild.pipeline.preview.differences import (
+    changed_runs,
+    has_errors,
+    offered,
+    renewed_places,
+    same_course,
+    same_frame,
+    with_owners,
+)
 from coursebuild.pipeline.preview.memo import Parsing, PerDocument
 from coursebuild.pipeline.preview.pages import Drawn, Pages, draw, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
@@ -33,7 +42,7 @@ from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library, Owner, owners
-from coursebuild.results import CompileResult, LabResult, ScriptRun
+from coursebuild.results import CompileResult, LabResult
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 
@@ -105,7 +114,7 @@ class LiveCourse:
         """Others that were drawn."""
         self._skeletons: dict[str, tuple[_Asked, Parsed[Document]]] = {}
         """What `documents` gave, by path."""
-        self._offers = PerDocument(_offers)
+        self._offers = PerDocument(offered)
         self._reading = threading.Lock()
         self._found: dict[str, tuple[Diagnostic, ...]] = {}
         """What reading and checking found, by file."""
@@ -114,6 +123,12 @@ class LiveCourse:
         """Ids of lessons and pages, by the path of their file."""
         self._sites: dict[str, str] = {}
         """Site paths, by the same."""
+
+    def close(self) -> None:
+        """End what typesets formulas: a process that ends with it running may hang."""
+        with self.changed:
+            self.parts.close()
+            self.documents.__exit__(None, None, None)
 
     # --- what may be asked
 
@@ -190,16 +205,18 @@ class LiveCourse:
         assert old is not None and known is not None and before is not None
         if not fresh:
             return Plan(self.edits, old, before, known, {}, {}, None, frozenset(), {})
-        course = _with_owners(old, fresh)
+        course = with_owners(old, fresh)
         library = self.parts.renewed(before, course, fresh)
-        known = _renewed(known, fresh, library)
+        known = renewed_places(known, fresh, library)
         scripts = {path: script for path, (script, _) in library.scripts.items()}
         documents = {o.path: o.document for o in fresh if o.document is not None}
         self.parts.typeset(documents.values())
         drawn: dict[str, tuple[Drawn, bytes]] = {}
         for path, document in documents.items():
             found[path] += check_document(course, document, known, scripts)
-            if not _wrong(found[path]) and not _wrong(self.parts.formula_mistakes(document)):
+            if not has_errors(found[path]) and not has_errors(
+                self.parts.formula_mistakes(document)
+            ):
                 page = draw(self.pages.painter(self._sites[path]), library)
                 drawn[self._sites[path]] = page, self.pages.framed(page, library)
         pairs = [(self._document(path), document) for path, document in documents.items()]
@@ -245,11 +262,11 @@ class LiveCourse:
         document = self.pages.document(path)
         if document is None:
             return True
-        if _wrong(self._found.get(document.source.path, ())):
+        if has_errors(self._found.get(document.source.path, ())):
             return False
         whole = self._whole(document)
         self.parts.typeset([whole])
-        return not _wrong(self.parts.formula_mistakes(whole))
+        return not has_errors(self.parts.formula_mistakes(whole))
 
     def _whole(self, document: Document) -> Document:
         """A document with its text, given that or what others look at in it."""
@@ -306,11 +323,11 @@ class LiveCourse:
             static[path] = (*static.get(path, ()), diagnostic)
         told_before = {path: told for path, told in self._found.items() if told}
         old, new = self.course, loaded.course
-        moved = new is not None and (old is None or not _same(old, new))
+        moved = new is not None and (old is None or not same_course(old, new))
         if not moved and static == told_before:
             return False
         for path, told in static.items():
-            if _wrong(told) and path in self._sites:
+            if has_errors(told) and path in self._sites:
                 self.pages.hold(self._sites[path])
         self._found = static
         if new is not None and moved:
@@ -318,7 +335,7 @@ class LiveCourse:
             stale = None
             self._ids = {owner.path: owner.id for owner in owners(new)}
             self._sites = site_paths(new)
-            if old is not None and _same_frame(old, new):
+            if old is not None and same_frame(old, new):
                 pairs = zip(old.documents, new.documents, strict=True)
                 changed = [(one, two) for one, two in pairs if one is not two]
                 stale = self._stale(changed, new, library)
@@ -341,7 +358,7 @@ class LiveCourse:
             stale |= {site, *self._models_of_both(before, document)}
         drawn_from = self.library
         if drawn_from is not None:
-            stale |= self._leaning(new, _changed_keys(drawn_from.runs, library.runs))
+            stale |= self._leaning(new, changed_runs(drawn_from.runs, library.runs))
             if len(drawn_from.scripts) != len(library.scripts):
                 stale.add(urls.HOME)  # it says how many there are
         return stale
@@ -373,7 +390,7 @@ class LiveCourse:
             self.parts.runs |= {ran.job.path: ran for ran in runs}
             if self.course is not None and self.library is not None:
                 library = self.parts.library(self.course)
-                changed = _changed_keys(self.library.runs, library.runs)
+                changed = changed_runs(self.library.runs, library.runs)
                 self.pages.renew(library, self._leaning(self.course, changed))
                 self.tell()
 
@@ -396,61 +413,3 @@ class LiveCourse:
             documents = (d for d in self.course.documents if self.parts.has_labs(d))
             self.pages.renew(library, {self._sites[d.source.path] for d in documents})
             self.tell()
-
-
-def _offers(document: Document) -> tuple[object, ...]:
-    """What other documents may refer to, or clash with."""
-    blocks = tuple(document_blocks(document))
-    quizzes = tuple(block.id for block in blocks if isinstance(block, Quiz))
-    scripts = tuple((block.path, block.norun) for block in blocks if isinstance(block, Script))
-    return anchors(document), quizzes, scripts
-
-
-def _wrong(diagnostics: Iterable[Diagnostic]) -> bool:
-    return any(d.severity is Severity.ERROR for d in diagnostics)
-
-
-def _with_owners(course: Course, fresh: Iterable[Owner]) -> Course:
-    """The course with other lessons and pages in the places of those with their ids."""
-    lessons = {owner.id: owner for owner in fresh if isinstance(owner, Lesson)}
-    pages = {owner.id: owner for owner in fresh if isinstance(owner, Page)}
-    touched = {lesson.level for lesson in lessons.values()}
-    levels = tuple(
-        replace(level, lessons=tuple(lessons.get(old.id, old) for old in level.lessons))
-        if level.id in touched
-        else level
-        for level in course.levels
-    )
-    return replace(course, levels=levels, pages=tuple(pages.get(p.id, p) for p in course.pages))
-
-
-def _renewed(known: Places, fresh: Iterable[Owner], library: Library) -> Places:
-    """What there is to link to, now that some documents are others."""
-    lessons = {owner.id: owner.document for owner in fresh if isinstance(owner, Lesson)}
-    pages = {owner.id: owner.document for owner in fresh if isinstance(owner, Page)}
-    return replace(
-        known,
-        lessons={**known.lessons, **lessons},
-        pages={**known.pages, **pages},
-        scripts=frozenset(library.scripts),
-    )
-
-
-def _changed_keys(old: Mapping[str, ScriptRun], new: Mapping[str, ScriptRun]) -> frozenset[str]:
-    return frozenset(path for path in old.keys() | new.keys() if old.get(path) is not new.get(path))
-
-
-def _same(old: Course, new: Course) -> bool:
-    """Whether two readings gave the same course."""
-    pairs = zip(old.documents, new.documents, strict=False)
-    return _same_frame(old, new) and all(one is two for one, two in pairs)
-
-
-def _same_frame(old: Course, new: Course) -> bool:
-    """Whether two readings differ in nothing but the texts of documents."""
-    return (
-        old.map.text == new.map.text
-        and old.models == new.models
-        and old.files == new.files
-        and [d.source.path for d in old.documents] == [d.source.path for d in new.documents]
-    )

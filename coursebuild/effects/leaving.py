@@ -1,0 +1,21 @@
+"""The end of this process, at once.
+
+Entry point: `leave(status)`. Python gives all its memory back before it exits, object by object:
+for a large course in memory that takes seconds, in which nobody sees why Ctrl-C does nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from typing import NoReturn
+
+
+def leave(status: int) -> NoReturn:
+    """Exit, once streams are flushed; whoever calls has ended all else that others can see."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:  # there is none where the tool was started without one
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+    os._exit(status)
