@@ -89,6 +89,8 @@ def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
         sites = []
         if "builds" in parts:
             sites = measure_builds(there, size, turns, work, places, say)
+            report.add_sites(sites, size)
+            keep(arguments, report.as_json())
         if "serve" in parts:
             known = {site.tool.key for site in sites}
             more = [t for t in there if t.serve is not None and t.key not in known]

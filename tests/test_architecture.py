@@ -83,7 +83,7 @@ IO_MODULES = {
     "multiprocessing",
     "signal",
 }
-PURE = ("syntax", "checks", "scripts", "labs", "render", "report", "model")
+PURE = ("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model")
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,9 @@ class Report:
     failed: list[str] = field(default_factory=list)
 
     def add_sites(self, sites: list[Site], lessons: int) -> None:
-        """Take over what was found at one size."""
+        """Take over what was found at one size, in the place of what was known before."""
+        self.figures = [figure for figure in self.figures if figure.lessons != lessons]
+        self.failed = [text for text in self.failed if f" {lessons} lessons)" not in text]
         for site in sites:
             if site.failed:
                 self.failed.append(f"{site.tool.title} ({site.failed}, {lessons} lessons)")

@@ -204,6 +204,7 @@ class ScriptServer:
     def _idle_worker(self, work: _Work) -> Worker | None:
         while self._idle:
             worker = self._idle.pop()
+            worker.rested = True
             if worker.environment == work.environment and worker.is_there():
                 return worker
             worker.close()
@@ -237,6 +238,8 @@ class _Work:
         self.waiting = [i for i in order or range(len(jobs)) if i not in self.runs]
         self.total = len(self.waiting)
         self.done = 0
+        self.told: set[int] = set()
+        """The jobs whose start was told."""
         self._packages: tuple[str, ...] | None = None
 
     def packages(self) -> tuple[str, ...]:
@@ -250,7 +253,9 @@ class _Work:
         if not self.waiting:
             return
         index = self.waiting.pop(0)
-        self.tell(RunStarted(self.jobs[index].path, self.total))
+        if index not in self.told:
+            self.told.add(index)
+            self.tell(RunStarted(self.jobs[index].path, self.total))
         worker.give(index, self._message(self.jobs[index]))
 
     def hear(self, worker: Worker) -> bool:
@@ -258,10 +263,14 @@ class _Work:
         if not worker.read():
             if worker.job is not None:
                 index, worker.job = worker.job, None
+                if worker.rested:  # it may have been as good as gone before it was given the job
+                    self.waiting.insert(0, index)
+                    return False
                 self._finish(index, _lost(self.jobs[index].path, worker.status()))
             return False
         if worker.job is not None and (report := worker.take_report()) is not None:
             index, worker.job = worker.job, None
+            worker.rested = False
             self._finish(index, _script_run(self.jobs[index].path, *report))
             self.next(worker)
         return True

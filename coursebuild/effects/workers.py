@@ -45,6 +45,8 @@ class Worker:
         self.reports = reports
         self.job: int | None = None
         """What it works on: the index of a job."""
+        self.rested = False
+        """Whether it is as it was left by an earlier run, and has reported nothing since."""
         self._buffer = bytearray()
 
     def fileno(self) -> int:

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -349,9 +350,13 @@ def root(tmp_path: Path) -> Path:
 
 def bare(root: Path, path: str) -> tuple[str, str, int]:
     """What Python itself makes of a script."""
-    temporary = root / "bare"
-    temporary.mkdir()
-    environment = clean_environment(os.environ) | {"TMPDIR": str(temporary)}
+    # As short as the runner's own: the path of a socket in it must not have many characters.
+    with tempfile.TemporaryDirectory(prefix="bare-", dir="/tmp") as temporary:
+        return _bare(root, path, temporary)
+
+
+def _bare(root: Path, path: str, temporary: str) -> tuple[str, str, int]:
+    environment = clean_environment(os.environ) | {"TMPDIR": temporary}
     if subprocess.run(
         [sys.executable, "-P", "-c", "import mjcourse"], capture_output=True, cwd="/"
     ).returncode:

@@ -107,7 +107,8 @@ def tried(root: Path, *labs: dict[str, Any]) -> list[LabResult]:
     assert loaded.course is not None and not loaded.diagnostics, loaded.diagnostics
     options = Options(root=root, jobs=1, quiet=True)
     results, found = try_labs(loaded.course, {}, options, Engines(root))
-    assert found == ()
+    # A start that is random every time is told, and is no error.
+    assert all(d.rule == "lab-reset" and "random" in fences for d in found)
     return list(results)
 
 

@@ -2,10 +2,10 @@
 
 A case names a smallest course that breaks the rule (see `scratch`) and all diagnostics that the
 tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which command finds
-the mistake, where it is not `check`. `{package.module.name = value}` in a title gives a constant another value, and
-`{package.module.name() = value}` a function another result, for what no course can bring about, or
-not in time. `pytest tests/rules --rewrite-fixtures` writes the expected parts and
-`docs/rules.md` anew.
+the mistake, where it is not `check`. `{package.module.name = value}` in a title gives a constant
+another value, and `{package.module.name() = value}` a function another result, for what no course
+can bring about, or not in time. `pytest tests/rules --rewrite-fixtures` writes the expected parts
+and `docs/rules.md` anew.
 """
 
 from __future__ import annotations
