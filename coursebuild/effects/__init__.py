@@ -1,13 +1,39 @@
 """The only I/O: everything else takes values and gives values.
 
-- `read`: the course's files, as sources
-- `examples`, `write`, `site_swap`, `locks`: what the tool writes, so that killing it at any instant
-  loses nothing
-- `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what they do is in
-  `forkserver` (with `warm`, `interpreter`, `preload`, `ending`), `supervisor` (with `watching`,
-  `required`), `tracing` (with `mujoco_tracing`, `mujoco_files`, `spawned`, `notes`); what scripts
-  find around them is in `surroundings`
-- `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
+The course's files:
+
+- `place`, `read`: where a course is, and its files as sources
+- `examples`, `write`, `site_swap` (with `exchange`, `published`), `locks`: what the tool writes, so
+  that killing it at any instant loses nothing
+- `errors`: what can go wrong with all that
+
+Scripts:
+
+- `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what scripts find
+  around them is in `surroundings`
+- what these processes do: `forkserver` (with `warm`, `interpreter`, `preload`, `ending`),
+  `supervisor` (with `watching`, `required`), `spawned`
+- what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made dependencies of by
+  `notes`
+- `dask_runner` (with `dask_task`): the same on a cluster
+
+What is kept:
+
+- `store` (with `prune`), `shared`: results, here and for others
+- `conditions`, `digests`, `installed`, `code`, `tool`: what results depend on, as it is now
+- `stamp`: whether there is anything to do
+- `prepared`: fonts that come cut with the tool
+
+Engines and processes:
+
 - `v8` (with `typeset.js`): formulas to MathML
-- `resources`, `versions`: what is installed
+- `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
+- `lab_engine` (with `lab_pieces.js`), `native` (with `native_worker`): labs in the browser's engine,
+  and beside it
+- `child`, `pool`: processes that answer, and copies of this one
+- `leaving`: the end of this process
+
+The preview: `server`, `watch`.
+
+What is installed: `resources`, `versions`, `packages`.
 """
