@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 
 from coursebuild.cli.arguments import parser
 from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
-from coursebuild.effects.errors import EffectError, PublishRefusedError
+from coursebuild.effects.errors import EffectError, PublishRefusedError, UsageError
 
 
 class _Terminated(KeyboardInterrupt):
@@ -55,8 +55,6 @@ def _heed_sigterm() -> Any:
 def _main(arguments: Sequence[str] | None) -> int:
     _utf8_streams()
     options = parser().parse_args(arguments)
-    from coursebuild.pipeline.options import UsageError
-
     try:
         command: Callable[[argparse.Namespace], int] = options.command
         return command(options)

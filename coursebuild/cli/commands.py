@@ -86,8 +86,10 @@ def _unless_unchanged(
     from coursebuild.effects.stamp import Watcher, unchanged
 
     colour, columns = look(sys.stdout)
-    shared = arguments.cache or os.environ.get("COURSEBUILD_CACHE", "")
-    command = (*command, str(arguments.quiet), str(colour), str(columns), shared)
+    given = [arguments.quiet, colour, columns, arguments.cache, arguments.cache_size]
+    given += [getattr(arguments, "executor", None)]
+    given += [os.environ.get(name) for name in ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")]
+    command = (*command, *map(repr, given))
     root = arguments.root or course_above(".")
     said = None
     if root and not arguments.no_cache:

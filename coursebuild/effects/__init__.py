@@ -28,8 +28,8 @@ Engines and processes:
 
 - `v8` (with `typeset.js`): formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
-- `lab_engine` (with `lab_pieces.js`), `native` (with `native_worker`): labs in the browser's engine,
-  and beside it
+- `lab_engine` (with `lab_pieces.js`), `native` (with `native_worker`): labs in the browser's engine
+  and natively
 - `child`, `pool`: processes that answer, and copies of this one
 - `leaving`: the end of this process
 

@@ -44,7 +44,9 @@ def is_dask(url: str) -> bool:
 
     `dask://HOST:PORT`, or `dask+tls://` with the certificates that Dask is configured with.
     """
-    return url.partition("://")[0] in _SCHEMES
+    scheme, _, place = url.partition("://")
+    host, _, port = place.rpartition(":")
+    return scheme in _SCHEMES and bool(host) and port.isdecimal() and int(port) < 65536
 
 
 def run_on_dask(

@@ -33,6 +33,10 @@ class PublishRefusedError(EffectError):
     """The place where the site should go holds something that a site must not replace."""
 
 
+class UsageError(Exception):
+    """The command was called in a way that cannot be; its text is for the user. Exit status 2."""
+
+
 def reason(error: OSError) -> str:
     """The system's words for an error: `no space left on device`."""
     text = os.strerror(error.errno) if error.errno else str(error)

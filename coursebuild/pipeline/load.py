@@ -187,22 +187,25 @@ class _Loader:
                 self.found.append(found)
 
     def _pages(self, pages: tuple[Page, ...]) -> tuple[Page, ...]:
-        return tuple(self._page(page) for page in pages)
+        # Such as lie elsewhere were not read with the course.
+        paths = (page.path for page in pages)
+        away = [path for path in paths if path not in self.files.unreadable]
+        away = [p for p in away if p not in self.sources and (self.root / p).exists()]
+        read = read_sources(self.root, away)
+        self.found += read.diagnostics
+        self._announce((), read.value)
+        others = {source.path: source for source in read.value}
+        return tuple(self._page(page, others) for page in pages)
 
-    def _page(self, page: Page) -> Page:
-        source = self.sources.get(page.path)
-        if source is None and page.path not in self.files.unreadable:
-            if not (self.root / page.path).exists():
-                message = f"there is no file {page.path}"
-                help = "write it, or take the page out of the map"
-                self._report("page-missing", page, message, help)
-                return page
-            read = read_sources(self.root, [page.path])
-            self.found += read.diagnostics
-            source = next(iter(read.value), None)
-        if source is None:
-            return page
-        return replace(page, document=self._document(source, lesson=False))
+    def _page(self, page: Page, others: Mapping[str, Source]) -> Page:
+        source = self.sources.get(page.path) or others.get(page.path)
+        if source is not None:
+            return replace(page, document=self._document(source, lesson=False))
+        if page.path not in self.files.unreadable and not (self.root / page.path).exists():
+            message = f"there is no file {page.path}"
+            help = "write it, or take the page out of the map"
+            self._report("page-missing", page, message, help)
+        return page
 
     def _others(self, course: Course) -> tuple[str, ...]:
         """The files that a page may show or link to: all but the map, the lessons and the pages."""

@@ -12,15 +12,12 @@ from pathlib import Path
 
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
+from coursebuild.effects.errors import UsageError as UsageError
 from coursebuild.effects.read import find_root
 from coursebuild.effects.shared import shared_cache
 from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
 from coursebuild.values import dataclass
-
-
-class UsageError(Exception):
-    """The command was called in a way that cannot be; its text is for the user. Exit status 2."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,6 +87,7 @@ def unchanged_report(report: Report, remark: str) -> Report:
         report,
         scripts=tuple(replace(line, cached=True) for line in report.scripts),
         labs=tuple(replace(line, cached=True) for line in report.labs),
+        summary=replace(report.summary, cached=report.summary.ran),
         remarks=(remark,),
     )
 

@@ -242,7 +242,7 @@ def test_every_rule_on_the_page_exists() -> None:
     assert sorted(rules - RULES.keys()) == []
 
 
-COMMANDS = ["build", "check", "update", "extract", "serve", "schema"]
+COMMANDS = ["build", "check", "update", "extract", "serve", "explain", "stability", "schema"]
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])
@@ -254,6 +254,6 @@ def test_every_command_and_option_is_named(
     assert left.value.code == 0
     told = capsys.readouterr().out
     if not command:
-        assert re.findall(r"^    (\w+) ", told, re.MULTILINE) == COMMANDS
+        assert re.findall(r"^    (\w+)(?: |$)", told, re.MULTILINE) == COMMANDS
     options = set(re.findall(r"(?<![\w-])--[a-z-]+", told))
     assert [option for option in sorted(options) if not quoted(option)] == []

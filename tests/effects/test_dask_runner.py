@@ -290,7 +290,15 @@ def test_dask_is_optional(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("url", "is_one"),
-    [("dask://h:1", True), ("dask+tls://h:1", True), ("h:1", False), ("ssh://h", False)],
+    [
+        ("dask://h:1", True),
+        ("dask+tls://h:1", True),
+        ("h:1", False),
+        ("dask://h", False),
+        ("dask://:1", False),
+        ("dask://h:99999", False),
+        ("ssh://h", False),
+    ],
 )
 def test_addresses(url: str, is_one: bool) -> None:
     assert is_dask(url) is is_one
