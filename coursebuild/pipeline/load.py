@@ -193,7 +193,8 @@ class _Loader:
         away = [p for p in away if p not in self.sources and (self.root / p).exists()]
         read = read_sources(self.root, away)
         self.found += read.diagnostics
-        self._announce((), read.value)
+        if read.value:
+            self._announce((), read.value)
         others = {source.path: source for source in read.value}
         return tuple(self._page(page, others) for page in pages)
 

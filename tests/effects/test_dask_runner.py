@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import json
 import os
 import signal
 import socket
@@ -41,13 +43,20 @@ class Cluster:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.processes: list[subprocess.Popen[bytes]] = []
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            self.port = probe.getsockname()[1]
-        self.address = f"127.0.0.1:{self.port}"
+        told = folder / "scheduler.json"
+        # Any free port: one that was looked for before may be taken by then.
+        where = ("--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(told))
+        self.scheduler = self._start("scheduler", *where, "--no-dashboard")
+        self.address = self._address(told)
+        self.port = int(self.address.rpartition(":")[2])
         self.url = f"dask://{self.address}"
-        self.scheduler = self._start(
-            "scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"
-        )
+
+    def _address(self, told: Path) -> str:
+        while self.scheduler.poll() is None:
+            with contextlib.suppress(OSError, ValueError):  # not there yet, or not whole
+                return str(json.loads(told.read_text())["address"]).removeprefix("tcp://")
+            time.sleep(0.05)
+        raise AssertionError("the scheduler ended")
 
     def worker(self, **environment: str) -> subprocess.Popen[bytes]:
         return self._start(

@@ -171,6 +171,19 @@ def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]
     assert running.course.version == version
 
 
+def test_nothing_is_new_where_a_page_lies_outside_of_content(
+    make: Make, live: Callable[[Folder], Live]
+) -> None:
+    folder = make(GOOD)
+    page = '\n[[page]]\nid = "p"\ntitle = "P"\npath = "docs/p.md"\n'
+    folder.write("content/course.toml", folder.read("content/course.toml") + page.encode())
+    folder.write("docs/p.md", "## A page\n\nText.\n")
+    running = live(folder)
+    running.site()
+    for _ in range(2):
+        assert running.course.reread() is False
+
+
 def test_a_plan_is_not_taken_over_when_something_else_came_first(
     make: Make, live: Callable[[Folder], Live]
 ) -> None:

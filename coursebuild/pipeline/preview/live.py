@@ -299,8 +299,13 @@ class LiveCourse:
             and self._skeletons.get(source.path, (None,))[0] != (source.text, callouts, lesson)
         ]
         self.documents.ahead(new, callouts)
-        paths = {source.path for source, _ in sources}
-        self._skeletons = {path: known for path, known in self._skeletons.items() if path in paths}
+
+    def _forget(self, course: Course | None) -> None:
+        """Keep no skeletons of documents that are no more."""
+        if course is not None:
+            paths = {document.source.path for document in course.documents}
+            kept = {path: known for path, known in self._skeletons.items() if path in paths}
+            self._skeletons = kept
 
     # --- everything
 
@@ -312,6 +317,7 @@ class LiveCourse:
                 edits = self.edits
                 loaded = load(self.root, self._parse, self._ahead, self.documents.course_map)
                 known = places(loaded.course) if loaded.course is not None else None
+                self._forget(loaded.course)
                 with self.changed:
                     if edits == self.edits:
                         return self._adopt(loaded, known)
