@@ -4,8 +4,8 @@ Entry points: `run_on_dask`, which does what `runner.run_scripts` does; `is_dask
 
 1. The course's files travel as one archive, which the scheduler hands to whoever needs it.
 2. As many scripts are under way as the cluster has threads, so that the longest begin first.
-3. A worker that is lost costs a retry, which is the scheduler's affair; an archive that was lost
-   with it is sent anew. A script under which worker after worker is lost counts as killed.
+3. A worker that is lost costs a retry, which is the scheduler's affair, like an archive that was
+   lost with it. A script under which worker after worker is lost counts as killed.
 4. A worker on which something else is installed runs nothing: its results would be others.
 """
 
@@ -15,6 +15,7 @@ import contextlib
 import importlib
 import io
 import logging
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -250,12 +251,17 @@ class _Cluster:
             self.completed.add(future)
 
     def _archive(self) -> Any:
-        """The course on the cluster; sent anew where it was lost with the workers that had it."""
-        if self.sent is None or self.sent.status != "finished":
-            try:
-                self.sent = self.client.scatter(self.data, broadcast=True, hash=False)
-            except TimeoutError:  # they were there a moment ago
-                raise EffectError(f"the Dask cluster {self.url} has no workers") from None
+        """The course on the cluster.
+
+        It is the result of a task, not data that was scattered: what is lost with a worker the
+        scheduler makes again by itself.
+        """
+        if self.sent is None:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
+                self.sent = self.client.submit(
+                    dask_task.hold, self.data, key=f"coursebuild-{id(self):x}", pure=False
+                )
         return self.sent
 
     def _take(self, index: int, future: Any) -> None:
