@@ -62,9 +62,11 @@ def check_out(root: Path, out: Path) -> Path:
     for name in _AUTHORED:
         if place.is_relative_to(os.path.realpath(root / name)):
             raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no site may go")
-    if place.exists() and not place.is_dir():
-        raise PublishRefusedError(f"{out} is not a folder")
-    if place.is_mount():
+    # One look each: another build may rename the site away between two.
+    with contextlib.suppress(OSError):
+        if not stat.S_ISDIR(os.stat(place).st_mode):
+            raise PublishRefusedError(f"{out} is not a folder")
+    if os.path.ismount(place):
         raise PublishRefusedError(
             f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
         )
@@ -301,12 +303,19 @@ def _foreign(place: Path) -> list[str]:
 
 
 def _foreign_once(place: Path) -> list[str]:
+    missing: FileNotFoundError | None = None
+    header, listed = "", list[str]()
     try:
         header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
-    except (FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
-        header, listed = "", []
+    except FileNotFoundError as error:
+        missing = error
+    except (IsADirectoryError, UnicodeDecodeError):
+        pass
+    found = list(_files(place))
+    if missing and MARKER in found:
+        raise missing  # the site was away when its list was to be read
     ours = {MARKER, *map(_normal, listed)} if header == _HEADER else set[str]()
-    return sorted(path for path in _files(place) if _normal(path) not in ours)
+    return sorted(path for path in found if _normal(path) not in ours)
 
 
 def _normal(path: str) -> str:

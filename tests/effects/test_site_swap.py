@@ -295,8 +295,42 @@ class TestRefusal:
 
     def test_a_mount_point(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (root / "public").mkdir()
-        monkeypatch.setattr(Path, "is_mount", lambda path: path.name == "public")
+        monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "public")
         assert "is a mount point" in self.refused(root, root / "public")
+
+    def test_a_site_that_another_build_renames_away(
+        self, root: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """At each look at it, it is there, or away, or is replaced just then."""
+        publish(root, root / "public", site("one"))
+        place, away = root / "public", root / "away"
+        real_stat, real_read, looks = os.stat, Path.read_text, 0
+
+        def rename(path: object) -> None:
+            nonlocal looks
+            if os.fspath(path) in (str(place), str(place / MARKER)):  # type: ignore[call-overload]
+                looks += 1
+                if looks == gone:
+                    place.rename(away)
+                elif looks == gone + 1:
+                    away.rename(place)
+
+        def look(path: object, **options: object) -> os.stat_result:
+            rename(path)
+            return real_stat(path, **options)  # type: ignore[arg-type, call-overload]
+
+        def read(path: Path, *rest: str, **options: str) -> str:
+            rename(path)
+            return real_read(path, *rest, **options)
+
+        monkeypatch.setattr(os, "stat", look)
+        monkeypatch.setattr(Path, "read_text", read)
+        for gone in range(1, 7):
+            looks = 0
+            assert check_out(root, place) == place
+            assert looks >= gone or gone > 3
+            if away.exists():
+                away.rename(place)
 
     def test_said_before_the_work(self, root: Path) -> None:
         assert check_out(root, root / "public") == root / "public"
@@ -355,9 +389,8 @@ def test_two_builds_at_once(root: Path, way: str) -> None:
         )
         for name in ("a", "b")
     ]
-    for build in builds:
-        _, errors = build.communicate(timeout=60)
-        assert build.returncode == 0, errors
+    said = [build.communicate(timeout=60)[1] for build in builds]
+    assert [build.returncode for build in builds] == [0, 0], "".join(said)
     assert len(set(tree(root / "public").values())) == 1
     assert len(tree(root / "public")) == 20
     publish(root, root / "public", site("one"))
