@@ -64,7 +64,7 @@ def check_out(root: Path, out: Path) -> Path:
             raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no site may go")
     # One look each: another build may rename the site away between two.
     with contextlib.suppress(OSError):
-        if not stat.S_ISDIR(os.stat(place).st_mode):
+        if not stat.S_ISDIR(place.stat().st_mode):
             raise PublishRefusedError(f"{out} is not a folder")
     if os.path.ismount(place):
         raise PublishRefusedError(
