@@ -20,7 +20,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"rules"}),
     frozenset({"diagnostics"}),
     frozenset({"model"}),
-    frozenset({"results", "vocabulary"}),
+    frozenset({"results", "vocabulary", "measured"}),
     frozenset({"syntax", "checks", "scripts", "labs", "render", "physics", "report", "effects"}),
     frozenset({"pipeline"}),
     frozenset({"cli"}),

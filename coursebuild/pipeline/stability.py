@@ -19,9 +19,7 @@ import msgspec
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.progress import Progress
-from coursebuild.report.stability import (
+from coursebuild.measured.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
@@ -29,9 +27,11 @@ from coursebuild.report.stability import (
     OrderLine,
     ReferenceLine,
 )
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.progress import Progress
 
 _KIND = "stability"
-_CODE = ("physics", "pipeline/stability.py", "report/stability.py")
+_CODE = ("physics", "pipeline/stability.py", "measured/cases.py")
 """What measures and says what was measured."""
 
 

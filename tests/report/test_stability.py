@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 
-from coursebuild.report import Style
-from coursebuild.report.stability import (
+from coursebuild.measured.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
     FigureLine,
     OrderLine,
     ReferenceLine,
-    stability_json,
-    stability_text,
 )
+from coursebuild.report import Style
+from coursebuild.report.stability import stability_json, stability_text
 
 TRIED = (1e-3, 10.0)
 

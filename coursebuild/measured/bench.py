@@ -1,0 +1,174 @@
+"""What was measured on a model: speed against error in each of its scenarios.
+
+Entry point: `SceneReport`.
+
+No number is infinite or missing by a code of its own: `None` stands for what is not there, and a
+field beside it says why, so that it can be kept as JSON.
+"""
+
+from __future__ import annotations
+
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """Where it was measured; times mean nothing without it."""
+
+    engine: str
+    """Version of MuJoCo."""
+    python: str
+    numpy: str
+    system: str
+    """Operating system and kind of processor, such as `Linux x86_64`."""
+    cpu: str
+    """What the processor calls itself; empty where it does not say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What can be chosen without changing the scene."""
+
+    integrator: str
+    """As MJCF names it."""
+    timestep: float
+    """s."""
+    solver: str
+    """As MJCF names it; empty where nothing is constrained, so that no solver runs."""
+    iterations: int
+    """At most; 0 where no solver runs."""
+    cone: str
+    """As MJCF names it; empty where nothing can touch."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkPrecisionRow:
+    """One setting in one scenario. Errors are the largest over the horizon, and at its end."""
+
+    setting: Setting
+    status: str
+    """`ok`, `slow-growth`, `diverged` or `reset`."""
+    reasons: tuple[str, ...]
+    """Why it is not `ok`."""
+    position: tuple[float, float] | None
+    """m or rad; `None` where the run was lost, or the model has none."""
+    attitude: tuple[float, float] | None
+    """rad."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s."""
+    figure: tuple[float, float] | None
+    """Of what the scenario declares to be measured, in its unit; `None` where it declares none."""
+    energy_drift: float | None
+    """Relative, with its sign; `None` where energy is not conserved."""
+    momentum_drift: float | None
+    """Relative; `None` where angular momentum is not conserved."""
+    penetration: float
+    """Deepest contact, m."""
+    slip: float | None
+    """Largest creep of a contact that sticks in the reference, m; `None` without contact."""
+    model_error: float | None
+    """What remains of the error however small the timestep, in the errors' unit (soft contact, a
+    pyramid for a cone): against the closed form; `None` where there is none."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
+    steps: int
+    cost: float | None
+    """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
+    realtime: float | None
+    """Simulated time over the time it takes, on this machine."""
+    spread: float | None
+    """Median over minimum of the repeated times: 1 where nothing disturbed them."""
+    growth: float | None
+    """By what velocities were multiplied in a step, where they grew."""
+    own: bool
+    """Whether it is the scene's own setting."""
+    front: bool
+    """Whether no other is both cheaper and more accurate, beyond what timing can tell."""
+    dominated_by: int | None
+    """The row (from 0) that is cheaper and no less accurate; `None` on the front."""
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRow:
+    """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
+
+    integrator: str
+    position: float | None
+    attitude: float | None
+    velocity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class StableRow:
+    """The largest stable timestep of an integrator in a scenario."""
+
+    integrator: str
+    largest: float | None
+    """s; 0 where no timestep tried is stable, `None` where all are."""
+    monotone: bool
+    """Whether all timesteps beyond are unstable."""
+    searched: tuple[float, float]
+    """The timesteps between which was looked, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a scene's own setting is a good choice."""
+
+    on_front: bool
+    better: int | None
+    """The row that dominates it; `None` where none does."""
+    cost_ratio: float | None
+    """Cost of the better one, relative to the own."""
+    error_ratio: float | None
+    """Error of the better one, relative to the own."""
+    noticeable: bool | None
+    """Whether a learner would see the own setting's error; `None` where it is not known."""
+    text: str
+    """The same in a sentence or two."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioReport:
+    """Everything that was measured in a scenario."""
+
+    name: str
+    title: str
+    duration: float
+    """s."""
+    horizon: float
+    """Seconds to which errors of trajectories mean something; shorter than the duration in chaos."""
+    hold: float
+    """Seconds for which a command holds; 0 where nothing is commanded."""
+    reference: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    """Where the reference comes from."""
+    floor: float
+    """What it may be wrong by; no error is given below ten times as much."""
+    second: str
+    """The source of the second reference; empty where there is none."""
+    agreement: float | None
+    """The largest difference of the two."""
+    lyapunov: float | None
+    """Largest Lyapunov exponent, 1/s; `None` where the scenario is not chaotic."""
+    figure: str
+    """What is measured beside coordinates, with its unit in brackets; empty where nothing is."""
+    rows: tuple[WorkPrecisionRow, ...]
+    orders: tuple[OrderRow, ...]
+    stable: tuple[StableRow, ...]
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class SceneReport:
+    """Everything that was measured on a model."""
+
+    model: str
+    """Its file below `models/`, without suffix, POSIX."""
+    digest: str
+    """Of all that the figures depend on in the course: the MJCF with its files and scenarios."""
+    quick: bool
+    """Whether only a part was measured, and in less time."""
+    machine: Machine
+    scenarios: tuple[ScenarioReport, ...]

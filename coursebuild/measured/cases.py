@@ -1,0 +1,115 @@
+"""What was measured on a hard case.
+
+Entry point: `CaseReport`.
+
+No number is infinite or missing by a code of its own: `None` stands for what is not there, and a
+field beside it says why, so that it can be kept as JSON.
+"""
+
+from __future__ import annotations
+
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryLine:
+    """The largest stable timestep of an integrator."""
+
+    integrator: str
+    largest: float | None
+    """s; 0 where no timestep tried is stable, `None` where all are."""
+    theory: float | None
+    """s, as `largest`; `None` also where there is no theory and so no formula."""
+    formula: str
+    """Where the theory comes from; empty where there is none."""
+    difference: float | None
+    """Measured against theory, relative."""
+    monotone: bool
+    """Whether all timesteps beyond are unstable."""
+    islands: tuple[float, ...]
+    """Those beyond that are stable all the same, s."""
+    beyond: str
+    """How the first unstable one tried went."""
+    growth: float | None
+    """By what the velocities were multiplied in a step there, where they stayed finite."""
+    searched: tuple[float, float]
+    """The timesteps between which was looked, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class FigureLine:
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    """`None` where it is not finite."""
+    exact: float | None
+    """`None` where theory does not say it."""
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLine:
+    """One run against the reference. Errors are the largest over the duration, and at its end."""
+
+    integrator: str
+    timestep: float
+    """s."""
+    status: str
+    reasons: tuple[str, ...]
+    """Why it is not `ok`."""
+    position: tuple[float, float] | None
+    """m or rad."""
+    attitude: tuple[float, float] | None
+    """rad."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s."""
+    energy_drift: float | None
+    momentum_drift: float | None
+    penetration: float
+    """m."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
+
+
+@dataclass(frozen=True, slots=True)
+class OrderLine:
+    """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
+
+    integrator: str
+    position: float | None
+    attitude: float | None
+    velocity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceLine:
+    """What the errors were measured against."""
+
+    kind: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    floor: float
+    second: str
+    """The source of the second reference; empty where there is none."""
+    agreement: float | None
+    """The largest difference of the two."""
+
+
+@dataclass(frozen=True, slots=True)
+class CaseReport:
+    """Everything that was measured on a hard case."""
+
+    name: str
+    title: str
+    case: int
+    engine: str
+    """Version of MuJoCo."""
+    note: str
+    reference: ReferenceLine | None
+    boundaries: tuple[BoundaryLine, ...]
+    figures: tuple[FigureLine, ...]
+    orders: tuple[OrderLine, ...]
+    errors: tuple[ErrorLine, ...]
