@@ -137,7 +137,7 @@ class ScenarioReport:
     duration: float
     """s."""
     horizon: float
-    """Seconds to which errors of trajectories mean something; shorter than the duration in chaos."""
+    """s: to where errors of trajectories mean something; less than the duration in chaos."""
     hold: float
     """Seconds for which a command holds; 0 where nothing is commanded."""
     reference: str
