@@ -16,7 +16,7 @@ ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"values"}),
-    frozenset({"source"}),
+    frozenset({"source", "drawing"}),
     frozenset({"rules"}),
     frozenset({"diagnostics"}),
     frozenset({"model"}),
@@ -83,7 +83,10 @@ IO_MODULES = {
     "multiprocessing",
     "signal",
 }
-PURE = ("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model")
+PURE = (
+    *("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model"),
+    *("drawing", "measured"),
+)
 
 
 @pytest.mark.parametrize(

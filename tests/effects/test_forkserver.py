@@ -368,6 +368,7 @@ def _bare(root: Path, path: str, temporary: str) -> tuple[str, str, int]:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         start_new_session=True,
+        timeout=60,
     )
     texts = (
         data.decode("utf-8", "backslashreplace").replace("\r\n", "\n")

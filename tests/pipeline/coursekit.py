@@ -223,3 +223,8 @@ def ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]
 def without_seconds(text: str) -> str:
     """A report with its times taken out."""
     return re.sub(r"\d+\.\d\d s", "# s", text)
+
+
+FIRST = "## One\n\n" + block("one.py", "print(1)", "1")
+SECOND = "## Two\n\n" + block("two.py", "print(2)", "2")
+DRIFTED = "## One\n\n" + block("one.py", "print('value', 1.25)", "value 1.35", "digits")

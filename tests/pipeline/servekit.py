@@ -1,0 +1,138 @@
+"""A preview in a process of its own: asked over HTTP, and listened to."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from coursekit import Folder, ended, wait_until_alone
+
+from coursebuild.effects.server import PREFIX
+
+
+class Preview:
+    """A running `coursebuild serve`."""
+
+    def __init__(self, folder: Folder, process: subprocess.Popen[bytes]) -> None:
+        self.folder = folder
+        self.process = process
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        first = self.heard("serving http://")
+        self.port = int(first.partition("127.0.0.1:")[2].partition("/")[0])
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        with contextlib.suppress(ValueError):  # closed at the end of the test
+            for line in self.process.stderr:
+                self.said.append(line.decode().rstrip("\n"))
+
+    def heard(self, text: str, after: int = 0, seconds: float = 30.0) -> str:
+        """The first line said that holds a text."""
+        until = time.monotonic() + seconds
+        while True:
+            for line in self.said[after:]:
+                if text in line:
+                    return line
+            assert time.monotonic() < until, f"{text!r} is not in {self.said}"
+            assert self.process.poll() is None, self.said
+            time.sleep(0.02)
+
+    def get(
+        self, path: str, method: str = "GET", body: bytes = b"", **headers: str
+    ) -> tuple[int, dict[str, str], bytes]:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=20)
+        with contextlib.closing(connection):
+            connection.putrequest(method, path, skip_host="Host" in headers)
+            for name, value in headers.items():
+                connection.putheader(name.replace("_", "-"), value)
+            if body:
+                connection.putheader("Content-Length", str(len(body)))
+            connection.endheaders(body or None)
+            response = connection.getresponse()
+            return response.status, dict(response.getheaders()), response.read()
+
+    def accept(self, body: bytes, **headers: str) -> tuple[int, Any]:
+        """What the server says to an acceptance; as JSON, or as text."""
+        status, _, data = self.get(f"{PREFIX}accept", "POST", body, **headers)
+        return status, json.loads(data) if data.startswith(b"{") else data.decode()
+
+    @contextlib.contextmanager
+    def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
+        """What an open page is told."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=30) as link:
+            asked = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
+            link.sendall(f"{asked}\r\n\r\n".encode())
+            with link.makefile("rb") as stream:
+                head = b""
+                while not head.endswith(b"\r\n\r\n"):
+                    head += stream.readline()
+                assert head.startswith(b"HTTP/1.1 200 ")
+                assert b"text/event-stream" in head
+                yield Events(_events(stream))
+
+
+class Events:
+    """The stream of one page, and what was told last."""
+
+    def __init__(self, stream: Iterator[tuple[str, str]]) -> None:
+        self.stream = stream
+        self.hello: dict[str, str] = {}
+        self.state = ""
+        self.pages = 0
+        self.news: dict[str, Any] = {}
+
+    def until(self, good: Callable[[Events], bool]) -> Events:
+        """Read on until something holds."""
+        while not (self.hello and self.news and good(self)):
+            name, data = next(self.stream, ("", ""))
+            assert name, f"nothing was told for 15 s; the last was {self.state} {self.news}"
+            match name:
+                case "hello":
+                    self.hello = json.loads(data)
+                case "page":
+                    self.state = json.loads(data)
+                    self.pages += 1
+                    self.news = {}  # it follows
+                case "news":
+                    self.news = json.loads(data)
+                case _:
+                    raise AssertionError(name)
+        return self
+
+    def rules(self) -> list[str]:
+        return [problem["rule"] for problem in self.news["problems"]]
+
+    def settled(self, *rules: str) -> Events:
+        """All is known, and this is what is wrong."""
+        return self.until(lambda told: told.news["busy"] == "" and told.rules() == [*rules])
+
+
+def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:
+    name = ""
+    for raw in stream:
+        line = raw.decode().rstrip("\r\n")
+        if line == ": still here":  # nothing was told for 15 s
+            return
+        if line.startswith("event: "):
+            name = line.removeprefix("event: ")
+        elif line.startswith("data: "):
+            yield name, line.removeprefix("data: ")
+
+
+@contextlib.contextmanager
+def serving(folder: Folder, *arguments: str) -> Iterator[Preview]:
+    process = folder.start(
+        "serve", "--port", "0", *arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    with ended(process):
+        yield Preview(folder, process)
+    wait_until_alone(folder)

@@ -1,0 +1,113 @@
+"""`serve`: an output is accepted in the page, and written into the lesson."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable
+
+from coursekit import GOOD, Folder, block
+from servekit import Events, serving
+
+Make = Callable[..., Folder]
+
+
+def test_an_output_is_accepted(make: Make) -> None:
+    lesson = "## Random\r\n\r\n" + GOOD.replace("\n", "\r\n").replace(
+        "3.14159\r\n```\r\n\r\n", "3\r\n```\r\n"
+    )
+    folder = make(lesson)
+    with serving(folder) as preview, preview.events() as events:
+
+        def offered(told: Events) -> bool:
+            return any(output.get("offer") for output in told.news["outputs"])
+
+        events.until(offered)
+        (output,) = events.news["outputs"]
+        assert (output["script"], output["nth"], output["state"]) == (
+            "examples/hello.py",
+            0,
+            "drift",
+        )
+        assert output["rows"] == [
+            ["-", [["hello ", False], ["3", True]]],
+            ["+", [["hello ", False], ["3.14159", True]]],
+        ]
+        asked = {"page": "lessons/1.1-one.html", "id": output["offer"]}
+        body = json.dumps(asked).encode()
+        right = {
+            "Origin": f"http://127.0.0.1:{preview.port}",
+            "X_Coursebuild_Token": events.hello["token"],
+        }
+        before = folder.read(folder.lesson())
+        alone = (403, "this preview answers only on this machine\n")
+        older = (403, {"message": "this page is older than the preview; load it again"})
+        unread = (400, {"message": "the request cannot be read"})
+        gone = (409, {"message": "this is no longer what the page offers; look at it again"})
+        for wrong, data, answer in (
+            ({"Origin": ""}, body, alone),
+            ({"Origin": "http://evil.example"}, body, alone),
+            ({"Host": "evil.example"}, body, alone),
+            ({"X_Coursebuild_Token": "x"}, body, older),
+            ({"X_Coursebuild_Token": ""}, body, older),
+            ({}, b"{", unread),
+            ({}, b"[1]", unread),
+            ({}, b'{"page": 1, "id": 2}', unread),
+            ({}, b"x" * 70_000, unread),
+            ({}, json.dumps({**asked, "id": "0" * 24}).encode(), gone),
+            ({}, json.dumps({**asked, "page": "index.html"}).encode(), gone),
+        ):
+            headers = {name: value for name, value in (right | wrong).items() if value}
+            assert preview.accept(data, **headers) == answer, (wrong, data[:40])
+        assert folder.read(folder.lesson()) == before
+        assert preview.accept(body, **right) == (200, {"message": ""})
+        assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
+        events.settled()
+        assert events.news["outputs"][0]["state"] == "verified"
+
+
+def test_what_changed_since_is_not_written(make: Make) -> None:
+    folder = make(GOOD.replace("hello 3.14159", "hello 3"))
+    with serving(folder) as preview, preview.events() as events:
+        events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
+        id = events.news["outputs"][0]["offer"]
+        # Somebody saves, and the server has not heard of it: another process holds its attention.
+        preview.process.send_signal(signal.SIGSTOP)
+        folder.replace(folder.lesson(), "## Hello", "## Mine")
+        mine = folder.read(folder.lesson())
+        preview.process.send_signal(signal.SIGCONT)
+        body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
+        status, told = preview.accept(
+            body,
+            Origin=f"http://127.0.0.1:{preview.port}",
+            X_Coursebuild_Token=events.hello["token"],
+        )
+        assert status == 409
+        assert told["message"] in (
+            "content/lessons/1.1-one.md was changed in the meantime",
+            "this is no longer what the page offers; look at it again",
+        )
+        assert folder.read(folder.lesson()) == mine
+
+
+def test_an_output_that_differs_from_run_to_run_is_not_offered(make: Make) -> None:
+    code = "import time\nprint('took', time.time_ns())"
+    folder = make("## Clock\n\n" + block("clock.py", code, "took 12"))
+    with serving(folder) as preview, preview.events() as events:
+        events.until(lambda told: any(o.get("refused") for o in told.news["outputs"]))
+        (output,) = events.news["outputs"]
+        assert output["offer"] is None
+        assert output["refused"] == "two runs of the script printed different lines"
+
+
+def test_a_bound_number_is_accepted(make: Make) -> None:
+    folder = make(GOOD + "It is `3.15`{out}, nearly.\n")
+    with serving(folder) as preview, preview.events() as events:
+        events.until(lambda told: bool(told.news["numbers"]))
+        (number,) = events.news["numbers"]
+        assert (number["text"], number["nth"], number["better"]) == ("3.15", 0, "3.14")
+        body = json.dumps({"page": "lessons/1.1-one.html", "id": number["offer"]}).encode()
+        origin, token = f"http://localhost:{preview.port}", events.hello["token"]
+        assert preview.accept(body, Origin=origin, X_Coursebuild_Token=token)[0] == 200
+        assert folder.text(folder.lesson()) == GOOD + "It is `3.14`{out}, nearly.\n"
+        events.settled()

@@ -1,0 +1,248 @@
+"""`serve`: saves of every kind, and what open pages are told of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from coursekit import GOOD, Folder, block
+from servekit import serving
+
+Make = Callable[..., Folder]
+
+
+def test_a_page_is_told_of_every_save(make: Make) -> None:
+    folder = make(GOOD)
+    page = "/lessons/1.1-one.html"
+    with serving(folder) as preview, preview.events() as events:
+        events.settled()
+        assert events.news["scripts"] == [{"path": "examples/hello.py", "state": "ok"}]
+
+        def shows(text: bytes) -> bool:
+            return text in preview.get(page)[2]
+
+        folder.replace(folder.lesson(), "## Hello\n", "## Hello again\n")
+        state = events.state
+        events.until(lambda told: told.state != state)
+        assert shows(b"Hello again")
+        folder.replace(folder.lesson(), "3.14159\n```", "3.14158\n```")
+        events.settled("output-drift")
+        assert shows(b"3.14158")  # the page is new, and says what is wrong with it
+        folder.replace(folder.lesson(), "## Hello again\n", "## Never [x](lesson:9.9)\n")
+        events.until(lambda told: "link-lesson" in told.rules())
+        assert events.news["kept"]
+        assert shows(b"Hello again") and not shows(b"Never")  # the last good page
+        with preview.events("index.html") as late:  # a page that is opened now is told as well
+            late.until(lambda told: "link-lesson" in told.rules())
+        folder.write(folder.lesson(), GOOD)
+        events.settled()
+        assert shows(b"Hello") and not shows(b"Hello again")
+        # As editors save: a new file takes the place of the old one.
+        fresh = folder.root / "content/lessons/.1.1-one.md.swp"
+        fresh.write_text(folder.text(folder.lesson()) + "By another file.\n")
+        fresh.replace(folder.root / folder.lesson())
+        state = events.state
+        events.until(lambda told: told.state != state)
+        assert shows(b"By another file.")
+        # A folder that was not there when the preview began.
+        folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+        with preview.events("models/ball.html") as model:
+            model.until(lambda told: told.state != "")
+            folder.write("models/ball.xml", "<mujoco><nosuch/></mujoco>")
+            events.settled("model-error")
+            (folder.root / "models/ball.xml").unlink()
+            events.settled()
+            model.until(lambda told: told.state == "")
+        # The map is gone, and back.
+        map_ = folder.read("content/course.toml")
+        (folder.root / "content/course.toml").unlink()
+        events.until(lambda told: "map-missing" in told.rules())
+        assert shows(b"By another file.")
+        folder.write("content/course.toml", map_)
+        events.settled()
+
+
+def test_pages_elsewhere_are_watched(make: Make) -> None:
+    folder = make(GOOD)
+    entries = "".join(
+        f'[[page]]\nid = "{id}"\ntitle = "Page"\nfile = "{path}"\n'
+        for id, path in (("guide", "docs/guide.md"), ("readme", "README.md"))
+    )
+    folder.write("content/course.toml", folder.text("content/course.toml") + entries)
+    folder.write("docs/guide.md", "One.\n")
+    folder.write("README.md", "One.\n")
+    with serving(folder) as preview:
+        for page, path in (("guide.html", "docs/guide.md"), ("readme.html", "README.md")):
+            with preview.events(page) as events:
+                events.settled()
+                folder.write(path, "Two.\n")
+                state = events.state
+                events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
+                assert b"Two." in preview.get(f"/{page}")[2]
+
+
+SAVES: dict[str, Callable[[Path, str], None]] = {}
+
+
+def saver(function: Callable[[Path, str], None]) -> Callable[[Path, str], None]:
+    SAVES[function.__name__] = function
+    return function
+
+
+@saver
+def in_place(path: Path, text: str) -> None:
+    path.write_text(text)
+
+
+@saver
+def in_pieces(path: Path, text: str) -> None:
+    """Emptied first, then written bit by bit."""
+    with path.open("w") as file:
+        file.flush()
+        for start in range(0, len(text), 20):
+            file.write(text[start : start + 20])
+            file.flush()
+
+
+@saver
+def with_a_backup(path: Path, text: str) -> None:
+    """vim: the old file is moved away, a new one is written, the old one is removed."""
+    backup = path.with_name(path.name + "~")
+    path.rename(backup)
+    path.write_text(text)
+    backup.unlink()
+
+
+@saver
+def by_renaming(path: Path, text: str) -> None:
+    fresh = path.with_name(f".#{path.name}.new")
+    fresh.write_text(text)
+    fresh.replace(path)
+
+
+@saver
+def gone_for_a_moment(path: Path, text: str) -> None:
+    path.unlink()
+    path.write_text(text)
+
+
+def test_saves_of_every_editor_count_once(make: Make) -> None:
+    folder = make(GOOD)
+    with serving(folder) as preview, preview.events() as events:
+        events.settled()
+        for name, save in SAVES.items():
+            state, before = events.state, len(preview.said)
+            save(folder.root / folder.lesson(), GOOD.replace("## Hello", f"## {name}"))
+            events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
+            assert name.encode() in preview.get("/lessons/1.1-one.html")[2], name
+            events.settled()
+            told = [line for line in preview.said[before:] if not line.startswith("checked")]
+            assert len(told) == 1 and told[0].startswith("changed: content/lessons/1.1-one.md (")
+
+
+def test_a_switched_branch_is_one_change(make: Make) -> None:
+    folder = make(*("## One\n" for _ in range(6)))
+    for number in range(300):
+        folder.write(f"content/pics/{number}.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
+    with serving(folder) as preview, preview.events() as events:
+        events.settled()
+        before = len(preview.said)
+        for number in range(300):
+            (folder.root / f"content/pics/{number}.svg").unlink()
+        for number in range(1, 7):
+            folder.write(folder.lesson(number), "## Two\n")
+        state = events.state
+        events.until(lambda told: told.state != state)
+        for name in ("one", "six"):
+            number = 1 + ("one", "two", "three", "four", "five", "six").index(name)
+            assert b"Two" in preview.get(f"/lessons/1.{number}-{name}.html")[2]
+        events.settled()
+        changed = [line for line in preview.said[before:] if line.startswith("changed: ")]
+        assert len(changed) == 1, changed
+
+
+def test_two_browsers_and_one_that_was_away(make: Make) -> None:
+    folder = make(GOOD, "## Two\n")
+    with serving(folder) as preview:
+        with preview.events() as one, preview.events() as two:
+            one.settled()
+            two.settled()
+            assert one.state == two.state
+            old = one.state
+            folder.replace(folder.lesson(), "## Hello", "## Both")
+            assert one.until(lambda told: told.state != old).state == (
+                two.until(lambda told: told.state != old).state
+            )
+        folder.replace(folder.lesson(), "## Both", "## Later")
+        with preview.events("lessons/1.2-two.html") as other:
+            other.settled()
+            assert other.pages == 1  # nothing of its own changed
+        with preview.events() as back:
+            assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
+
+
+def test_what_is_not_of_the_course_is_no_change(make: Make) -> None:
+    folder = make(GOOD)
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        before = len(preview.said)
+        folder.write("notes.txt", "elsewhere")
+        folder.write("examples/mine.txt", "derived")
+        folder.write("content/lessons/.1.1-one.md.swp", "an editor's")
+        folder.write("content/lessons/1.1-one.md~", "an editor's")
+        folder.write("content/lessons/#1.1-one.md#", "an editor's")
+        folder.write("content/lessons/4913", "an editor's")
+        folder.write("content/public/pic.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>")
+        preview.heard("changed: content/public", before)
+        assert len([line for line in preview.said[before:] if line.startswith("changed: ")]) == 1
+
+
+def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
+    slow = "import time, pathlib\npathlib.Path('begun').touch()\ntime.sleep(0.7)\nprint(1)"
+    folder = make("## First\n\n" + block("x.py", slow, "1"))
+    with serving(folder) as preview, preview.events() as events:
+        until = time.monotonic() + 20
+        while not (folder.root / "begun").exists():
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
+            {"path": "examples/x.py", "state": "running"}
+        ]
+        folder.replace(folder.lesson(), "## First", "## Second")
+        events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
+        events.settled()
+        assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
+
+
+def test_a_course_that_is_wrong_from_the_beginning(make: Make) -> None:
+    folder = make(GOOD + "[gone](lesson:7.7)\n")
+    page = "/lessons/1.1-one.html"
+    with serving(folder) as preview:
+        preview.heard("error[link-lesson]")
+        status, _, body = preview.get(page)
+        assert status == 200
+        assert b"This page cannot be shown before its mistakes are mended." in body
+        assert b"/.coursebuild/preview.js" in body
+        assert b"Scratch" in preview.get("/")[2]
+        with preview.events() as events:
+            events.settled("link-lesson")
+            assert events.state == ""
+            folder.write(folder.lesson(), GOOD)
+            events.until(lambda told: told.state != "")
+        assert b"hello 3.14159" in preview.get(page)[2]
+    assert not (folder.root / "public").exists()
+
+
+def test_a_map_that_is_wrong_from_the_beginning(make: Make) -> None:
+    folder = make(GOOD)
+    good = folder.read("content/course.toml")
+    folder.write("content/course.toml", "[course\n")
+    with serving(folder) as preview, preview.events("index.html") as events:
+        events.until(lambda told: told.rules() == ["map-syntax"])
+        status, _, body = preview.get("/")
+        assert status == 404
+        assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
+        folder.write("content/course.toml", good)
+        events.settled()
+        assert preview.get("/")[0] == 200
