@@ -127,7 +127,28 @@ def problems() -> tuple[Problem, ...]:
     return tuple(_problem(ratio) for ratio in RATIOS)
 
 
+def references(
+    ratio: float, rate: float, source: str, *, floor: float
+) -> tuple[Reference, Reference]:
+    """The oscillator begun at `START`: its closed form, and an integration.
+
+    `floor` is for a rate of 1 rad/s: velocities are known worse by the rate.
+    """
+    return (
+        Reference(
+            "closed", source, lambda times: oscillation(ratio, rate, *START, times), floor * rate
+        ),
+        Reference(
+            "ode",
+            "Bulirsch–Stoer",
+            lambda times: integrated(ratio, rate, *START, times),
+            1e-13 * rate,
+        ),
+    )
+
+
 def _problem(ratio: float) -> Problem:
+    reference, second = references(ratio, RATE, "the linear oscillator", floor=1e-14)
     return Problem(
         name=f"damped-spring-{ratio:g}",
         title=f"Damped spring, ζ = {ratio:g}",
@@ -136,18 +157,8 @@ def _problem(ratio: float) -> Problem:
         scenario=Scenario(1.0, 0.1, START[:1], START[1:]),
         position_bound=BOUND,
         velocity_bound=BOUND * RATE * (1 + 4 * ratio),
-        reference=Reference(
-            "closed",
-            "the linear oscillator",
-            lambda times: oscillation(ratio, RATE, *START, times),
-            floor=1e-14 * RATE,
-        ),
-        second=Reference(
-            "ode",
-            "Bulirsch–Stoer",
-            lambda times: integrated(ratio, RATE, *START, times),
-            floor=1e-13 * RATE,
-        ),
+        reference=reference,
+        second=second,
         timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160, 320, 640)),
         limit=lambda one: limit_of(ratio, RATE, one, explicit=(Integrator.EULER_EXPLICIT,)),
         energy_conserved=ratio == 0,

@@ -120,6 +120,25 @@ def problems() -> tuple[Problem, ...]:
     )
 
 
+def _references(
+    law: str, pull: float, inertia: float, turn: float, across: bool, *, floor: float
+) -> tuple[Reference, Reference]:
+    """The closed form of a steady acceleration `pull` (m/s²), and the balance of energy.
+
+    `inertia` is that of the motion relative to the mass, `turn` rad for each metre.
+    """
+    closed = Reference(
+        "closed", law, lambda times: _straight(pull, turn, across, times), floor=floor
+    )
+    balance = Reference(
+        "ode",
+        "the balance of energy, Bulirsch–Stoer",
+        lambda times: _integrated(pull * inertia, inertia, turn, across, times),
+        floor=10 * floor,
+    )
+    return closed, balance
+
+
 _LADDER = (2e-3, 1e-3, 5e-4)
 
 
@@ -128,6 +147,8 @@ def _sliding(cone: Cone, across: bool) -> Problem:
     text = mjcf("box", SLIDING, across, cone, FRICTION)
     where = "across" if across else "along"
     said = "between the axes" if across else "along an axis"
+    law = "Coulomb's law, a = g (sin α − μ cos α)"
+    reference, second = _references(law, pull, 1.0, 0.0, across, floor=1e-14)
     return Problem(
         name=f"sliding-block-{cone}-{where}",
         title=f"Block sliding {said} of an {cone} cone"
@@ -138,18 +159,8 @@ def _sliding(cone: Cone, across: bool) -> Problem:
         scenario=Scenario(1.0, 0.1),
         position_bound=20.0,
         velocity_bound=20.0,
-        reference=Reference(
-            "closed",
-            "Coulomb's law, a = g (sin α − μ cos α)",
-            lambda times: _straight(pull, 0.0, across, times),
-            floor=1e-14,
-        ),
-        second=Reference(
-            "ode",
-            "the balance of energy, Bulirsch–Stoer",
-            lambda times: _integrated(pull, 1.0, 0.0, across, times),
-            floor=1e-13,
-        ),
+        reference=reference,
+        second=second,
         timesteps=_LADDER,
         figures=(
             Figure(
@@ -182,6 +193,8 @@ def _blunted(text: str) -> Figure:
 def _rolling(cone: Cone) -> Problem:
     pull = 5 / 7 * GRAVITY * math.sin(ROLLING)
     text = mjcf("sphere", ROLLING, False, cone, 1.0)
+    law = "rolling without slipping, a = 5/7 g sin α"
+    reference, second = _references(law, pull, 7 / 5, 1 / _HALF, False, floor=1e-13)
     return Problem(
         name=f"rolling-ball-{cone}",
         title=f"Ball rolling, {cone} cone",
@@ -190,18 +203,8 @@ def _rolling(cone: Cone) -> Problem:
         scenario=Scenario(1.0, 0.1),
         position_bound=20.0,
         velocity_bound=200.0,
-        reference=Reference(
-            "closed",
-            "rolling without slipping, a = 5/7 g sin α",
-            lambda times: _straight(pull, 1 / _HALF, False, times),
-            floor=1e-13,
-        ),
-        second=Reference(
-            "ode",
-            "the balance of energy, Bulirsch–Stoer",
-            lambda times: _integrated(GRAVITY * math.sin(ROLLING), 7 / 5, 1 / _HALF, False, times),
-            floor=1e-12,
-        ),
+        reference=reference,
+        second=second,
         timesteps=_LADDER,
         figures=(
             Figure(
@@ -220,6 +223,8 @@ def _rolling(cone: Cone) -> Problem:
 
 def _sticking(cone: Cone) -> Problem:
     text = mjcf("box", STICKING, False, cone, FRICTION)
+    law = "Coulomb's law: tan α < μ, so that it rests"
+    reference, second = _references(law, 0.0, 1.0, 0.0, False, floor=1e-15)
     return Problem(
         name=f"sticking-block-{cone}",
         title=f"Block that should stick, {cone} cone",
@@ -228,18 +233,8 @@ def _sticking(cone: Cone) -> Problem:
         scenario=Scenario(2.0, 0.1),
         position_bound=1.0,
         velocity_bound=1.0,
-        reference=Reference(
-            "closed",
-            "Coulomb's law: tan α < μ, so that it rests",
-            lambda times: _straight(0.0, 0.0, False, times),
-            floor=1e-15,
-        ),
-        second=Reference(
-            "ode",
-            "the balance of energy, Bulirsch–Stoer",
-            lambda times: _integrated(0.0, 1.0, 0.0, False, times),
-            floor=1e-15,
-        ),
+        reference=reference,
+        second=second,
         timesteps=_LADDER,
         figures=(
             Figure(

@@ -13,14 +13,13 @@ Source: MuJoCo documentation, Computation, Constraint model.
 
 from __future__ import annotations
 
-from coursebuild.physics.problem import Integrator, Limit, Problem, Reference, Scenario
+from coursebuild.physics.problem import Integrator, Limit, Problem, Scenario
 from coursebuild.physics.problems.common import NO_GRAVITY
 from coursebuild.physics.problems.damped_spring import (
     BOUND,
     START,
-    integrated,
     limit_of,
-    oscillation,
+    references,
 )
 
 RATE = 50.0
@@ -63,6 +62,8 @@ def _limit(ratio: float, integrator: Integrator) -> Limit:
 
 
 def _problem(ratio: float) -> Problem:
+    source = "the linear oscillator of the constraint"
+    reference, second = references(ratio, RATE, source, floor=1e-13)
     return Problem(
         name=f"soft-equality-{ratio:g}",
         title=f"Soft equality as an oscillator, ζ = {ratio:g}, refsafe off",
@@ -71,18 +72,8 @@ def _problem(ratio: float) -> Problem:
         scenario=Scenario(0.2, 0.02, START[:1], START[1:]),
         position_bound=BOUND,
         velocity_bound=BOUND * RATE * (1 + 4 * ratio),
-        reference=Reference(
-            "closed",
-            "the linear oscillator of the constraint",
-            lambda times: oscillation(ratio, RATE, *START, times),
-            floor=1e-13 * RATE,
-        ),
-        second=Reference(
-            "ode",
-            "Bulirsch–Stoer",
-            lambda times: integrated(ratio, RATE, *START, times),
-            floor=1e-13 * RATE,
-        ),
+        reference=reference,
+        second=second,
         timesteps=tuple(0.02 / n for n in (4, 8, 16, 32, 64, 128, 256)),
         limit=lambda one: _limit(ratio, one),
         search=(1e-2 / RATE, 1e1 / RATE),
