@@ -44,6 +44,41 @@ class ScriptJob:
     """Seconds."""
     requires: tuple[str, ...]
     norun: bool
+    perturbation: int = 0
+    """From 1: its initial states are moved a little, in one of several directions; 0: they are
+    not."""
+
+
+class Sign(enum.Enum):
+    """What shows that a simulation was lost."""
+
+    POSITIONS = "positions"
+    """MuJoCo warned of bad ones, as of the next two."""
+    VELOCITIES = "velocities"
+    ACCELERATIONS = "accelerations"
+    STATE = "state"
+    """It was not finite when it was looked at."""
+    CONTACT = "contact"
+    """Bodies lay deep in each other when they were looked at, of which MuJoCo does not warn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Divergence:
+    """A simulation of a script that was lost on the way."""
+
+    sign: Sign
+    time: str
+    """Simulated time, s, as MuJoCo wrote it."""
+    model: str
+    """The model's name; empty where it has none or is not known."""
+    path: str
+    """The script that was being executed, relative to the project; empty where none was."""
+    line: int
+    """Its line, from 1; 0 where it is not known."""
+    depth: str = ""
+    """Of a contact: how deep it was, m."""
+    geoms: tuple[str, ...] = ()
+    """Of a contact: the names of its geoms, or what stands for them, as words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +102,14 @@ class Trace:
     opaque: str
     """Why there may be more, as words that end a sentence ("it starts other programs"); empty where
     this is everything."""
+    divergences: tuple[Divergence, ...] = ()
+    """The simulations that were lost, in the order in which it was noticed, without repeats."""
+    moved: bool = False
+    """Whether there was an initial state to be moved, of a run that was to do so."""
+    states: tuple[str, ...] = ()
+    """Of such a run, for each `MjData` in words: its number in the order of their first use, the
+    length of `qpos`, the largest initial |qpos| and |qvel|, and the `qpos` and `qvel` that it ended
+    with, as hexadecimal numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +228,7 @@ class ModelFacts:
     body_names: tuple[str, ...]
     includes: tuple[str, ...] = ()
     """Files that the model pulls in, relative to the project root; absolute if they lie outside."""
+    sensors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -166,7 +166,23 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "A script run again does something else, with nothing changed that is known to count.",
     ),
     ("script-silent", "error", "An output is recorded and the script printed nothing."),
+    (
+        "script-diverged",
+        "error",
+        "A simulation of a script diverged, and the script does not say that it should.",
+    ),
+    ("script-stable", "error", "A script says `diverges`, and none of its simulations did."),
+    (
+        "script-penetration",
+        "warning",
+        "Bodies of a script's simulation lie deep in each other, of which MuJoCo does not warn.",
+    ),
     ("output-drift", "error", "A recorded output differs from what the script prints."),
+    (
+        "output-noise",
+        "warning",
+        "A recorded output has digits that change when initial states are moved by 1e-12.",
+    ),
     (
         "output-unstable",
         "error",
@@ -175,6 +191,17 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("output-not-updatable", "error", "A recorded output cannot be brought up to date by itself."),
     # models and MJCF
     ("model-error", "error", "A model in models/ does not compile."),
+    ("toml-syntax", "error", "A file of scenarios, models/NAME.toml, is not valid TOML."),
+    (
+        "scenario-model",
+        "error",
+        "A file of scenarios has no model beside it, or a scenario does not fit the model.",
+    ),
+    (
+        "report-stale",
+        "warning",
+        "A recorded report in content/reports/ is not of the course as it is, so no page shows it.",
+    ),
     ("mjcf-error", "error", "An MJCF block does not compile."),
     ("mjcf-compiles", "error", "An MJCF block that must not compile does."),
     ("mjcf-message", "error", "An MJCF block fails with another message than the lesson says."),
@@ -191,6 +218,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("lab-value", "error", "An expression of a lab gives no finite number and no string."),
     ("lab-warning", "error", "MuJoCo raised a warning while a lab was tried."),
     ("lab-diverged", "error", "The simulation of a lab diverges."),
+    (
+        "lab-penetration",
+        "warning",
+        "Bodies of a lab lie deep in each other, of which MuJoCo does not warn.",
+    ),
     ("lab-expect", "error", "A claim of a lab does not hold."),
     ("lab-parity", "error", "A lab runs otherwise in the browser's engine than natively."),
     ("lab-reset", "warning", "A reset does not lead a lab back to where it started."),

@@ -11,13 +11,17 @@ the only module that counts lines.
 3. An `Excerpt` is what a parser of an inner language reads (a fence's JSON, a quiz's Markdown):
    prefixes, indentation and escapes are gone from its text, and its pieces say where each part
    came from.
+
+The text of a source may be away: it is read when it is asked for, and not kept. So a course of any
+length can be held, of which few places are ever shown.
 """
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 from coursebuild.values import dataclass, field
 
@@ -35,12 +39,36 @@ class Source:
     _line_starts: list[int] = field(
         default_factory=list, init=False, repr=False, compare=False, hash=False
     )
+    _read: Callable[[], str] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """Gives the text, where it is away."""
+
+    @classmethod
+    def away(cls, path: str, read: Callable[[], str]) -> Source:
+        """A source whose text is read each time it is asked for; it must be the same each time."""
+        source = object.__new__(cls)
+        object.__setattr__(source, "path", path)
+        object.__setattr__(source, "_line_starts", [])
+        object.__setattr__(source, "_read", read)
+        return source
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> str:
+            """The text that is away: its slot is empty."""
+            if name == "text":
+                return self._read()
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def line_starts(self) -> list[int]:
         """Offsets at which lines begin; a line ends with LF, CRLF or CR, as in CommonMark."""
         if not self._line_starts:
-            self._line_starts.extend([0, *(m.end() for m in _NEWLINE.finditer(self.text))])
+            starts = [0, *(m.end() for m in _NEWLINE.finditer(self.text))]
+            if self._read is not None:
+                return starts
+            self._line_starts.extend(starts)
         return self._line_starts
 
     def position(self, offset: int) -> tuple[int, int]:

@@ -1,7 +1,7 @@
-"""The words that every course has: the kinds of callouts, and what each promises.
+"""The words that every course has: the kinds of callouts, and closed forms to measure against.
 
-Entry point: `CALLOUTS`. A course can add kinds, or give these other labels, under `[callouts]` in
-course.toml.
+Entry points: `CALLOUTS`, what each kind promises, and `CLOSED_FORMS`. A course can add kinds, or
+give these other labels, under `[callouts]` in course.toml.
 """
 
 from __future__ import annotations
@@ -46,3 +46,46 @@ CALLOUTS: tuple[CalloutKind, ...] = (
     CalloutKind("caution", "Caution", "A step that cannot be taken back, or may damage something."),
 )
 """In the order in which a page that explains them lists them."""
+
+CLOSED_FORMS: tuple[str, ...] = (
+    "tumbling-box",
+    "pendulum-hinge-90",
+    "pendulum-hinge-179",
+    "pendulum-ball-90",
+    "pendulum-ball-179",
+    "pendulum-connect-90",
+    "pendulum-connect-179",
+    "free-top",
+    "thin-rod",
+    "coin",
+    "heavy-top",
+    "projectile",
+    "damped-spring-0",
+    "damped-spring-0.1",
+    "damped-spring-1",
+    "damped-spring-10",
+    "stiff-servo-0.1",
+    "stiff-servo-1",
+    "stiff-servo-10",
+    "sliding-block-elliptic-along",
+    "sliding-block-elliptic-across",
+    "sliding-block-pyramidal-along",
+    "sliding-block-pyramidal-across",
+    "rolling-ball-elliptic",
+    "rolling-ball-pyramidal",
+    "sticking-block-elliptic",
+    "sticking-block-pyramidal",
+    "elastic-impact",
+    "newtons-cradle",
+    "stack-1",
+    "stack-10",
+    "stack-100",
+    "stack-1000",
+    "stack-10000",
+    "soft-equality-0.1",
+    "soft-equality-1",
+    "millimetre-cube",
+    "distant-body",
+    "flat-plate",
+)
+"""The hard cases whose exact motion is a formula: a scenario may name one as its reference."""

@@ -51,6 +51,7 @@ _STAMP = "stamp.json"
 _SCRATCH = ".bundle-"
 _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
+_CUTTING = ("coursebuild/render/fonts.py", "coursebuild/render/cutting.py")
 _NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
 
 
@@ -195,9 +196,9 @@ def _copy_inputs(target: Path) -> None:
 def _digest(root: Path) -> str:
     """Hashes the names and contents of the inputs, of this module, and of what cuts fonts."""
     whole = hashlib.sha256(_sha256(Path(__file__)).encode())
-    for cutting in (SITE / "prepare_fonts.py", SITE.parent / "coursebuild/render/fonts.py"):
-        if cutting.exists():
-            whole.update(_sha256(cutting).encode())
+    for path in (SITE / "prepare_fonts.py", *(SITE.parent / name for name in _CUTTING)):
+        if path.exists():
+            whole.update(_sha256(path).encode())
     for name in _inputs(root):
         whole.update(f"{name}\0{_sha256(root / name)}\n".encode())
     return whole.hexdigest()

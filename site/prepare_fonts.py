@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.render import fonts
+from coursebuild.render import cutting, fonts
+from coursebuild.values import replace
 
 OFTEN = (
     *range(0x20, 0x7F),
@@ -44,15 +45,19 @@ def prepared(bundle: Path) -> dict[str, bytes]:
     smaller: dict[str, dict[str, str]] = {}
     listed = fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes())
     faces = [(face, (bundle / "fonts" / face.file).read_bytes()) for face in listed]
-    for job in fonts.font_jobs(faces, "".join(fonts.BASE), ""):
-        files[job.face.file] = fonts.subset_font(job)
-        cuts[job.key] = job.face.file
+    ready: dict[str, bytes] = {}
     for face, data in faces:
-        if face.family == fonts.MATH:
-            characters = "".join(sorted(set(map(chr, OFTEN)) & fonts.covered(data)))
-            files[face.file] = fonts.subset_font(fonts.FontJob(face, data, characters))
-            name = f"{fonts.VERSION}/{hashlib.sha256(data).hexdigest()}"
-            smaller[name] = {"file": face.file, "characters": characters}
+        often = set(map(chr, OFTEN)) if face.family == fonts.MATH else fonts.covered(data)
+        characters = "".join(sorted(often & fonts.covered(data)))
+        made = fonts.ready_font(fonts.FontJob(face, data, characters))
+        ready[face.file] = made
+        name = face.file.replace(".woff2", ".ttf")
+        files[name] = made
+        key = f"{fonts.VERSION}/{hashlib.sha256(data).hexdigest()}"
+        smaller[key] = {"file": name, "characters": characters}
+    for job in fonts.font_jobs(faces, "".join(fonts.BASE), ""):
+        files[job.face.file] = fonts.finest_font(replace(job, data=ready[job.face.file]))
+        cuts[job.key] = job.face.file
     listing = {"made_from": made_from(bundle), "cuts": cuts, "smaller": smaller}
     text = json.dumps(listing, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
     return {**files, "fonts.json": text.encode()}
@@ -61,9 +66,23 @@ def prepared(bundle: Path) -> dict[str, bytes]:
 def made_from(bundle: Path) -> str:
     """A hash of the fonts and of what cuts them."""
     digest = hashlib.sha256()
-    for path in (Path(__file__), Path(fonts.__file__), *sorted((bundle / "fonts").iterdir())):
+    for path in (Path(__file__), Path(fonts.__file__), Path(cutting.__file__)):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
+    for face in fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes()):
+        whole = replace(face, characters="", measure=None)  # which may not be noted yet
+        digest.update(f"{whole}\0".encode() + (bundle / "fonts" / face.file).read_bytes())
     return digest.hexdigest()
+
+
+def noted(bundle: Path) -> bytes:
+    """The list of the fonts, with what is otherwise found by reading them."""
+    path = bundle / "fonts" / "fonts.json"
+    faces = json.loads(path.read_bytes())
+    for face in faces:
+        data = (bundle / "fonts" / face["file"]).read_bytes()
+        face["characters"] = fonts.unicode_range("".join(sorted(fonts.covered(data))))
+        face["measure"] = fonts.measured(data)
+    return (json.dumps(faces, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def main(bundle: Path, old: Path | None) -> None:
@@ -71,10 +90,11 @@ def main(bundle: Path, old: Path | None) -> None:
     target = bundle / "prepared"
     if old is not None and is_from(old / "prepared" / "fonts.json", made_from(bundle)):
         shutil.copytree(old / "prepared", target)
-        return
-    target.mkdir()
-    for name, data in prepared(bundle).items():
-        (target / name).write_bytes(data)
+    else:
+        target.mkdir()
+        for name, data in prepared(bundle).items():
+            (target / name).write_bytes(data)
+    (bundle / "fonts" / "fonts.json").write_bytes(noted(bundle))
 
 
 def is_from(listing: Path, digest: str) -> bool:

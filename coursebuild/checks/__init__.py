@@ -22,7 +22,7 @@ from coursebuild.checks.links import check_links, document_links
 from coursebuild.checks.links import places as places
 from coursebuild.checks.quizzes import check_quizzes, quiz_findings
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Course, Document, Script, document_blocks
+from coursebuild.model import Course, Document, document_blocks
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
@@ -31,11 +31,12 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
 
 
 def check_document(
-    course: Course, document: Document, known: Places, scripts: Mapping[str, Script]
+    course: Course, document: Document, known: Places, scripts: Mapping[str, bool]
 ) -> tuple[Diagnostic, ...]:
     """What `check_course` finds in one document, given what the rest of the course offers.
 
-    Only that another document has a quiz of the same id goes unseen.
+    `scripts` are those of the course by path, and whether they are not run. Only that another
+    document has a quiz of the same id goes unseen.
     """
     blocks = tuple(document_blocks(document))
     links = document_links(course, document, known)

@@ -6,6 +6,7 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
    number of lines put before it.
 2. `check_compiled` holds what compiling gave against what the lesson says, and a lab's names
    against its model. A file that only other models include need not compile by itself.
+3. Scenarios that are declared for a model are held against it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Course, Lab, Mjcf, document_blocks
 from coursebuild.results import CompileResult, ModelFacts
@@ -70,7 +72,7 @@ def check_compiled(
 
     `readable` makes one line of a message of MuJoCo's.
     """
-    blocks = [block for document in course.documents for block in document_blocks(document)]
+    blocks = (block for document in course.documents for block in document_blocks(document))
     labs = [block for block in blocks if isinstance(block, Lab)]
     found: list[Diagnostic] = []
     parts = _parts(course, models) - {lab.model for lab in labs}
@@ -80,17 +82,26 @@ def check_compiled(
             span = _line(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
             message = f"the model `{model.name}` does not compile: {readable(result.error)}"
             found.append(diagnose("model-error", span, message))
-    facts: dict[int, ModelFacts] = {}
+    facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         found += _check_text(text, result, readable)
         if result.facts is not None:
-            facts[id(text.block)] = result.facts
+            facts[_place(text.block)] = result.facts
     for lab in labs:
         compiled = models.get(lab.model) if lab.model is not None else None
-        known = compiled.facts if compiled is not None else facts.get(id(lab))
+        known = compiled.facts if compiled is not None else facts.get(_place(lab))
         if known is not None:
             found += _check_names(lab, known)
+    for declared in course.declarations:
+        facts_of_model = models[declared.model].facts
+        if facts_of_model is not None:
+            found += check_scenarios(declared, facts_of_model)
     return tuple(found)
+
+
+def _place(block: Mjcf | Lab) -> tuple[str, int]:
+    """What a block is found by: it may be another object the next time."""
+    return block.span.path, block.span.start
 
 
 def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str | None]:

@@ -10,23 +10,28 @@ from collections.abc import Iterable, Iterator, Mapping
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Block, Course, OutputQuestion, Quiz, Script, document_blocks
 from coursebuild.results import Outcome, ScriptRun
+from coursebuild.source import Span
 
 
 def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
     """Repeated ids, and output questions about scripts that nothing runs."""
-    blocks = [block for document in course.documents for block in document_blocks(document)]
-    scripts = {block.path: block for block in blocks if isinstance(block, Script)}
+    blocks = (block for document in course.documents for block in document_blocks(document))
+    scripts = {block.path: block.norun for block in blocks if isinstance(block, Script)}
+    blocks = (block for document in course.documents for block in document_blocks(document))
     return quiz_findings(blocks, scripts)
 
 
-def quiz_findings(blocks: Iterable[Block], scripts: Mapping[str, Script]) -> tuple[Diagnostic, ...]:
-    """The same for the quizzes among some blocks, by the scripts of the course."""
-    seen: dict[str, Quiz] = {}
+def quiz_findings(blocks: Iterable[Block], scripts: Mapping[str, bool]) -> tuple[Diagnostic, ...]:
+    """The same for the quizzes among some blocks.
+
+    `scripts` are those of the course by path, and whether they are not run.
+    """
+    seen: dict[str, Span] = {}
     found: list[Diagnostic] = []
     for quiz in (block for block in blocks if isinstance(block, Quiz)):
-        first = seen.setdefault(quiz.id, quiz)
-        if first is not quiz:
-            note = Note("the first one is here", first.id_span)
+        first = seen.setdefault(quiz.id, quiz.id_span)
+        if first is not quiz.id_span:
+            note = Note("the first one is here", first)
             found.append(
                 diagnose(
                     "quiz-id-repeated",
@@ -40,19 +45,19 @@ def quiz_findings(blocks: Iterable[Block], scripts: Mapping[str, Script]) -> tup
     return tuple(found)
 
 
-def _output_questions(quiz: Quiz, scripts: Mapping[str, Script]) -> Iterator[Diagnostic]:
+def _output_questions(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:
     for question in quiz.questions:
         if not isinstance(question, OutputQuestion):
             continue
-        script = scripts.get(question.script)
-        if script is None:
+        norun = scripts.get(question.script)
+        if norun is None:
             yield diagnose(
                 "quiz-output",
                 question.script_span,
                 f"no lesson has a script `{question.script}`",
                 help=did_you_mean(question.script, scripts),
             )
-        elif script.norun:
+        elif norun:
             yield diagnose(
                 "quiz-output",
                 question.script_span,

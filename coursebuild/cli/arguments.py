@@ -11,13 +11,14 @@ from collections.abc import Callable
 from coursebuild.cli.commands import (
     build_command,
     check_command,
+    diet_command,
     explain_command,
     extract_command,
     schema_command,
     serve_command,
-    stability_command,
     update_command,
 )
+from coursebuild.cli.measuring import bench_command, stability_command
 
 
 def parser() -> argparse.ArgumentParser:
@@ -55,6 +56,17 @@ def parser() -> argparse.ArgumentParser:
         metavar="PLACE",
         default=None,
         help="run the scripts on a Dask cluster: dask://HOST:PORT",
+    )
+    check.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="move initial states by 1e-12, and say which printed digits hold",
+    )
+    check.add_argument(
+        "--against",
+        metavar="VERSION",
+        default=None,
+        help="run the scripts with this version of MuJoCo, and say what it changes",
     )
     update = _command(commands, "update", update_command, "bring recorded outputs up to date")
     _lessons(update)
@@ -94,6 +106,30 @@ def parser() -> argparse.ArgumentParser:
         "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
     )
     explain.set_defaults(command=explain_command, quiet=False)
+    bench = _command(
+        commands,
+        "bench",
+        bench_command,
+        "measure speed against error of the course's models",
+        runs=False,
+    )
+    bench.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help="a model, as in models/SCENE.xml (default: all)"
+    )
+    bench.add_argument(
+        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
+    )
+    bench.add_argument(
+        "--quick", action="store_true", help="fewer settings and rough times, for a first look"
+    )
+    bench.add_argument(
+        "--plot",
+        metavar="FILE.svg",
+        default=None,
+        help="draw error against cost; of several scenarios each into a file of its own",
+    )
+    _recorded(bench)
+    _cache(bench)
     stability = _command(
         commands,
         "stability",
@@ -107,13 +143,47 @@ def parser() -> argparse.ArgumentParser:
     stability.add_argument(
         "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
     )
+    _recorded(stability)
     _cache(stability)
+    diet = _command(
+        commands,
+        "diet",
+        diet_command,
+        "say what models hold that their scenarios do not need",
+        runs=False,
+    )
+    diet.add_argument("models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)")
+    writes = diet.add_mutually_exclusive_group()
+    writes.add_argument(
+        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
+    )
+    writes.add_argument(
+        "--record", action="store_true", help="write what was found to content/reports/"
+    )
+    diet.add_argument("--quick", action="store_true", help="short runs, rough times")
+    diet.add_argument(
+        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
+    )
+    _cache(diet)
     schema = commands.add_parser(
         "schema", help="print a JSON Schema for an editor", allow_abbrev=False
     )
-    schema.add_argument("name", choices=("quiz", "lab", "course"))
+    schema.add_argument("name", choices=("quiz", "lab", "course", "model"))
     schema.set_defaults(command=schema_command)
     return parser
+
+
+def _recorded(parser: argparse.ArgumentParser) -> None:
+    """What is done with reports in the course's folder."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--record", action="store_true", help="write what was measured into content/reports/"
+    )
+    group.add_argument(
+        "--check",
+        action="store_true",
+        help="measure again, and fail where a figure is not as recorded; times never are compared",
+    )
 
 
 def _cache(parser: argparse.ArgumentParser) -> None:

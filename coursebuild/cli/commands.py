@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from coursebuild.cli.output import CLEAN, look, print_report, report_text, style_of, write
+from coursebuild.cli.output import CLEAN, WRONG, look, print_report, report_text, style_of, write
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
@@ -41,6 +41,8 @@ def available_cores() -> int:
 
 def check_command(arguments: argparse.Namespace) -> int:
     """Verify, publish nothing."""
+    if arguments.against is not None:
+        return _against(arguments)
 
     def work(options: Options) -> Report:
         from coursebuild.pipeline.check import check
@@ -48,15 +50,42 @@ def check_command(arguments: argparse.Namespace) -> int:
 
         part = read_shard(arguments.shard, arguments.timings)
         lessons = tuple(arguments.lessons)
-        return check(options, lessons, shard=part, timings=arguments.write_timings)
+        return check(
+            options,
+            lessons,
+            shard=part,
+            timings=arguments.write_timings,
+            sensitivity=arguments.sensitivity,
+        )
 
     # Machines are told how long it took.
     parts = arguments.shard or arguments.timings or arguments.write_timings
-    if arguments.format != "text" or parts:
+    if arguments.format != "text" or parts or arguments.sensitivity:
         options = _options(arguments)
         return print_report(work(options), arguments.format, options)
     command = ("check", *arguments.lessons)
     return _unless_unchanged(arguments, command, ("examples",), work)
+
+
+def _against(arguments: argparse.Namespace) -> int:
+    """Tell what the scripts do with another version of MuJoCo; no difference is a mistake."""
+    from coursebuild.pipeline.against import against, forbid
+    from coursebuild.report.against import against_json, against_text
+
+    forbid(arguments.format not in ("text", "json"), f"--format {arguments.format}")
+    forbid(arguments.executor is not None, "--executor")
+    forbid(arguments.shard is not None, "--shard")
+    forbid(bool(arguments.timings), "--timings")
+    forbid(arguments.write_timings is not None, "--write-timings")
+    forbid(arguments.sensitivity, "--sensitivity")
+    options = _options(arguments)
+    try:
+        report = against(options, tuple(arguments.lessons), arguments.against)
+    finally:
+        options.store.close()
+    if arguments.format == "json":
+        return write(against_json(report), CLEAN)
+    return write(against_text(report, style_of(sys.stdout)), CLEAN)
 
 
 def build_command(arguments: argparse.Namespace) -> int:
@@ -149,19 +178,22 @@ def explain_command(arguments: argparse.Namespace) -> int:
     return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
 
 
-def stability_command(arguments: argparse.Namespace) -> int:
-    """Measure MuJoCo on hard cases, beside theory."""
-    from coursebuild.pipeline.stability import stability
-    from coursebuild.report.stability import stability_json, stability_text
+def diet_command(arguments: argparse.Namespace) -> int:
+    """Say what models hold that their scenarios do not need."""
+    from coursebuild.pipeline import diet
+    from coursebuild.report.diet import diet_report, diet_values
 
     options = _options(arguments)
+    work = diet.fix if arguments.fix else diet.record if arguments.record else diet.diet
     try:
-        reports = stability(options, tuple(arguments.problems))
+        found = work(options, tuple(arguments.models), quick=arguments.quick)
     finally:
         options.store.close()
+    status = CLEAN if found.ok else WRONG
+    parts = (found.reports, found.diagnostics, found.failures, found.remarks)
     if arguments.format == "json":
-        return write(stability_json(reports), CLEAN)
-    return write(stability_text(reports, style_of(sys.stdout)), CLEAN)
+        return write(diet_values(*parts), status)
+    return write(diet_report(*parts, style_of(sys.stdout)), status)
 
 
 def schema_command(arguments: argparse.Namespace) -> int:

@@ -34,7 +34,8 @@ _MARGIN = 10.0
 class JsonChild:
     """The child and its folder."""
 
-    def __init__(self, script: str, seconds: float) -> None:
+    def __init__(self, script: str, seconds: float, python: str | None = None) -> None:
+        self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -108,7 +109,7 @@ class JsonChild:
             self._folder = tempfile.TemporaryDirectory(prefix="coursebuild-")
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
-                [sys.executable, "-E", "-P", self._script],
+                [self._python, "-E", "-P", self._script],
                 cwd=self._folder.name,
                 env=clean_environment(os.environ),
                 stdin=subprocess.PIPE,

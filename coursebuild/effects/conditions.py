@@ -58,12 +58,17 @@ def _c_library() -> str:
         return ""
 
 
-def places(root: Path, outer: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    """Folders of this machine whose paths may stand in what a script writes, longest first."""
+def places(
+    root: Path, outer: Mapping[str, str], prefix: str | None = None
+) -> tuple[tuple[str, str], ...]:
+    """Folders of this machine whose paths may stand in what a script writes, longest first.
+
+    `prefix` is that of another interpreter than the one that runs this.
+    """
     found = {
         "course": str(root),
         "library": str(Path(__file__).resolve().parents[2]),
-        "prefix": sys.prefix,
+        "prefix": prefix or sys.prefix,
         "base": sys.base_prefix,
         "home": outer.get("HOME", ""),
     }

@@ -23,7 +23,7 @@ import msgspec
 
 from coursebuild.effects.runner import run_scripts
 from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.results import ScriptJob, ScriptRun, Trace
+from coursebuild.results import ScriptJob, ScriptRun
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -84,11 +84,6 @@ def _at_home(run: ScriptRun, here: str, home: str) -> ScriptRun:
     """The run as it would have been at home, but for files that are nowhere but here."""
     trace = run.trace
     if trace is not None and trace.outside and not trace.opaque:
-        trace = Trace(
-            trace.files,
-            trace.folders,
-            (),
-            trace.modules,
-            "it read files of another machine that are no part of the course",
-        )
+        why = "it read files of another machine that are no part of the course"
+        trace = replace(trace, outside=(), opaque=why)
     return replace(run, stderr=run.stderr.replace(here, home), trace=trace)

@@ -69,12 +69,15 @@ class ExamplesReport:
     blocked: tuple[Blocked, ...]
 
 
-def write_examples(root: Path, extractions: Sequence[tuple[str, bytes]]) -> ExamplesReport:
+def write_examples(
+    root: Path, extractions: Sequence[tuple[str, bytes]] | Mapping[str, bytes]
+) -> ExamplesReport:
     """Bring `examples/` up to date.
 
     Args:
         root: the course folder; the caller holds its lock.
-        extractions: every script of the course, each path once, POSIX, below `examples/`.
+        extractions: every script of the course, each path once, POSIX, below `examples/`; a
+            mapping is asked for one after the other.
 
     Raises:
         EffectError: the folder cannot be written, or leads out of the project.
@@ -88,7 +91,8 @@ def write_examples(root: Path, extractions: Sequence[tuple[str, bytes]]) -> Exam
     if not extractions and not known:
         return ExamplesReport((), (), (), ())
     try:
-        return _Update(root, known, dict(extractions)).run()
+        wanted = extractions if isinstance(extractions, Mapping) else dict(extractions)
+        return _Update(root, known, wanted).run()
     except OSError as error:
         where = os.path.relpath(error.filename, root) if error.filename else FOLDER
         raise EffectError(f"{where} cannot be written: {reason(error)}") from None

@@ -34,11 +34,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypedDict
 
-from coursebuild.effects import mujoco_tracing
+from coursebuild.effects import mujoco_nudging, mujoco_tracing, mujoco_watching
 from coursebuild.effects.ending import Ending
 from coursebuild.effects.interpreter import Interpreter
 from coursebuild.effects.notes import Notes, read_notes
 from coursebuild.effects.preload import Recorder
+from coursebuild.effects.spawned import Waiting
 from coursebuild.effects.supervisor import Job, Slot, die_with, library_is_installed
 from coursebuild.effects.tracing import Tracer, installed_folders, library_folders
 from coursebuild.effects.watching import Launched
@@ -175,6 +176,7 @@ class _Server:
         self.recorder.settle()
         if "mujoco" in names and "mujoco" in sys.modules:
             mujoco_tracing.wrap(sys.modules["mujoco"], re)
+            mujoco_watching.watch(sys.modules["mujoco"])
         gc.collect()
         gc.freeze()  # a script's collector shall not look at, and so copy, what it did not make
         changed = [k for k, v in _surroundings().items() if v != before[k]]
@@ -266,10 +268,20 @@ class _Forker:
         mujoco_tracing.tracer = tracer
         ending = Ending(self.recorder.offer(tracer.restored), tracer, _contents(job["path"]))
         atexit.register(ending.check)  # the first that is registered is the last that runs
+        atexit.register(mujoco_watching.finish)
         tracer.at_end = ending.leave
+        self._watch_mujoco(job["perturbation"])
         gc.enable()
         tracer.install()
         return None
+
+    def _watch_mujoco(self, perturbation: int) -> None:
+        """See to it that MuJoCo is watched also where it was not imported before."""
+        modules = self.recorder.modules
+        if "mujoco" not in modules:
+            sys.meta_path.insert(0, Waiting(perturbation, at_end=False))
+        elif perturbation:
+            mujoco_nudging.install(modules["mujoco"], modules["numpy"], perturbation)
 
     def _notes(self, shared: mmap.mmap, notes: str, root: str, path: str) -> Notes:
         end = shared.find(b"\0\0")

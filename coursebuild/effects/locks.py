@@ -50,17 +50,20 @@ def is_abandoned(fd: int) -> bool:
 
 
 @contextlib.contextmanager
-def project_lock(root: Path, on_wait: Callable[[str], None] | None = None) -> Iterator[None]:
-    """Hold the lock of a course folder.
+def project_lock(
+    root: Path, on_wait: Callable[[str], None] | None = None, *, name: str = "lock"
+) -> Iterator[None]:
+    """Hold the lock of a course folder, or another one that it has.
 
     Args:
         root: the course folder; the lock is `.coursebuild/lock` in it.
         on_wait: is called once with a message, in the case that another run has the lock.
+        name: of the lock's file.
 
     Raises:
         RuntimeError: this thread holds it already and would wait for itself.
     """
-    path = root.resolve() / ".coursebuild" / "lock"
+    path = root.resolve() / ".coursebuild" / name
     if _held.get(path) == threading.get_ident():
         raise RuntimeError(f"{path} is already locked by this thread")
     fd = _take(path, on_wait)

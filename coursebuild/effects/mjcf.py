@@ -30,9 +30,16 @@ TEXT_PATH = f"models/{_TEXT_NAME}"
 
 
 def compile_all(
-    root: Path, models: Sequence[MjcfModel], texts: Sequence[str], *, timeout: float = TIMEOUT
+    root: Path,
+    models: Sequence[MjcfModel],
+    texts: Sequence[str],
+    *,
+    timeout: float = TIMEOUT,
+    python: str | None = None,
 ) -> tuple[tuple[CompileResult, ...], tuple[CompileResult, ...]]:
     """Compile models of the course and texts as if they stood in `models/`, all in one child.
+
+    `python` is another interpreter than the one that runs this, with a MuJoCo of its own.
 
     Returns:
         A result for each model, and one for each text.
@@ -45,7 +52,7 @@ def compile_all(
     jobs += [(TEXT_PATH, text) for text in texts]
     if not jobs:
         return (), ()
-    with _Compiler(root, timeout) as compiler:
+    with _Compiler(root, timeout, python) as compiler:
         results = tuple(compiler.compile(*job) for job in jobs)
     return results[: len(models)], results[len(models) :]
 
@@ -67,8 +74,8 @@ def compile_texts(
 class _Compiler(JsonChild):
     """The child that compiles."""
 
-    def __init__(self, root: Path, timeout: float) -> None:
-        super().__init__(mjcf_worker.__file__, timeout)
+    def __init__(self, root: Path, timeout: float, python: str | None) -> None:
+        super().__init__(mjcf_worker.__file__, timeout, python)
         self.root = root
         self.timeout = timeout
 
@@ -108,6 +115,7 @@ def _facts(facts: mjcf_worker.Facts, parts: Iterable[str]) -> ModelFacts:
         sites=tuple(facts["sites"]),
         body_names=tuple(facts["body_names"]),
         includes=tuple(parts),
+        sensors=tuple(facts["sensors"]),
     )
 
 

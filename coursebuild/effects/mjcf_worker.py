@@ -45,6 +45,7 @@ class Facts(TypedDict):
     total_mass: float
     keyframes: list[str]
     sites: list[str]
+    sensors: list[str]
     body_names: list[str]
 
 
@@ -104,10 +105,11 @@ def _facts(mujoco: Any, model: Any) -> Facts:
         "nv": model.nv,
         "nu": model.nu,
         "timestep": float(model.opt.timestep),
-        "integrator": _INTEGRATORS[model.opt.integrator],
+        "integrator": dict(enumerate(_INTEGRATORS)).get(model.opt.integrator, "unknown"),
         "total_mass": float(model.body_mass.sum()),
         "keyframes": names(model.name_keyadr),
         "sites": names(model.name_siteadr),
+        "sensors": names(model.name_sensoradr),
         "body_names": names(model.name_bodyadr[1:]),
     }
 

@@ -2,6 +2,8 @@
 
 Entry point: `wrap`, once MuJoCo has been imported; nothing is noted until `tracer` is set.
 
+What a version of MuJoCo does not have is passed over.
+
 A wrapper has the name and the documentation of what it wraps, and takes itself out of the traceback
 of whatever that raises.
 """
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from coursebuild.effects.tracing import Tracer
 
     _Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
+    _After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
 
 tracer: Tracer | None = None
 """Who takes the notes; nobody does before it is set."""
@@ -41,7 +44,7 @@ _WRITERS = (
 def wrap(mujoco: ModuleType, re: ModuleType) -> None:
     """Wrap the functions of an imported MuJoCo."""
     files = ModelFiles(re, _read)
-    model, spec = mujoco.MjModel, mujoco.MjSpec
+    model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
 
     def path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         files.of_path(_text(_get(args, keywords, 0, "filename")), _given(args, keywords))
@@ -88,7 +91,8 @@ def wrap(mujoco: ModuleType, re: ModuleType) -> None:
         (spec, "from_string", spec_string),
     )
     for owner, name, before in of_class:
-        setattr(owner, name, staticmethod(_wrapped(getattr(owner, name), before)))
+        if hasattr(owner, name):
+            setattr(owner, name, staticmethod(wrapped(getattr(owner, name), before)))
     of_spec: tuple[tuple[str, _Before], ...] = (
         ("compile", compile),
         ("recompile", compile),
@@ -96,7 +100,8 @@ def wrap(mujoco: ModuleType, re: ModuleType) -> None:
         ("to_file", writer(1)),
     )
     for name, before in of_spec:
-        setattr(spec, name, _wrapped(spec.__dict__[name].__get__(None, spec), before))
+        if name in getattr(spec, "__dict__", ()):
+            setattr(spec, name, wrapped(vars(spec)[name].__get__(None, spec), before))
     functions: list[tuple[str, _Before]] = [
         ("mj_loadPluginLibrary", library),
         ("mj_loadAllPluginLibraries", library),
@@ -105,17 +110,22 @@ def wrap(mujoco: ModuleType, re: ModuleType) -> None:
     functions += [(name, writer(position)) for name, position in _WRITERS]
     for name, before in functions:
         real = getattr(mujoco, name, None)
-        if real is None:
-            continue
-        wrapper = _wrapped(real, before)
-        for module in (mujoco, sys.modules.get(real.__module__ or "")):
-            if module is not None and module.__dict__.get(name) is real:
-                setattr(module, name, wrapper)
+        if real is not None:
+            replace_function(mujoco, name, wrapped(real, before))
 
 
-def _wrapped(
-    real: Callable[..., Any], before: Callable[[tuple[Any, ...], Mapping[str, Any]], None]
+def wrapped(
+    real: Callable[..., Any],
+    before: _Before,
+    after: _After | None = None,
+    *,
+    like: Callable[..., Any] | None = None,
 ) -> Callable[..., Any]:
+    """A function that does what another does, and something before, and with its result after.
+
+    `like` is the one whose name it has, where that is another one.
+    """
+
     def wrapper(*args: Any, **keywords: Any) -> Any:
         if tracer is not None:
             try:  # noqa: SIM105 (contextlib may not be loaded)
@@ -123,15 +133,29 @@ def _wrapped(
             except Exception:  # MuJoCo itself says what is wrong with its arguments
                 pass
         try:
-            return real(*args, **keywords)
+            result = real(*args, **keywords)
         except BaseException as error:
             if error.__traceback__ is not None:
                 error.__traceback__ = error.__traceback__.tb_next
             raise  # which, unlike naming the error, adds no entry to the traceback
+        if after is not None and tracer is not None:
+            try:  # noqa: SIM105
+                after(args, keywords, result)
+            except Exception:  # what was asked for has been done
+                pass
+        return result
 
     for attribute in ("__module__", "__name__", "__qualname__", "__doc__"):
-        setattr(wrapper, attribute, getattr(real, attribute, None))
+        setattr(wrapper, attribute, getattr(like or real, attribute, None))
     return wrapper
+
+
+def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> None:
+    """Put a function in the place of one of MuJoCo's, wherever it is found."""
+    real = getattr(mujoco, name)
+    for module in (mujoco, sys.modules.get(real.__module__ or "")):
+        if module is not None and module.__dict__.get(name) is real:
+            setattr(module, name, new)
 
 
 def _read(path: str) -> None:

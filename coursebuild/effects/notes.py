@@ -13,6 +13,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypedDict
 
+_FIELDS = 6
+"""Of a record that says that a simulation was lost."""
+
 
 class Notes(TypedDict):
     """The fields of `coursebuild.results.Trace`."""
@@ -22,6 +25,10 @@ class Notes(TypedDict):
     outside: list[str]
     modules: list[str]
     opaque: str
+    divergences: list[list[str]]
+    """Of each its sign, detail, time, model, path and line."""
+    moved: bool
+    states: list[str]
 
 
 def read_notes(
@@ -52,6 +59,9 @@ def read_notes(
         "outside": sorted(collected.outside),
         "modules": sorted(collected.modules),
         "opaque": collected.opaque,
+        "divergences": collected.divergences,
+        "moved": collected.moved,
+        "states": collected.states,
     }
 
 
@@ -62,6 +72,9 @@ class _Collected:
         self.outside: set[str] = set()
         self.modules: set[str] = set()
         self.opaque = ""
+        self.divergences: list[list[str]] = []
+        self.moved = False
+        self.states: list[str] = []
         self._root = root.rstrip("/") + "/"
         self._looked_for = looked_for
 
@@ -76,6 +89,14 @@ class _Collected:
         elif kind == "n":
             folder, _, name = about.partition("\t")
             self._imported(folder.removeprefix(self._root[:-1]).lstrip("/"), name, bool(folder))
+        elif kind == "d":
+            fields = about.split("\t")
+            if len(fields) == _FIELDS and fields not in self.divergences:
+                self.divergences.append(fields)
+        elif kind == "p":
+            self.moved = True
+        elif kind == "s":
+            self.states.append(about)
         elif kind == "o" and not self.opaque:
             self.opaque = about
 

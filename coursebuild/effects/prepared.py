@@ -1,11 +1,12 @@
-"""Fonts that come with the tool cut already: those that nearly every course needs.
+"""Fonts that come with the tool cut already, or ready to be cut.
 
 Entry points: `prepared_cut`, `prepared_source`. `site/prepare_fonts.py` makes the files when
 site/dist is made.
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
-2. A large font is there a second time, cut to the characters that are used at all often. What is
-   cut from it is, byte for byte, what would be cut from the whole font, in less than half the time.
+2. Every font is there a second time, with all done that does not depend on the course: what is cut
+   from it takes a third of the time. The largest has the characters only that are used at all
+   often.
 
 Where the way of cutting is another than when the files were made, no key is found, and everything
 is cut from the whole fonts.

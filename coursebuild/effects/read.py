@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
 from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
@@ -39,6 +40,8 @@ class CourseFiles:
     """`content/pages/**/*.md`."""
     models: tuple[MjcfModel, ...]
     """`models/**/*.xml`, those included that other models pull in."""
+    declarations: tuple[Source, ...]
+    """`models/**/*.toml`: what is to be measured on the models beside them."""
     files: tuple[str, ...]
     """Every regular file in `content/` and `models/`: what a relative link can lead to."""
     unreadable: tuple[str, ...]
@@ -67,8 +70,11 @@ def find_root(chosen: Path | None, start: Path) -> Path:
     )
 
 
-def read_course(root: Path) -> Parsed[CourseFiles]:
-    """Read the map, the lessons, the pages and the models of a course."""
+def read_course(root: Path, aside: Aside | None = None) -> Parsed[CourseFiles]:
+    """Read the map, the lessons, the pages and the models of a course.
+
+    The texts of lessons and pages are put aside, where somebody says where.
+    """
     root = root.resolve()
     reader = _Reader(root)
     files = [*reader.walk("content"), *reader.walk("models")]
@@ -79,14 +85,16 @@ def read_course(root: Path) -> Parsed[CourseFiles]:
     ]
     pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
     models = [f for f in files if f.startswith("models/") and f.endswith(".xml")]
+    declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]
     found = CourseFiles(
         map=reader.map(),
-        lessons=reader.sources(lessons),
-        pages=reader.sources(pages),
+        lessons=reader.sources(lessons, aside),
+        pages=reader.sources(pages, aside),
         models=tuple(
             MjcfModel(source.path.removeprefix("models/").removesuffix(".xml"), source)
             for source in reader.sources(models)
         ),
+        declarations=reader.sources(declarations),
         files=tuple(sorted(files)),
         unreadable=tuple(sorted(reader.unreadable)),
     )
@@ -111,10 +119,12 @@ def read_bytes(root: Path, path: str) -> bytes:
         raise EffectError(f"{path} cannot be read: {reason(error)}") from None
 
 
-def read_sources(root: Path, paths: list[str]) -> Parsed[tuple[Source, ...]]:
+def read_sources(
+    root: Path, paths: list[str], aside: Aside | None = None
+) -> Parsed[tuple[Source, ...]]:
     """Further text files of the project, such as pages that lie outside of `content/`."""
     reader = _Reader(root.resolve())
-    return Parsed(reader.sources(paths), tuple(reader.diagnostics))
+    return Parsed(reader.sources(paths, aside), tuple(reader.diagnostics))
 
 
 class _Reader:
@@ -195,8 +205,8 @@ class _Reader:
         else:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
 
-    def sources(self, paths: list[str]) -> tuple[Source, ...]:
-        """The files that can be read, decoded."""
+    def sources(self, paths: list[str], aside: Aside | None = None) -> tuple[Source, ...]:
+        """The files that can be read, decoded; those that are UTF-8 are put aside."""
         found = []
         for path in paths:
             if path in self.unreadable:
@@ -208,12 +218,13 @@ class _Reader:
             except EffectError as error:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
             else:
-                found.append(self._decode(path, data))
+                found.append(self._decode(path, data, aside))
         return tuple(found)
 
-    def _decode(self, path: str, data: bytes) -> Source:
+    def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source:
         try:
-            return Source(path, data.decode("utf-8"))
+            text = data.decode("utf-8")
+            return Source(path, text) if aside is None else Source.away(path, aside.put(data).text)
         except UnicodeDecodeError as error:
             source = Source(path, data.decode("utf-8", "replace"))
             at = len(data[: error.start].decode("utf-8"))

@@ -31,11 +31,11 @@ from typing import Self, TypeAlias
 from coursebuild.effects import supervisor
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.notes import Notes
+from coursebuild.effects.surroundings import Place, library_folder, wanted_packages
 from coursebuild.effects.surroundings import clean_environment as clean_environment
-from coursebuild.effects.surroundings import library_folder, wanted_packages
 from coursebuild.effects.watching import STDERR_KEPT
 from coursebuild.effects.workers import ForkServer, ServerLostError, Worker, spawn_worker
-from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign, Trace
 from coursebuild.values import dataclass
 
 
@@ -59,6 +59,9 @@ class RunFinished:
 
 
 RunEvent: TypeAlias = RunStarted | RunFinished
+
+_LOG = "MUJOCO_LOG.TXT"
+"""What MuJoCo writes where it runs when it warns, in a process that a script has started."""
 
 
 def run_scripts(
@@ -95,9 +98,14 @@ class ScriptServer:
 
     The process is started when scripts are first run; a new one takes its place when it has died,
     when packages of other versions were installed, and when the environment is another one.
+
+    Args:
+        fork: let a server fork the scripts, where it can.
+        place: another interpreter that is to run them.
     """
 
-    def __init__(self, *, fork: bool = True) -> None:
+    def __init__(self, *, fork: bool = True, place: Place | None = None) -> None:
+        self._place = place
         self._fork = fork and sys.platform == "linux"
         self._server: ForkServer | None = None
         self._idle: list[Worker] = []
@@ -125,7 +133,7 @@ class ScriptServer:
         """Begin to import what these scripts import, without waiting for it."""
         if not self._fork:
             return
-        environment = clean_environment(os.environ)
+        environment = _environment(self._place)
         with contextlib.suppress(ServerLostError):  # which the run will find too
             server = self._usable(environment)
             server.expect(wanted_packages(root / path for path in paths))
@@ -140,11 +148,13 @@ class ScriptServer:
         order: Sequence[int] | None = None,
     ) -> tuple[ScriptRun, ...]:
         """As `run_scripts`; one run at a time."""
-        work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order)
+        work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order, self._place)
         if not work.waiting:
             return work.results()
         busy: set[Worker] = set()
         work.scratch = _scratch()
+        log = work.root / _LOG
+        had_log = os.path.lexists(log)
         try:
             with selectors.DefaultSelector() as selector:
                 for _ in range(min(max(parallel, 1), len(work.waiting))):
@@ -158,6 +168,9 @@ class ScriptServer:
             for worker in busy:
                 worker.close()
             supervisor.remove_folder(work.scratch)
+            if not had_log:
+                with contextlib.suppress(OSError):
+                    log.unlink()
         return work.results()
 
     def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
@@ -192,13 +205,14 @@ class ScriptServer:
                 return self._idle_worker(work) or server.worker(work.scratch)
             except ServerLostError:
                 self.close()
-        return self._idle_worker(work) or spawn_worker(work.environment)
+        return self._idle_worker(work) or spawn_worker(work.environment, work.python)
 
     def _usable(self, environment: Mapping[str, str]) -> ForkServer:
         if self._server is not None and not self._server.usable(environment):
             self.close()
         if self._server is None:
-            self._server = ForkServer(environment)
+            python = None if self._place is None else self._place.python
+            self._server = ForkServer(environment, python)
         return self._server
 
     def _idle_worker(self, work: _Work) -> Worker | None:
@@ -224,11 +238,14 @@ class _Work:
         jobs: Sequence[ScriptJob],
         tell: Callable[[RunEvent], None],
         order: Sequence[int] | None,
+        place: Place | None,
     ) -> None:
         self.root = root
         self.jobs = jobs
         self.tell = tell
-        self.environment = clean_environment(os.environ)
+        self.environment = _environment(place)
+        self.python = None if place is None else place.python
+        self.library = library_folder() if place is None else place.packages
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
@@ -287,7 +304,8 @@ class _Work:
             "requires": list(job.requires),
             "environment": self.environment,
             "scratch": self.scratch,
-            "library": library_folder(),
+            "library": self.library,
+            "perturbation": job.perturbation,
         }
         return json.dumps(request).encode()
 
@@ -295,6 +313,11 @@ class _Work:
         self.runs[index] = run
         self.done += 1
         self.tell(RunFinished(run, self.done, self.total))
+
+
+def _environment(place: Place | None) -> dict[str, str]:
+    clean = clean_environment(os.environ)
+    return clean if place is None else place.environment(clean)
 
 
 def _script_run(
@@ -325,7 +348,15 @@ def _trace(notes: Notes) -> Trace:
         outside=tuple(notes["outside"]),
         modules=tuple(notes["modules"]),
         opaque=notes["opaque"],
+        divergences=tuple(_divergence(*fields) for fields in notes["divergences"]),
+        moved=notes["moved"],
+        states=tuple(notes["states"]),
     )
+
+
+def _divergence(sign: str, detail: str, time: str, model: str, path: str, line: str) -> Divergence:
+    depth, *geoms = detail.split("\x1f")
+    return Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
 
 
 def _outcome(report: supervisor.Report) -> tuple[Outcome, int]:

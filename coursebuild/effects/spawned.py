@@ -9,7 +9,7 @@ from __future__ import annotations
 import posix
 import sys
 
-from coursebuild.effects import mujoco_tracing, tracing
+from coursebuild.effects import mujoco_nudging, mujoco_tracing, mujoco_watching, tracing
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def start(notes: str, tool: str, bare: frozenset[str]) -> None:
+def start(notes: str, tool: str, bare: frozenset[str], perturbation: int) -> None:
     """Watch this process.
 
     Args:
         notes: the folder where the notes are written.
         tool: the entry of the search path where this tool was imported from.
         bare: names of the modules that were there before.
+        perturbation: in which direction initial states are moved; 0: in none.
     """
     sys.path.remove(tool)
     temporary = posix.environ[b"TMPDIR"].decode("utf-8", "surrogateescape")
@@ -32,7 +33,7 @@ def start(notes: str, tool: str, bare: frozenset[str]) -> None:
     installed = [*tracing.installed_folders(), *tracing.library_folders(root, tool)]
     tracer = tracing.Tracer(root, temporary, installed, notes, sink=None)
     mujoco_tracing.tracer = tracer
-    sys.meta_path.insert(0, _Waiting())
+    sys.meta_path.insert(0, Waiting(perturbation))
     for name in [name for name in sys.modules if name not in bare]:
         if name != "sitecustomize":
             del sys.modules[name]
@@ -40,8 +41,13 @@ def start(notes: str, tool: str, bare: frozenset[str]) -> None:
     tracer.begin()
 
 
-class _Waiting:
-    """Wraps MuJoCo when it has been imported."""
+class Waiting:
+    """Wraps MuJoCo when it has been imported; first on `sys.meta_path`."""
+
+    def __init__(self, perturbation: int, *, at_end: bool = True) -> None:
+        self._perturbation = perturbation
+        self._at_end = at_end
+        """Whether it has to see to a last look itself."""
 
     def find_spec(
         self, name: str, path: Any = None, target: ModuleType | None = None
@@ -54,16 +60,26 @@ class _Waiting:
             spec = finder.find_spec(name, path, target)
             if spec is not None:
                 if spec.loader is not None:
-                    spec.loader = _Loader(spec.loader)  # type: ignore[assignment]
+                    spec.loader = _Loader(spec.loader, self)  # type: ignore[assignment]
                 return spec
         return None
+
+    def wrap(self, mujoco: ModuleType) -> None:
+        """Let it be watched."""
+        mujoco_tracing.wrap(mujoco, sys.modules["re"])
+        mujoco_watching.watch(mujoco)
+        if self._perturbation:
+            mujoco_nudging.install(mujoco, sys.modules["numpy"], self._perturbation)
+        if self._at_end:
+            sys.modules["atexit"].register(mujoco_watching.finish)
 
 
 class _Loader:
     """Loads as another loader does, and wraps what was loaded."""
 
-    def __init__(self, real: Any) -> None:
+    def __init__(self, real: Any, waiting: Waiting) -> None:
         self._real = real
+        self._waiting = waiting
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._real, name)
@@ -78,4 +94,4 @@ class _Loader:
         if module.__spec__ is not None:
             module.__spec__.loader = self._real
         self._real.exec_module(module)
-        mujoco_tracing.wrap(module, sys.modules["re"])
+        self._waiting.wrap(module)

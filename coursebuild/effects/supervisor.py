@@ -66,6 +66,8 @@ class Job(TypedDict):
     """Where the script's temporary folder is made; it goes when the last supervisor does."""
     library: str
     """A folder to import `mjcourse` from, where it is not installed."""
+    perturbation: int
+    """In which direction initial states are moved (see `mujoco_nudging`); 0: in none."""
 
 
 class Report(TypedDict):
@@ -223,7 +225,12 @@ def _spawn(job: Job, environment: Mapping[str, str]) -> Launched:
         process = subprocess.Popen(
             [sys.executable, job["path"], *job["args"]],
             cwd=job["root"],
-            env={**environment, "PYTHONPATH": path, "COURSEBUILD_TRACE": notes},
+            env={
+                **environment,
+                "PYTHONPATH": path,
+                "COURSEBUILD_TRACE": notes,
+                "COURSEBUILD_PERTURBATION": str(job["perturbation"]),
+            },
             stdin=subprocess.DEVNULL,
             stdout=stdout,
             stderr=stderr,

@@ -1,6 +1,7 @@
 """What a process that runs scripts finds around it.
 
-Entry points: `clean_environment`, `library_folder`, `wanted_packages`.
+Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `Place`, another interpreter
+than that of the tool.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import ast
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+from coursebuild.values import dataclass
 
 _PASSED_ON = (
     "PATH",
@@ -55,6 +58,26 @@ _PRELOADED = ("numpy", "numpy.random", "mujoco")
 """Packages that are worth importing once for all scripts, in this order: one may import those
 before it. None does anything that a script could see."""
 _IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]+([^\n#;]+)", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An interpreter and what is installed for it, where scripts run that do not run here."""
+
+    name: str
+    """Other places have other names: what is remembered of one holds in no other."""
+    python: str
+    """The interpreter's absolute path."""
+    prefix: str
+    """The folder that holds all of it."""
+    packages: str
+    """The folder with the installed packages, `mjcourse` among them."""
+
+    def environment(self, clean: Mapping[str, str]) -> dict[str, str]:
+        """The environment of scripts there, of the one that they have here."""
+        programs = f"{self.prefix}/bin"
+        path = f"{programs}:{clean['PATH']}" if clean.get("PATH") else programs
+        return {**clean, "PATH": path, "VIRTUAL_ENV": self.prefix}
 
 
 def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:

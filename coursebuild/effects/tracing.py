@@ -17,6 +17,8 @@ A record is a letter and what it is about, in bytes:
 - `m` and a name: a module was imported that is not Python's own, nor of the project
 - `n`, a folder, a tab and a name: a module that had been imported before scripts were, and all that
   it imports, would have been found in this folder first
+- `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
+- `p`: an initial state was moved; `s` and numbers: a state at its end (see `mujoco_nudging`)
 - `o` and words: why there may be more
 
 This file is imported in a script's own process too, where nothing may stay behind, so it imports
@@ -217,6 +219,14 @@ class Tracer:
             self._note(f"r{at}")
             if at.startswith(self.root):
                 self.opaque(NATIVE)
+
+    def diverged(self, fields: str) -> None:
+        """A simulation was lost."""
+        self._note(f"d{fields}")
+
+    def moved(self, record: str) -> None:
+        """Something about a run whose initial states are moved."""
+        self._note(record)
 
     def opaque(self, why: str) -> None:
         """There may be more than is noted."""

@@ -29,6 +29,8 @@ _SUPERVISOR = (
     "from coursebuild.effects import supervisor\n"
     "sys.path.pop(0); supervisor.main(int(sys.argv[2]))"
 )
+_SUPERVISED = ("-E", "-P", "-c", _SUPERVISOR)
+"""Its search path is a script's, without the script's folder."""
 
 
 class ServerLostError(Exception):
@@ -139,14 +141,16 @@ class _SpawnedWorker(Worker):
         self._process.wait()
 
 
-def spawn_worker(environment: Mapping[str, str]) -> Worker:
-    """A supervisor with an interpreter of its own, which starts one for each script."""
+def spawn_worker(environment: Mapping[str, str], python: str | None = None) -> Worker:
+    """A supervisor with an interpreter of its own, which starts one for each script.
+
+    `python` is another interpreter than the one that runs this.
+    """
     theirs, jobs = os.pipe()
     reports, theirs_too = os.pipe()
     try:
         process = subprocess.Popen(
-            # -E and -P: its search path is a script's, without the script's folder.
-            [sys.executable, "-E", "-P", "-c", _SUPERVISOR, library_folder(), str(theirs_too)],
+            [python or sys.executable, *_SUPERVISED, library_folder(), str(theirs_too)],
             stdin=theirs,
             stdout=subprocess.DEVNULL,
             pass_fds=(theirs_too,),
@@ -176,11 +180,13 @@ class _ForkedWorker(Worker):
 class ForkServer:
     """The fork server, started when this is made.
 
+    `python` is another interpreter than the one that runs this.
+
     Raises:
         OSError: there is no place for another process.
     """
 
-    def __init__(self, environment: Mapping[str, str]) -> None:
+    def __init__(self, environment: Mapping[str, str], python: str | None = None) -> None:
         self.environment = dict(environment)
         """What scripts that it forks have found around them since their start."""
         self.trouble = ""
@@ -193,7 +199,7 @@ class ForkServer:
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, forkserver.PLACEHOLDER, str(theirs.fileno())],
+                [python or sys.executable, forkserver.PLACEHOLDER, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,

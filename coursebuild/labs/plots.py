@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from html import escape
 from itertools import pairwise
 
+from coursebuild.drawing.marks import apart
+from coursebuild.drawing.marks import markup_text as _text
+from coursebuild.drawing.scales import tick_texts as tick_texts
+from coursebuild.drawing.scales import ticks as ticks
 from coursebuild.model import LabPlot, LabTrace
 from coursebuild.values import dataclass
 
@@ -24,60 +27,6 @@ _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
 _LABEL_GAP = 13.0
 _LARGEST = 4e307
 """What is beyond is drawn there, so that the range of an axis is finite."""
-
-
-def ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Round numbers from `low` to `high`, about so many."""
-    span = high - low
-    if not (span > 0 and math.isfinite(span)):
-        return [low]
-    step = _step(span, about)
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    # The product has the rounding error of the step; a tick is the nearest double to what it says.
-    return [float(f"{i * step:.15g}") for i in range(first, last + 1)] or [low]
-
-
-def _step(span: float, about: int) -> float:
-    """The distance of the ticks: 1, 2, 2.5 or 5 times a power of ten."""
-    raw = span / about
-    power = 10.0 ** math.floor(math.log10(raw))
-    return next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
-
-
-def tick_texts(values: Sequence[float]) -> list[str]:
-    """Ticks as text: with as many digits as tell them apart, and a real minus."""
-    step = min((b - a for a, b in pairwise(values)), default=0.0)
-    largest = max(abs(value) for value in values)
-    if largest == 0:
-        return ["0" for _ in values]
-    allowed = 1e-6 * (step or largest)
-    plain = _digits(values, "f", allowed) if largest < 1e15 else None
-    if plain is not None and 1e-4 <= largest < 1e6:
-        return plain
-    powers = _digits(values, "e", allowed) or [_readable(f"{v:.3e}") for v in values]
-    longest = max(map(len, powers))
-    return powers if plain is None or max(map(len, plain)) > longest else plain
-
-
-def _digits(values: Sequence[float], form: str, allowed: float) -> list[str] | None:
-    """The values as text with the fewest digits that say them; `None` where none do."""
-    for digits in range(18):
-        texts = [f"{value:.{digits}{form}}" for value in values]
-        if all(abs(float(t) - v) <= allowed for t, v in zip(texts, values, strict=True)):
-            return [_readable(text) for text in texts]
-    return None
-
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def _readable(text: str) -> str:
-    mantissa, _, exponent = text.partition("e")
-    mantissa = mantissa.replace("-", "\u2212")
-    if float(text) == 0:
-        return "0" if exponent else mantissa.lstrip("\u2212")
-    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}" if exponent else mantissa
 
 
 def plot_svg(
@@ -119,11 +68,6 @@ def plot_svg(
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
         f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
     )
-
-
-def _text(text: str) -> str:
-    """Text for markup; characters that no markup can hold are left out."""
-    return escape("".join(c for c in text if c >= " " and c not in "\x7f\ufffe\uffff"))
 
 
 def _dash(trace: LabTrace, n: int) -> str:
@@ -284,13 +228,8 @@ def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
 
 def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
     """Names at the ends of the lines, moved apart where they would overlap."""
-    places: list[float] = []
-    for y, _, _ in sorted(ends):
-        places.append(max(y, places[-1] + _LABEL_GAP) if places else y)
-    most = _HEIGHT - _BOTTOM
-    for i in reversed(range(len(places))):  # those that were pushed out at the bottom go up again
-        most = places[i] = min(places[i], most)
-        most -= _LABEL_GAP
+    wanted = [y for y, _, _ in sorted(ends)]
+    places = apart(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
     return [
         f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:.1f}" '
         f'y="{place + 3.5:.1f}">{_text(label)}</text>'

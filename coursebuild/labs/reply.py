@@ -20,8 +20,8 @@ class Failure:
 
     entry: Entry
     kind: str
-    """`throws`, `nan`, `type`, `warning`, `diverged`, `expect`, `stopAt`, `timeout`, `engine` or
-    `shared`."""
+    """`throws`, `nan`, `type`, `warning`, `diverged`, `deep`, `expect`, `stopAt`, `timeout`,
+    `engine` or `shared`."""
     message: str
     time: float | None
     """Simulated time, s."""

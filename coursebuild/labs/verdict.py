@@ -1,7 +1,7 @@
 """What a trial found, as diagnostics at the entries of the lesson.
 
-Entry points: `trial_diagnostics(lab, trial)`, `reset_diagnostics(lab, trial)`,
-`parity_diagnostics(lab, parity)`, `code_diagnostic`.
+Entry points: `trial_diagnostics(lab, trial)`, `deep_diagnostics(lab, trial)`,
+`reset_diagnostics(lab, trial)`, `parity_diagnostics(lab, parity)`, `code_diagnostic`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _RULES = {
     "type": "lab-value",
     "warning": "lab-warning",
     "diverged": "lab-diverged",
+    "deep": "lab-penetration",
     "expect": "lab-expect",
     "stopAt": "lab-expect",
     "timeout": "lab-timeout",
@@ -117,10 +118,18 @@ def trial_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
     """
     always = {f.kind for f in trial.failures if f.entry == () and f.kind in _OF_MUJOCO}
     failures = [f for f in trial.failures if f.entry == () or f.kind not in always]
-    return tuple(_failure(lab, failure) for failure in failures)
+    return tuple(_failure(lab, failure) for failure in failures if failure.kind != _DEEP)
 
 
 _OF_MUJOCO = ("warning", "diverged")
+_DEEP = "deep"
+
+
+def deep_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
+    """Bodies that lie deep in each other; once where the main run has some."""
+    failures = [f for f in trial.failures if f.kind == _DEEP]
+    always = [f for f in failures if f.entry == ()]
+    return tuple(_failure(lab, failure) for failure in always or failures)
 
 
 def _failure(lab: Lab, failure: Failure) -> Diagnostic:
@@ -147,6 +156,12 @@ def _told(lab: Lab, failure: Failure) -> tuple[str, str]:
         case "diverged":
             help = "try a smaller timestep, another integrator, or a narrower range"
             return f"the simulation diverges{when}: {message}", help
+        case "deep":
+            help = (
+                "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
+                "(`solref`), or a narrower range"
+            )
+            return f"bodies lie deep in each other{when}: {message}", help
         case "expect":
             return f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}", ""
         case "timeout" if message == "did not finish in time":

@@ -85,7 +85,16 @@ class WorkPrecisionRow:
     front: bool
     """Whether no other is both cheaper and more accurate, beyond what timing can tell."""
     dominated_by: int | None
-    """The row (from 0) that is cheaper and no less accurate; `None` on the front."""
+    """The row (from 0) that is cheaper and no less accurate; `None` on the front, and for what was
+    lost or not timed."""
+    seen: float | None = None
+    """The largest displacement or turn of a body in a picture, where 1 is just visible. The front
+    is that of cost and the figure, or where none is declared, of cost and this."""
+    mean_energy: float | None = None
+    """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
+    less 1; `None` where nothing is beyond the horizon."""
+    cost_uncertainty: float | None = None
+    """Relative standard error of the cost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +154,8 @@ class ScenarioReport:
     source: str
     """Where the reference comes from."""
     floor: float
-    """What it may be wrong by; no error is given below ten times as much."""
+    """What places and attitudes may be wrong by, m or rad; no error is given below ten times as
+    much. So it is for velocities, with a floor of their own."""
     second: str
     """The source of the second reference; empty where there is none."""
     agreement: float | None
@@ -158,6 +168,34 @@ class ScenarioReport:
     orders: tuple[OrderRow, ...]
     stable: tuple[StableRow, ...]
     verdict: Verdict
+    velocity_floor: float = 0.0
+    """As `floor`, of velocities: around an impact they are known far worse than places."""
+    smooth: bool = True
+    """Whether accelerations are a smooth function of the state; else there are no orders."""
+    notes: tuple[str, ...] = ()
+    """What to know when reading the figures, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneCard:
+    """What a model is made of, and how fast the browser's engine runs it."""
+
+    bodies: int
+    """Without the world."""
+    geoms: int
+    freedom: int
+    """Degrees of freedom."""
+    possible: int
+    """Pairs of geoms between which MuJoCo looks for contact when they are near each other."""
+    touched: int
+    """Those that touched in any scenario, with the scene's own setting."""
+    mjcf: int
+    """Bytes of the MJCF with the files that it pulls in."""
+    mjb: int
+    """Bytes of the compiled model (an MJB file)."""
+    browser: float | None
+    """Simulated time over the time it takes in WebAssembly (V8), from where the first scenario
+    begins; `None` where it was not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,3 +210,5 @@ class SceneReport:
     """Whether only a part was measured, and in less time."""
     machine: Machine
     scenarios: tuple[ScenarioReport, ...]
+    card: SceneCard | None = None
+    """`None` in a report that is about speed and error alone."""

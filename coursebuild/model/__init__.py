@@ -80,6 +80,11 @@ from coursebuild.model.interactive import OrderQuestion as OrderQuestion
 from coursebuild.model.interactive import OutputQuestion as OutputQuestion
 from coursebuild.model.interactive import Question as Question
 from coursebuild.model.interactive import Quiz as Quiz
+from coursebuild.model.scenarios import Declarations as Declarations
+from coursebuild.model.scenarios import DeclaredScenario as DeclaredScenario
+from coursebuild.model.scenarios import Keep as Keep
+from coursebuild.model.scenarios import Measured as Measured
+from coursebuild.model.scenarios import Visible as Visible
 from coursebuild.model.walk import block_inlines as block_inlines
 from coursebuild.model.walk import child_blocks as child_blocks
 from coursebuild.model.walk import document_blocks as document_blocks

@@ -6,8 +6,9 @@ Entry points: the union `Block`, and `Document`.
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from decimal import Decimal
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from coursebuild.model.inlines import Inline
 from coursebuild.model.interactive import Lab, Quiz
@@ -162,6 +163,8 @@ class Script:
     norun: bool
     body_span: Span
     """The lines between the fences, to the start of the closing one."""
+    diverges: bool = False
+    """Whether a simulation in it is to be lost."""
 
 
 class Mode(enum.Enum):
@@ -297,3 +300,31 @@ class Document:
         default_factory=list, init=False, repr=False, compare=False, hash=False
     )
     """What `document_blocks` gives, once it was asked for."""
+    _load: Callable[[], Document] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """Gives the document with its blocks, where they are away."""
+
+    @property
+    def is_away(self) -> bool:
+        """Whether its blocks are fetched each time."""
+        return self._load is not None
+
+    @classmethod
+    def away(cls, source: Source, load: Callable[[], Document]) -> Document:
+        """A document whose blocks are fetched each time they are asked for.
+
+        They are equal each time, but need not be the same objects.
+        """
+        document = object.__new__(cls)
+        object.__setattr__(document, "source", source)
+        object.__setattr__(document, "_load", load)
+        return document
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """Blocks that are away: their slots are empty."""
+            if name in ("blocks", "footnotes", "_all"):
+                return getattr(self._load(), name)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import enum
 
 from coursebuild.model.blocks import Comparison, Document, Filter
+from coursebuild.model.scenarios import Declarations
 from coursebuild.source import Source, Span
 from coursebuild.values import dataclass
 
@@ -122,6 +123,8 @@ class Course:
     files: tuple[str, ...] = ()
     """Other files in `content/` that a page may show or link to (pictures, data), by path relative
     to the root."""
+    declarations: tuple[Declarations, ...] = ()
+    """What `models/NAME.toml` say, each of a model that is there."""
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:

@@ -99,6 +99,8 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
 
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
+    if document._load is not None:
+        document = document._load()
     known = document._all
     if not known:
         known += walk_blocks(document.blocks)

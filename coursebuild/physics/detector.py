@@ -117,6 +117,9 @@ class Peaks:
     """Largest |qvel|, m/s or rad/s; no number once one of them is none."""
     penetration: float = 0.0
     """Deepest contact, m."""
+    sunk: float = 0.0
+    """The same relative to the half thickness of the thinner body, where thicknesses are known: at
+    1 its middle is at the other's surface."""
 
     @property
     def finite(self) -> bool:
@@ -127,13 +130,25 @@ class Peaks:
 NO_BOUNDS = Peaks(float("inf"), float("inf"), float("inf"))
 
 
-def peaks(data: Any, before: Peaks) -> Peaks:
-    """The most that was seen, with what is there now."""
+def peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Peaks:
+    """The most that was seen, with what is there now.
+
+    `thickness`: half the thickness of every geom, and a last one for what is none (ngeom + 1,), m.
+    """
     return Peaks(
         _more(before.position, data.qpos),
         _more(before.velocity, data.qvel),
         max(before.penetration, deepest_contact(data)),
+        before.sunk if thickness is None else max(before.sunk, _sunk(data, thickness)),
     )
+
+
+def _sunk(data: Any, thickness: Array) -> float:
+    if data.ncon == 0:
+        return 0.0
+    contact = data.contact
+    thinner = thickness[contact.geom].min(axis=1)  # the number of what is no geom is -1
+    return max(0.0, float(np.max(-contact.dist / thinner)))
 
 
 def _more(before: float, values: Array) -> float:
@@ -163,7 +178,7 @@ def observe(
         finite=most.finite,
         position=most.position / bounds.position,
         velocity=most.velocity / bounds.velocity,
-        penetration=most.penetration / bounds.penetration,
+        penetration=max(most.penetration / bounds.penetration, most.sunk),
     )
 
 

@@ -1,6 +1,6 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `simulate`, `advance`, `watched`, `refsafe_active`.
+Entry points: `compiled`, `varied`, `simulate`, `advance`, `watched`, `refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from coursebuild.physics.detector import Judgement, Peaks, deepest_contact, judge, observe, peaks
-from coursebuild.physics.problem import Array, Integrator, Motion, Problem, whole_number
+from coursebuild.physics.problem import Array, Integrator, Motion, Problem, Setup, whole_number
 from coursebuild.values import dataclass, replace
 
 _CODE = {
@@ -48,26 +48,47 @@ def compiled(mjcf: str, integrator: Integrator, timestep: float) -> Any:
     Raises:
         ValueError: the MJCF is wrong.
     """
-    model = copy.copy(_original(mjcf))
+    return varied(_original(mjcf), integrator, timestep)
+
+
+def varied(model: Any, integrator: Integrator, timestep: float) -> Any:
+    """A copy of a `mjModel` with this integrator and timestep (s), and automatic reset off."""
+    model = copy.copy(model)
+    choose(model, integrator, timestep)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+def choose(model: Any, integrator: Integrator, timestep: float) -> None:
+    """Give a model this integrator and timestep (s)."""
     model.opt.integrator = int(_CODE[integrator])
     model.opt.timestep = timestep
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if integrator is Integrator.EULER_EXPLICIT:
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-    return model
 
 
 def advance(model: Any, data: Any, steps: int = 1) -> None:
     """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(_ignore)
-    try:
+    with silent():
         mujoco.mj_step(model, data, steps)
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
-def watched(model: Any, data: Any, steps: int, seen: Peaks) -> tuple[Peaks, int]:
+class silent:  # noqa: N801 - used as a function, and quicker than a generator
+    """Nothing that MuJoCo warns of is printed meanwhile."""
+
+    __slots__ = ("before",)
+
+    def __enter__(self) -> None:
+        self.before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(_ignore)
+
+    def __exit__(self, *_: object) -> None:
+        mujoco.set_mju_user_warning(self.before)
+
+
+def watched(
+    model: Any, data: Any, steps: int, seen: Peaks, thickness: Array | None = None
+) -> tuple[Peaks, int]:
     """Make so many steps, and no more once the state is no number.
 
     Gives the most that was seen, with what was `seen` before, and how many steps were made. Looks
@@ -78,11 +99,11 @@ def watched(model: Any, data: Any, steps: int, seen: Peaks) -> tuple[Peaks, int]
         part = min(_WATCHED, steps - done)
         advance(model, data, part)
         done += part
-        seen = peaks(data, seen)
+        seen = peaks(data, seen, thickness)
     return seen, done
 
 
-def bounds_of(problem: Problem) -> Peaks:
+def bounds_of(problem: Setup) -> Peaks:
     """The most that can be in a problem."""
     return Peaks(problem.position_bound, problem.velocity_bound, problem.penetration_bound)
 
@@ -108,6 +129,8 @@ class Run:
     penetration: float
     """Deepest contact at those times, m."""
     judgement: Judgement
+    act: Array
+    """(n, na): activations of actuators."""
 
 
 def simulate(problem: Problem, integrator: Integrator, timestep: float) -> Run:
@@ -119,8 +142,8 @@ def simulate(problem: Problem, integrator: Integrator, timestep: float) -> Run:
     return simulate_model(problem, compiled(problem.mjcf, integrator, timestep))
 
 
-def simulate_model(problem: Problem, model: Any) -> Run:
-    """Run the problem's scenario with a model whose options were set otherwise.
+def simulate_model(problem: Setup, model: Any, thickness: Array | None = None) -> Run:
+    """Run a scenario with a model whose options were set otherwise; `thickness` as for `peaks`.
 
     Raises:
         ValueError: its timestep does not divide the interval of the looks.
@@ -129,28 +152,29 @@ def simulate_model(problem: Problem, model: Any) -> Run:
     step = float(model.opt.timestep)
     every = whole_number(scenario.sample, step, "the sampling interval", "the timestep")
     times = scenario.times
-    data, other = begun(problem, model), mujoco.MjData(model)
+    data, other = begun(problem, model), begun(problem, model)
     qpos = np.empty((len(times), model.nq))
     qvel = np.empty((len(times), model.nv))
+    act = np.empty((len(times), model.na))
     kept = [invariants(model, other, data.qpos, data.qvel)]
     seen = Peaks(penetration=deepest_contact(other))
     holds, steps = held(problem), 0
     for index in range(len(times)):
         if scenario.controls:
             data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
-        seen, done = watched(model, data, every, seen)
+        seen, done = watched(model, data, every, seen, thickness)
         steps += done
         if not seen.finite:
-            qpos[index:], qvel[index:] = np.nan, np.nan
+            qpos[index:], qvel[index:], act[index:] = np.nan, np.nan, np.nan
             break
-        qpos[index], qvel[index] = data.qpos, data.qvel
+        qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
         kept.append(invariants(model, other, data.qpos, data.qvel))
         # Where a step ends, its contacts are still those of its beginning.
         seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
     judgement = judge(observe(model, data, steps * step, seen=seen, bounds=bounds_of(problem)))
     kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
     table = np.array(kept)
-    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement)
+    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement, act)
 
 
 def refsafe_active(model: Any) -> bool:
@@ -180,10 +204,13 @@ def refsafe_active(model: Any) -> bool:
     return bool(np.any((constants > 0) & (constants < 2 * model.opt.timestep * (1 - 1e-12))))
 
 
-def begun(problem: Problem, model: Any) -> Any:
+def begun(problem: Setup, model: Any) -> Any:
     """`mjData` in the initial state of the problem's scenario."""
     data = mujoco.MjData(model)
     scenario = problem.scenario
+    if scenario.keyframe >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, scenario.keyframe)
+        data.time = 0.0
     if scenario.qpos:
         data.qpos[:] = scenario.qpos
     if scenario.qvel:
@@ -193,7 +220,7 @@ def begun(problem: Problem, model: Any) -> Any:
     return data
 
 
-def held(problem: Problem) -> int:
+def held(problem: Setup) -> int:
     """Looks for which a command holds."""
     scenario = problem.scenario
     if not scenario.hold:

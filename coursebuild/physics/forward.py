@@ -1,22 +1,53 @@
 """A reference for smooth scenes: MuJoCo's accelerations, another integration.
 
-Entry point: `forward_motion(mjcf, scenario, times)`.
+Entry points: `forward_motion(mjcf, scenario, times)`; `forward_states(model, setup, times, method)`
+for any model and method.
 
-`mj_forward` gives the acceleration of a state; the state is then integrated by Bulirsch–Stoer in
-positions, plain quaternions and velocities. It shares the engine's model, and nothing of its
-integrators. Commands are held: the integration begins anew when one changes.
+`mj_forward` gives the acceleration of a state; the state is then integrated in positions, plain
+quaternions, velocities and activations, by Bulirsch–Stoer or another method. It shares the engine's
+model, and nothing of its integrators. Commands are held: the integration begins anew when one
+changes.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from coursebuild.physics.engine import compiled, motion_of
-from coursebuild.physics.extrapolation import State, integrate
-from coursebuild.physics.problem import Array, Integrator, Motion, Scenario
+from coursebuild.physics.engine import begun, compiled, motion_of
+from coursebuild.physics.extrapolation import NoConvergenceError, Rate, State, integrate
+from coursebuild.physics.problem import Array, Integrator, Motion, Scenario, Setup
+from coursebuild.values import dataclass
+
+Method: TypeAlias = Callable[[Rate, State, Array], State]
+"""A rate, a first state (d,) and rising times (n,) → the states (n, d)."""
+
+
+@dataclass(frozen=True, slots=True)
+class States:
+    """A motion in the engine's coordinates."""
+
+    times: Array
+    """(n,) s."""
+    qpos: Array
+    """(n, nq)."""
+    qvel: Array
+    """(n, nv)."""
+    act: Array
+    """(n, na)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Unbounded:
+    """A scenario of which nothing is judged."""
+
+    scenario: Scenario
+    position_bound: float = float("inf")
+    velocity_bound: float = float("inf")
+    penetration_bound: float = float("inf")
 
 
 def forward_motion(
@@ -29,30 +60,54 @@ def forward_motion(
         NoConvergenceError: the scene is not smooth.
     """
     model = compiled(mjcf, Integrator.EULER, 1e-3)
-    data = mujoco.MjData(model)
-    state = _start(model, data, scenario)
-    rate = _rate(model, data)
+
+    def method(rate: Rate, start: State, offsets: Array) -> State:
+        return integrate(rate, start, offsets, tolerance)
+
+    found = forward_states(model, _Unbounded(scenario), times, method)
+    return motion_of(model, times, found.qpos, found.qvel)
+
+
+def forward_states(
+    model: Any, setup: Setup, times: Array, method: Method, *, evaluations: float = float("inf")
+) -> States:
+    """The states of a smooth scene at the rising times (n,) s.
+
+    `evaluations`: the most accelerations to compute.
+
+    Raises:
+        NoConvergenceError: the scene is not smooth, or it takes more evaluations.
+    """
+    data = begun(setup, model)
+    state = np.concatenate([data.qpos, data.qvel, data.act])
+    rate = _limited(_rate(model, data), evaluations)
     states = np.empty((len(times), len(state)))
-    for begin, end, command in _holds(scenario, float(times[-1])):
-        data.ctrl[:] = command
+    for begin, end, command in _holds(setup.scenario, float(times[-1])):
+        if command:
+            data.ctrl[:] = command
         here = (times > begin + 1e-12) & (times <= end + 1e-12)
         offsets = np.append(times[here] - begin, end - begin)
-        part = integrate(rate, state, np.maximum.accumulate(offsets), tolerance)
+        part = method(rate, state, np.maximum.accumulate(offsets))
         states[here] = part[:-1]
         state = part[-1]
-    nq = int(model.nq)
+    nq, nv = int(model.nq), int(model.nv)
     qpos = states[:, :nq].copy()
-    for at in _quaternions(model):
+    for at in quaternions(model):
         qpos[:, at : at + 4] /= np.linalg.norm(qpos[:, at : at + 4], axis=1, keepdims=True)
-    return motion_of(model, times, qpos, states[:, nq:])
+    return States(times, qpos, states[:, nq : nq + nv].copy(), states[:, nq + nv :].copy())
 
 
-def _start(model: Any, data: Any, scenario: Scenario) -> State:
-    if scenario.qpos:
-        data.qpos[:] = scenario.qpos
-    if scenario.qvel:
-        data.qvel[:] = scenario.qvel
-    return np.concatenate([data.qpos, data.qvel])
+def _limited(rate: Rate, evaluations: float) -> Rate:
+    done = 0
+
+    def limited(state: State) -> State:
+        nonlocal done
+        done += 1
+        if done > evaluations:
+            raise NoConvergenceError(f"it takes more than {evaluations:g} evaluations")
+        return rate(state)
+
+    return limited
 
 
 def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[float, ...]]]:
@@ -68,7 +123,7 @@ def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[flo
     return found
 
 
-def _quaternions(model: Any) -> list[int]:
+def quaternions(model: Any) -> list[int]:
     """Where quaternions begin in `qpos`."""
     found = []
     for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
@@ -80,20 +135,21 @@ def _quaternions(model: Any) -> list[int]:
 
 
 def _rate(model: Any, data: Any) -> Any:
-    """d(qpos, qvel)/dt of a state (nq + nv,)."""
-    nq = int(model.nq)
+    """d(qpos, qvel, act)/dt of a state (nq + nv + na,)."""
+    nq, end = int(model.nq), int(model.nq + model.nv)
     joints = [
         (mujoco.mjtJoint(int(kind)), int(q), int(v))
         for kind, q, v in zip(model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True)
     ]
-    quaternions = _quaternions(model)
+    turns = quaternions(model)
 
     def rate(state: State) -> State:
         slope = np.empty_like(state)
-        qvel = state[nq:]
+        qvel = state[nq:end]
         data.qpos[:] = state[:nq]
         data.qvel[:] = qvel
-        for at in quaternions:  # the engine normalizes some of them, in some places
+        data.act[:] = state[end:]
+        for at in turns:  # the engine normalizes some of them, in some places
             data.qpos[at : at + 4] /= np.linalg.norm(data.qpos[at : at + 4])
         mujoco.mj_forward(model, data)
         for kind, q, v in joints:
@@ -105,7 +161,8 @@ def _rate(model: Any, data: Any) -> Any:
                     slope[q : q + 4] = _turning(state[q : q + 4], qvel[v : v + 3])
                 case _:
                     slope[q] = qvel[v]
-        slope[nq:] = data.qacc
+        slope[nq:end] = data.qacc
+        slope[end:] = data.act_dot
         return slope
 
     return rate

@@ -135,17 +135,24 @@ def raised(found: Errors, floor: float) -> Errors:
     return Errors(up(found.position), up(found.attitude), up(found.velocity))
 
 
-def energy_drift(run: Run) -> float | None:
+def energy_drift(run: Run, scale: float | None = None) -> float | None:
     """The largest change of potential and kinetic energy together, with its sign.
 
-    Relative to the kinetic energy at the beginning, or to its largest where it begins at rest.
+    Relative to `scale`; without one to the kinetic energy at the beginning, or to its largest where
+    it begins at rest.
     """
     whole = run.energy.sum(axis=1)
-    scale = float(run.energy[0, 1]) or float(np.max(run.energy[:, 1]))
+    if scale is None:
+        scale = energy_scale(run)
     if not np.isfinite(whole).all() or scale == 0:
         return None
     changes = (whole - whole[0]) / scale
     return float(changes[np.argmax(np.abs(changes))])
+
+
+def energy_scale(run: Run) -> float:
+    """What changes of energy are large against, J."""
+    return float(run.energy[0, 1]) or float(np.max(run.energy[:, 1]))
 
 
 def momentum_drift(run: Run) -> float | None:

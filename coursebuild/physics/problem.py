@@ -1,13 +1,14 @@
 """What a hard case is: a model, what happens in it, and what exactly would happen.
 
-Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `Figure`, `Integrator`.
+Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `Figure`, `Integrator`; `Setup`, what a
+run of it needs.
 """
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from typing import Literal, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,8 @@ class Scenario:
     """Commands one after the other, each for `hold` seconds, the last to the end."""
     hold: float = 0.0
     """Seconds, a multiple of `sample`: commands change on a grid that all timesteps share."""
+    keyframe: int = -1
+    """The keyframe of the model in which it begins, by number; -1: in none."""
 
     @property
     def times(self) -> Array:
@@ -127,6 +130,26 @@ class Figure:
     measure: Callable[[Integrator], float]
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
+
+
+class Setup(Protocol):
+    """What a run must know beside the model: a hard case, or a scenario of some model."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What happens."""
+
+    @property
+    def position_bound(self) -> float:
+        """Largest |qpos| that can be, in m or rad."""
+
+    @property
+    def velocity_bound(self) -> float:
+        """Largest |qvel| that can be, in m/s or rad/s."""
+
+    @property
+    def penetration_bound(self) -> float:
+        """Deepest contact that is no fault, m."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The largest stable timestep of a problem for each integrator, and how fast it grows beyond.
 
-Entry points: `boundary(problem, integrator)`, `survey(problem)`.
+Entry points: `boundary(problem, integrator)`, `survey(problem)`; `scan(attempt, search)` and
+`attempted(setup, model, steps)` for what is no hard case.
 
 1. A grid of timesteps, even in the logarithm, is tried from end to end: stability need not be
    monotone, and a bisection alone would find some boundary, not the first.
@@ -11,13 +12,25 @@ Entry points: `boundary(problem, integrator)`, `survey(problem)`.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from coursebuild.physics.detector import Peaks, Status, judge, observe
 from coursebuild.physics.engine import begun, bounds_of, compiled, watched
-from coursebuild.physics.problem import INTEGRATORS, STANDARD, Integrator, Limit, Problem
+from coursebuild.physics.problem import (
+    INTEGRATORS,
+    STANDARD,
+    Array,
+    Integrator,
+    Limit,
+    Problem,
+    Scenario,
+    Setup,
+)
 from coursebuild.values import dataclass
 
 GRID = 12
@@ -96,25 +109,62 @@ def boundary(problem: Problem, integrator: Integrator) -> Boundary:
     """
     if problem.search is None:
         raise ValueError(f"{problem.name} has no range of timesteps to search")
-    low, high = problem.search
-    count = max(2, round(GRID * math.log10(high / low)) + 1)
-    grid = np.geomspace(low, high, count).tolist()
-    trials = [attempt(problem, integrator, h) for h in grid]
-    first = next((i for i, trial in enumerate(trials) if not trial.stable), None)
+    found = scan(lambda step: attempt(problem, integrator, step), problem.search)
     theory = None if problem.limit is None else problem.limit(integrator)
+    return Boundary(
+        integrator,
+        found.largest,
+        not found.islands,
+        found.islands,
+        found.beyond,
+        theory,
+        problem.search,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """Where timesteps cease to be stable."""
+
+    largest: float
+    """s, as `Boundary.largest`."""
+    islands: tuple[float, ...]
+    """Timesteps beyond that are stable all the same, s."""
+    beyond: Trial | None
+    """The first unstable one of the grid."""
+
+
+def scan(
+    attempt: Callable[[float], Trial],
+    search: tuple[float, float],
+    *,
+    grid: int = GRID,
+    resolution: float = RESOLUTION,
+) -> Scan:
+    """Look for the largest stable timestep between two (s): on a grid, then by bisection.
+
+    `grid`: timesteps tried in a decade; `resolution`: relative width at which bisection ends.
+    """
+    low, high = search
+    count = max(2, round(grid * math.log10(high / low)) + 1)
+    steps = np.geomspace(low, high, count).tolist()
+    trials = [attempt(step) for step in steps]
+    first = next((i for i, trial in enumerate(trials) if not trial.stable), None)
     if first is None:
-        return Boundary(integrator, math.inf, True, (), None, theory, (low, high))
+        return Scan(math.inf, (), None)
     islands = tuple(trial.timestep for trial in trials[first:] if trial.stable)
     largest = 0.0
     if first > 0:
-        largest = _bisected(problem, integrator, grid[first - 1], grid[first])
-    return Boundary(integrator, largest, not islands, islands, trials[first], theory, (low, high))
+        largest = _bisected(attempt, steps[first - 1], steps[first], resolution)
+    return Scan(largest, islands, trials[first])
 
 
-def _bisected(problem: Problem, integrator: Integrator, low: float, high: float) -> float:
-    while high / low > 1 + RESOLUTION:
+def _bisected(
+    attempt: Callable[[float], Trial], low: float, high: float, resolution: float
+) -> float:
+    while high / low > 1 + resolution:
         middle = math.sqrt(low * high)
-        if attempt(problem, integrator, middle).stable:
+        if attempt(middle).stable:
             low = middle
         else:
             high = middle
@@ -123,20 +173,49 @@ def _bisected(problem: Problem, integrator: Integrator, low: float, high: float)
 
 def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Trial:
     """Run the problem's steps at a timestep (s), whatever its duration."""
-    model = compiled(problem.mjcf, integrator, timestep)
-    data = begun(problem, model)
-    chunk = max(1, problem.steps // _LOOKS)
+    return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.steps)
+
+
+def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = None) -> Trial:
+    """Make so many steps with a model's own timestep; `thickness` as for `detector.peaks`.
+
+    A command changes with the first step that begins after its time: the timestep need not divide
+    the hold.
+    """
+    data = begun(setup, model)
+    timestep = float(model.opt.timestep)
+    chunk = max(1, steps // _LOOKS)
     sizes: list[float] = []
-    seen, steps = Peaks(), 0
+    seen, total = Peaks(), 0
     for _ in range(_LOOKS):
-        seen, done = watched(model, data, chunk, seen)
-        steps += done
+        for part in _parts(setup.scenario, timestep, total, chunk):
+            _command(setup.scenario, data, total * timestep)
+            seen, done = watched(model, data, part, seen, thickness)
+            total += done
         if not seen.finite:
             break
         sizes.append(_size(data))
-    elapsed = steps * timestep
-    judgement = judge(observe(model, data, elapsed, seen=seen, bounds=bounds_of(problem)))
+    elapsed = total * timestep
+    judgement = judge(observe(model, data, elapsed, seen=seen, bounds=bounds_of(setup)))
     return Trial(timestep, judgement.status, _growth(sizes, chunk))
+
+
+def _parts(scenario: Scenario, timestep: float, done: int, count: int) -> list[int]:
+    """Steps cut at changes of the command."""
+    if len(scenario.controls) < 2:
+        return [count]
+    end = done + count
+    edges = {done, end}
+    for index in range(1, len(scenario.controls)):
+        edges.add(min(max(math.ceil(index * scenario.hold / timestep - 1e-9), done), end))
+    cuts = sorted(edges)
+    return [b - a for a, b in itertools.pairwise(cuts)]
+
+
+def _command(scenario: Scenario, data: Any, time: float) -> None:
+    if scenario.controls:
+        index = int(time / scenario.hold + 1e-9) if scenario.hold else 0
+        data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]
 
 
 def _size(data: object) -> float:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.site_swap import check_out, publish
 from coursebuild.pipeline.check import no_lessons
@@ -20,6 +21,7 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report
 from coursebuild.results import SiteFile
@@ -56,24 +58,35 @@ def _unpublished(root: Path, out: Path) -> str:
 @contextmanager
 def prepare(options: Options, progress: Progress) -> Iterator[Prepared]:
     """Verify and render. The caller holds the course's lock, and has the files made meanwhile."""
-    with Documents(options.store, options.jobs, progress.stage) as documents:
+    aside = Aside(options.store.folder)
+    with Documents(options.store, options.jobs, progress.stage, aside) as documents:
         yield _prepared(options, progress, documents)
 
 
 def _prepared(options: Options, progress: Progress, documents: Documents) -> Prepared:
     began = time.monotonic()
-    loaded = load(options.root, documents.parse, documents.ahead, documents.course_map)
+    loaded = load(
+        options.root,
+        documents.parse,
+        documents.ahead,
+        documents.course_map,
+        documents.declarations,
+        documents.aside,
+    )
     if loaded.course is None:
         report = judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
         return Prepared(report, ())
     verified = verify(loaded.course, options, progress, static=True)
+    reports = shown_reports(options.root, loaded.course)
     found = [*loaded.diagnostics, *verified.diagnostics, *no_lessons(loaded.course)]
+    found += reports.diagnostics
     files: tuple[SiteFile, ...] = ()
     drawn: tuple[str, ...] = ()
     if all(d.severity is not Severity.ERROR for d in found):
         from coursebuild.pipeline.site import site_files
 
-        site = site_files(loaded.course, verified.results, documents, options)
+        results = verified.results
+        site = site_files(loaded.course, results, documents, options, reports.value)
         files, drawn = site.files, site.drawn
         found += site.diagnostics
     report = _report(loaded, verified, found, time.monotonic() - began)

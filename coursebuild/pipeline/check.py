@@ -9,7 +9,9 @@ import time
 from collections.abc import Sequence
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.locks import project_lock
+from coursebuild.measured.sensitivity import Sensitivity
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
@@ -18,10 +20,12 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shards import Shard, write_timings
+from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import plural
 from coursebuild.scripts.extract import extract
+from coursebuild.scripts.sensitivity import noise
 from coursebuild.values import replace
 
 
@@ -31,15 +35,17 @@ def check(
     *,
     shard: Shard | None = None,
     timings: str | None = None,
+    sensitivity: bool = False,
 ) -> Report:
     """Verify the lessons that the names mean; all, and the pages, where there are none.
 
     `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
-    it writes how long each took.
+    it writes how long each took. `sensitivity`: say which printed digits hold when initial states
+    are moved a little.
     """
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
-        return _check(options, names, progress, shard, timings)
+        return _check(options, names, progress, shard, timings, sensitivity)
 
 
 def _check(
@@ -48,10 +54,19 @@ def _check(
     progress: Progress,
     shard: Shard | None,
     timings: str | None,
+    sensitivity: bool,
 ) -> Report:
     began = time.monotonic()
-    with Documents(options.store, options.jobs, progress.stage) as documents:
-        loaded = load(options.root, documents.parse, documents.ahead, documents.course_map)
+    aside = Aside(options.store.folder)
+    with Documents(options.store, options.jobs, progress.stage, aside) as documents:
+        loaded = load(
+            options.root,
+            documents.parse,
+            documents.ahead,
+            documents.course_map,
+            documents.declarations,
+            documents.aside,
+        )
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
@@ -61,6 +76,11 @@ def _check(
         write_timings(timings, _seconds(verified), _names(course))
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)
+    sensitive = None
+    if sensitivity:
+        sensitive = _sensitivity(course, options, progress, verified, chosen)
+        found += [warning for one in sensitive for warning in noise(one)]
+    found += shown_reports(options.root, course).diagnostics
     if shard is None or not any(True for _ in extract(course).value):
         found += _no_scripts(course, chosen, verified.scripts, found)
     report = judge(
@@ -73,7 +93,18 @@ def _check(
         labs=verified.labs,
         remarks=() if shard is None else (_part(shard, verified),),
     )
-    return replace(report, depends=depends_on(course, verified.results))
+    return replace(report, depends=depends_on(course, verified.results), sensitivity=sensitive)
+
+
+def _sensitivity(
+    course: Course, options: Options, progress: Progress, verified: Verified, chosen: Selection
+) -> tuple[Sensitivity, ...]:
+    from coursebuild.pipeline.sensitivity import measure
+
+    by_path = {run.path: run for run in verified.results.runs}
+    ran = [extraction for extraction in extract(course).value if extraction.path in by_path]
+    runs = [by_path[extraction.path] for extraction in ran]
+    return measure(course, options, progress, ran, runs, chosen.documents)
 
 
 def _part(shard: Shard, verified: Verified) -> str:

@@ -6,6 +6,8 @@ Entry point: `Documents`, a context manager, which gives outlines (`parse`) and 
 1. `ahead` is told which texts there are. The outlines of texts that were read before come from the
    store; the others are read, in copies of this process where there are many.
 2. `draw` draws pages: each in the copy that has read its document, which has it still.
+3. Where texts are put aside, so are the skeletons: what is held of a document is then its name, its
+   key and what is wrong in it.
 """
 
 from __future__ import annotations
@@ -13,16 +15,20 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from itertools import islice
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias
 
 from coursebuild.diagnostics import Parsed
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
-from coursebuild.model import Course, Document
-from coursebuild.pipeline.outlines import Outline, Task, pack, unpack, unpacked
-from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Read, Request
+from coursebuild.model import Course, Declarations, Document
+from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
+from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Later, Read, Request
+from coursebuild.pipeline.shelf import Shelf
 from coursebuild.source import Source
+from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.pool import Pool
@@ -37,17 +43,26 @@ def _silent(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-_MAPS, _FONTS = "maps", "fonts"
+_MAPS, _DECLARATIONS, _FONTS = "maps", "declarations", "fonts"
 """Kinds of entries in the store: course maps, and cut fonts."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
+_AT_ONCE = 256
+"""Texts whose outlines are waited for before more are read."""
 
 
 class Documents:
     """Outlines of the documents of a course, and their pages."""
 
-    def __init__(self, store: Store, jobs: int, stage: Stage = _silent) -> None:
-        """`jobs` copies of this process at most; `stage` is told when long work begins."""
+    def __init__(
+        self, store: Store, jobs: int, stage: Stage = _silent, aside: Aside | None = None
+    ) -> None:
+        """`jobs` copies of this process at most; `stage` is told when long work begins.
+
+        `aside` is where skeletons are put; without it they stay in memory.
+        """
+        self.aside = aside
+        self._shelf = Shelf(aside) if aside is not None else None
         self._store = store
         self._stage = stage
         self._jobs = jobs
@@ -80,24 +95,26 @@ class Documents:
         """Have the outlines of sources, of which it is said which are lessons."""
         missing: list[Task] = []
         for source, lesson in sources:
-            task = Task(source, callouts, lesson)
+            task = Task.of(source, callouts, lesson)
             self._tasks[source.path] = task
             outline = self._stored(task)
             if outline is None:
                 missing.append(task)
             else:
                 self._outlines[source.path] = outline
-        if not missing:
-            return
-        requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in missing]
-        if len(requests) >= _MANY:
-            from coursebuild.pipeline.reading import import_all
+        if len(missing) >= _MANY:
+            from coursebuild.pipeline.reading import prepare_to_read
 
-            import_all()
+            prepare_to_read(missing[0])
+        rest = iter(missing)
+        while tasks := tuple(islice(rest, _AT_ONCE)):
+            self._read(tasks)
+
+    def _read(self, tasks: Sequence[Task]) -> None:
+        requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in tasks]
         answers, readers = self._work("reading lessons and pages", requests)
-        for task, data, reader in zip(missing, answers, readers, strict=True):
-            assert isinstance(data, bytes)
-            outline = unpacked(data, task.source)
+        for task, data, reader in zip(tasks, answers, readers, strict=True):
+            outline = self._opened(data, task)
             assert outline is not None
             self._outlines[task.source.path] = outline
             self._readers[task.source.path] = reader
@@ -105,7 +122,7 @@ class Documents:
     def parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
         """The skeleton of a document, and what is wrong in it."""
         known = self._tasks.get(source.path)
-        if known is None or known != Task(source, callouts, lesson):
+        if known is None or not known.is_of(source, callouts, lesson):
             self.ahead([(source, lesson)], callouts)
         outline = self._outlines[source.path]
         return Parsed(outline.skeleton, outline.diagnostics)
@@ -124,20 +141,31 @@ class Documents:
         self._store.keep(_MAPS, key, pack(parsed), local=True)
         return parsed
 
+    def declarations(self, source: Source) -> Parsed[Declarations | None]:
+        """What a file beside a model declares, and what is wrong in it."""
+        parts = (tool_digest(), source.path, source.text)
+        key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+        data = None if self._store.fresh else self._store.peek(_DECLARATIONS, key)
+        found = None if data is None else unpack(data, source)
+        if isinstance(found, Parsed):
+            return found
+        from coursebuild.syntax.scenarios import parse_declarations
+
+        parsed = parse_declarations(source)
+        self._store.keep(_DECLARATIONS, key, pack(parsed), local=True)
+        return parsed
+
     def task(self, path: str) -> Task:
         """The text of a path, with all that its document depends on."""
         return self._tasks[path]
 
-    def draw(self, pages: Sequence[Draw]) -> list[PageRecord]:
-        """Draw pages; their bodies are in the store then."""
+    def draw(self, pages: Sequence[Later]) -> list[bytes]:
+        """Draw pages; gives their packed records, and their bodies are in the store then."""
         requests: list[tuple[int | None, Request]] = [
-            (self._readers.get(page.task.source.path) if page.task is not None else None, page)
+            (self._readers.get(page.path) if page.path is not None else None, page)
             for page in pages
         ]
-        if not requests:
-            return []
-        answers, _ = self._work("drawing pages", requests)
-        return [answer for answer in answers if not isinstance(answer, bytes)]
+        return self._work("drawing pages", requests)[0] if requests else []
 
     def cut(self, jobs: Sequence[FontJob]) -> Callable[[FontJob], bytes]:
         """Fonts, cut already or cut now; gives them."""
@@ -151,11 +179,13 @@ class Documents:
         # The largest first, so that none of them is left for the end.
         missing = sorted((j for j in jobs if j.key not in found), key=lambda j: -len(j.data))
         if missing:
+            from coursebuild.pipeline.reading import prepare_to_cut
+
             self._rest()  # which have seen everything; what cuts fonts needs room
+            prepare_to_cut()
             requests: list[tuple[int | None, Request]] = [(None, Cut(job)) for job in missing]
             answers, _ = self._work("cutting fonts", requests, many=2)
             for job, made in zip(missing, answers, strict=True):
-                assert isinstance(made, bytes)
                 found[job.key] = made
                 self._store.keep(_FONTS, job.key, made)
         return lambda job: found[job.key]
@@ -166,7 +196,21 @@ class Documents:
 
     def _stored(self, task: Task) -> Outline | None:
         data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
-        return None if data is None else unpacked(data, task.source)
+        return None if data is None else self._opened(data, task)
+
+    def _opened(self, data: bytes, task: Task) -> Outline | None:
+        """An outline, put aside where that is wanted; `None` where the bytes are none."""
+        if self._shelf is None:
+            return unpacked(data, task.source)
+        parts = parted(data, task.source)
+        if parts is None:
+            return None
+        outline, skeleton = parts
+
+        def again() -> Document:
+            return self._here().outline(task).skeleton
+
+        return replace(outline, skeleton=self._shelf.document(task.source, skeleton, again))
 
     def _work(
         self, name: str, requests: Sequence[tuple[int | None, Request]], *, many: int = _MANY

@@ -20,6 +20,8 @@ _OF_RUNS = (
     "script-output-limit",
     "script-encoding",
     "script-silent",
+    "script-diverged",
+    "script-penetration",
 )
 """Only scripts that were to be run have these; they may point at a line of another lesson."""
 

@@ -36,6 +36,7 @@ from coursebuild.labs.reply import Trial, read_trial
 from coursebuild.labs.verdict import (
     Parity,
     code_diagnostic,
+    deep_diagnostics,
     entry_span,
     parity_diagnostics,
     reset_diagnostics,
@@ -236,7 +237,7 @@ class _Attempt:
             export=offer.script,
             unexported=offer.reason,
         )
-        return result, [*found, *reset_diagnostics(lab, trial)]
+        return result, [*found, *deep_diagnostics(lab, trial), *reset_diagnostics(lab, trial)]
 
     def _failed(self, module: LabModule, began: float) -> LabResult:
         """A lab that could not be tried."""

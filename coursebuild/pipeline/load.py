@@ -7,6 +7,7 @@ all that will be parsed.
    lessons are parsed all the same, so that all mistakes are told in one run.
 2. Attach its document to each lesson and page; compare what the map names with what is there.
 3. Check the course as a whole.
+4. Parse what `models/NAME.toml` declare of the models beside them.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from typing import Protocol, TypeAlias
 
 from coursebuild.checks import check_course
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
-from coursebuild.model import Course, Document, Lesson, Level, Page, Status
+from coursebuild.model import Course, Declarations, Document, Lesson, Level, Page, Status
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 from coursebuild.vocabulary import CALLOUTS
@@ -50,15 +52,20 @@ Ahead: TypeAlias = Callable[[Sequence[tuple[Source, bool]], frozenset[str]], Non
 ParseMap: TypeAlias = Callable[[Source], Parsed[Course | None]]
 """`parse_course_map`, or what remembers its results."""
 
+ParseDeclarations: TypeAlias = Callable[[Source], Parsed[Declarations | None]]
+"""`parse_declarations`, or what remembers its results."""
+
 
 def load(
     root: Path,
     parse: Parse | None = None,
     ahead: Ahead | None = None,
     course_map: ParseMap | None = None,
+    declarations: ParseDeclarations | None = None,
+    aside: Aside | None = None,
 ) -> Loaded:
-    """Read and parse everything below `root`."""
-    read = read_course(root)
+    """Read and parse everything below `root`; texts are put aside, where it is said where."""
+    read = read_course(root, aside)
     if parse is None:
         from coursebuild.syntax.document import parse_document
 
@@ -67,8 +74,11 @@ def load(
         from coursebuild.syntax.coursemap import parse_course_map
 
         course_map = parse_course_map
-    loader = _Loader(root, read.value, list(read.diagnostics), parse, ahead, course_map)
+    loader = _Loader(root, read.value, list(read.diagnostics), parse, ahead, course_map, aside)
     course = loader.course()
+    declared = loader.declared(declarations)
+    if course is not None:
+        course = replace(course, declarations=declared)
     return Loaded(course, tuple(loader.found))
 
 
@@ -83,11 +93,13 @@ class _Loader:
         parse: Parse,
         ahead: Ahead | None,
         course_map: ParseMap,
+        aside: Aside | None,
     ) -> None:
         self.root = root
         self.parse = parse
         self.ahead = ahead
         self.course_map = course_map
+        self.aside = aside
         self.files = files
         self.found = found
         self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
@@ -130,6 +142,31 @@ class _Loader:
         parsed = self.course_map(self.files.map)
         self.found += parsed.diagnostics
         return parsed.value
+
+    def declared(self, parse: ParseDeclarations | None) -> tuple[Declarations, ...]:
+        """What stands beside the models; a file without a model is a mistake."""
+        models = {model.name for model in self.files.models}
+        found: list[Declarations] = []
+        if not self.files.declarations:
+            return ()
+        if parse is None:
+            from coursebuild.syntax.scenarios import parse_declarations
+
+            parse = parse_declarations
+        for source in self.files.declarations:
+            parsed = parse(source)
+            self.found += parsed.diagnostics
+            model = source.path.removesuffix(".toml") + ".xml"
+            if model.removeprefix("models/").removesuffix(".xml") not in models:
+                if model not in self.files.unreadable:
+                    message = f"there is no model {model} to which these scenarios belong"
+                    near = nearest(model, (m.source.path for m in self.files.models))
+                    help = f"is it `{near}`?" if near is not None else "put it beside its model"
+                    place = source.span(0, 0)
+                    self.found.append(diagnose("scenario-model", place, message, help=help))
+            elif parsed.value is not None:
+                found.append(parsed.value)
+        return tuple(found)
 
     def _announce(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
         if self.ahead is not None:
@@ -191,7 +228,7 @@ class _Loader:
         paths = (page.path for page in pages)
         away = [path for path in paths if path not in self.files.unreadable]
         away = [p for p in away if p not in self.sources and (self.root / p).exists()]
-        read = read_sources(self.root, away)
+        read = read_sources(self.root, away, self.aside)
         self.found += read.diagnostics
         if read.value:
             self._announce((), read.value)

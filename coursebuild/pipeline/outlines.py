@@ -1,7 +1,7 @@
 """What is known of a document without its text, kept from build to build.
 
-Entry points: `Task`, a text; `Outline`; `packed` and `unpacked`, an outline as bytes, `pack` and
-`unpack`, any value whose places are in one source.
+Entry points: `Task`, a text; `Outline`; `packed` and `unpacked`, an outline as bytes, and `parted`,
+whose skeleton stays bytes; `pack` and `unpack`, any value whose places are in one source.
 
 An outline as bytes holds no text of the document but that of its scripts and the like: it is put
 together with the source again, which whoever unpacks it has read anyway.
@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import io
 import pickle
+import struct
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -19,7 +20,9 @@ from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.tool import engine_digest, tool_digest
 from coursebuild.model import Document
 from coursebuild.source import Source
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, replace
+
+_LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +32,21 @@ class Task:
     source: Source
     callouts: frozenset[str]
     lesson: bool
+    key: str
+    """A hash of all that its outline depends on."""
 
-    @property
-    def key(self) -> str:
-        """A hash of all that its outline depends on."""
-        digest = hashlib.sha256(f"{tool_digest()}\0{engine_digest()}\0{self.lesson}".encode())
-        for part in (*sorted(self.callouts), "", self.source.path, self.source.text):
+    @classmethod
+    def of(cls, source: Source, callouts: frozenset[str], lesson: bool) -> Task:
+        """With its key."""
+        digest = hashlib.sha256(f"{tool_digest()}\0{engine_digest()}\0{lesson}".encode())
+        for part in (*sorted(callouts), "", source.path, source.text):
             digest.update(b"\0" + part.encode("utf-8", "surrogatepass"))
-        return digest.hexdigest()
+        return cls(source, callouts, lesson, digest.hexdigest())
+
+    def is_of(self, source: Source, callouts: frozenset[str], lesson: bool) -> bool:
+        """Whether it is the task of these."""
+        same = self.callouts == callouts and self.lesson == lesson
+        return same and (self.source is source or self.source == source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +99,31 @@ def unpack(data: bytes, source: Source) -> Any:
 
 def packed(outline: Outline) -> bytes:
     """An outline as bytes."""
-    return pack((outline.skeleton, outline.diagnostics, dict(outline.imports), outline.lasting))
+    head = pack((outline.diagnostics, dict(outline.imports), outline.lasting))
+    return _LENGTH.pack(len(head)) + head + pack(outline.skeleton)
+
+
+def parted(data: bytes, source: Source) -> tuple[Outline, bytes] | None:
+    """The outline of a source without blocks, and its skeleton as `pack` made it.
+
+    `None` where the bytes are none.
+    """
+    if len(data) < _LENGTH.size:
+        return None
+    end = _LENGTH.size + _LENGTH.unpack_from(data)[0]
+    head = unpack(data[_LENGTH.size : end], source)
+    if not isinstance(head, tuple) or len(head) != 3:
+        return None
+    return Outline(Document(source, (), ()), *head), data[end:]
 
 
 def unpacked(data: bytes, source: Source) -> Outline | None:
     """The outline of a source; `None` where the bytes are none."""
-    found = unpack(data, source)
-    return Outline(*found) if isinstance(found, tuple) and len(found) == 4 else None
+    parts = parted(data, source)
+    if parts is None:
+        return None
+    skeleton = unpack(parts[1], source)
+    return replace(parts[0], skeleton=skeleton) if isinstance(skeleton, Document) else None
 
 
 def all_imports(outlines: Iterable[Outline]) -> dict[str, frozenset[str]]:

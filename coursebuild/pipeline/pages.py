@@ -9,23 +9,28 @@ Entry point: `Pages`.
 3. From the records alone it is known whether all links lead somewhere, and which characters and
    styles the pages use.
 4. A body is fetched, and framed, when its file is written.
+
+Of a page no more is held than its key and how its sheet is made: a course may have any number.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
-import pickle
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
+from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.requests import PAGES, Draw
+from coursebuild.pipeline.records import bundle, part, unbundle, unpack_record
+from coursebuild.pipeline.requests import PAGES, Draw, Later
 from coursebuild.render import lesson, pages
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
-from coursebuild.render.links import all_lead_somewhere
+from coursebuild.render.numerics import numerics_sheet
 from coursebuild.render.record import PageRecord
+from coursebuild.render.shared import PageFacts
 from coursebuild.render.sheet import Sheet, fingerprint
 from coursebuild.results import KeptFile
 from coursebuild.values import dataclass
@@ -35,9 +40,23 @@ _SITE = "site"
 
 
 @dataclass(frozen=True, slots=True)
+class _Wanted:
+    """A page as it should be."""
+
+    path: str
+    """Its site path."""
+    key: str
+    sheet: Callable[[], Sheet]
+    document: str | None
+    """The path of its document."""
+
+
+@dataclass(frozen=True, slots=True)
 class _Page:
-    request: Draw
-    record: PageRecord
+    wanted: _Wanted
+    record: Kept
+    """Packed."""
+    indexed: bool
 
 
 class Pages:
@@ -47,43 +66,43 @@ class Pages:
         self._library = library
         self._documents = documents
         self._store = store
-        requests = [self._request(sheet) for sheet in sheets(library)]
-        known = self._known(request.key for request in requests)
-        new = [request for request in requests if request.key not in known]
-        self.drawn = tuple(request.sheet.path for request in new)
-        """Site paths of the pages that were drawn just now."""
-        made = documents.draw(new)
-        known |= {request.key: record for request, record in zip(new, made, strict=True)}
-        self._pages = [_Page(request, known[request.key]) for request in requests]
-        if self._last != [page.request.key for page in self._pages]:
-            self._remember()
+        self._aside = documents.aside or Aside(store.folder)
+        self._facts = _Facts()
+        self._pages = tuple(self._made([self._wanted(make) for make in sheets(library)]))
 
     @property
-    def records(self) -> tuple[PageRecord, ...]:
-        """In the order of the site."""
-        return tuple(page.record for page in self._pages)
+    def facts(self) -> PageFacts:
+        """What the shared files must know of all pages together."""
+        return self._facts.together()
+
+    @property
+    def indexed(self) -> Iterator[str]:
+        """Site paths of the pages that search engines should list."""
+        return (page.wanted.path for page in self._pages if page.indexed)
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
-        ids = {page.record.draft.path: frozenset(page.record.ids) for page in self._pages}
-        paths = files | ids.keys()
-        return all(all_lead_somewhere(page.record.references, paths, ids) for page in self._pages)
+        pages = {page.wanted.path: page for page in self._pages}
+        if not self._facts.sound or not self._facts.leads <= files | pages.keys():
+            return False
+        for path, anchors in self._facts.anchors.items():
+            if path in pages and not anchors <= {"top", *self._record(pages[path]).ids}:
+                return False
+        return True
 
     def files(self, names: Names) -> Iterator[KeptFile]:
         """The pages in their frames."""
         frame = hashlib.sha256(self._frame(names).encode()).hexdigest()
         frames = Frames(self._library, names)
         for page in self._pages:
-            key = hashlib.sha256(f"{page.request.key}{frame}".encode()).hexdigest()
-
-            def make(page: _Page = page) -> bytes:
-                return self._framed(page, frames)
-
-            yield KeptFile(page.record.draft.path, key, make)
+            key = hashlib.sha256(f"{page.wanted.key}{frame}".encode()).hexdigest()
+            make = functools.partial(self._framed, page.wanted, frames)
+            yield KeptFile(page.wanted.path, key, make)
 
     # --- keys
 
-    def _request(self, sheet: Sheet) -> Draw:
+    def _wanted(self, make: Callable[[], Sheet]) -> _Wanted:
+        sheet = make()
         course = self._library.course
         task = self._documents.task(sheet.document) if sheet.document is not None else None
         parts = (
@@ -94,7 +113,13 @@ class Pages:
             task.key if task is not None else "",
         )
         key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
-        return Draw(sheet, task, course.language, course.base_url, key)
+        return _Wanted(sheet.path, key, make, sheet.document)
+
+    def _request(self, wanted: _Wanted) -> Draw:
+        course = self._library.course
+        path = wanted.document
+        task = self._documents.task(path) if path is not None else None
+        return Draw(wanted.sheet(), task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
         """All that a frame shows besides its page."""
@@ -115,76 +140,108 @@ class Pages:
 
     # --- records and bodies
 
-    def _known(self, keys: Iterable[str]) -> dict[str, PageRecord]:
-        """The records that there are, by key."""
+    def _made(self, pages: list[_Wanted]) -> Iterator[_Page]:
+        """The pages with their records, which are drawn where they are nowhere."""
         last = self._load_last()
-        self._last = list(last)
-        found: dict[str, PageRecord] = {}
-        for key in keys:
-            if key in last:
-                found[key] = last[key]
-            elif (kept := self._kept(key)) is not None:
-                found[key] = kept[0]
-        return found
+        same = list(last) == [page.key for page in pages]
+        known = {page.key: data for page in pages if (data := self._known(page.key, last))}
+        new = [page for page in pages if page.key not in known]
+        self.drawn = tuple(page.path for page in new)
+        """Site paths of the pages that were drawn just now."""
+        later = [Later(p.document, functools.partial(self._request, p)) for p in new]
+        drawn = self._documents.draw(later)
+        known |= {page.key: data for page, data in zip(new, drawn, strict=True)}
+        if not same:
+            data = bundle((page.key, known[page.key]) for page in pages)
+            self._store.keep(_SITE, self._name(), data, local=True)
+        for page in pages:
+            record = unpack_record(known[page.key])
+            assert record is not None
+            self._facts.add(record)
+            yield _Page(page, self._aside.put(known[page.key]), record.draft.indexed)
 
-    def _load_last(self) -> dict[str, PageRecord]:
+    def _known(self, key: str, last: Mapping[str, bytes]) -> bytes | None:
+        """A packed record that can be read."""
+        data = last.get(key)
+        if data is None and not self._store.fresh:
+            kept = self._store.peek(PAGES, key)
+            data = None if kept is None else part(kept)[0]
+        return data if data and unpack_record(data) is not None else None
+
+    def _load_last(self) -> dict[str, bytes]:
         data = None if self._store.fresh else self._store.peek(_SITE, self._name())
-        try:
-            found = pickle.loads(data) if data is not None else {}
-        except Exception:  # whatever damaged bytes make of it
-            return {}
-        return found if isinstance(found, dict) else {}
-
-    def _remember(self) -> None:
-        records = {page.request.key: page.record for page in self._pages}
-        data = pickle.dumps(records, pickle.HIGHEST_PROTOCOL)
-        self._store.keep(_SITE, self._name(), data, local=True)
+        return {} if data is None else unbundle(data)
 
     def _name(self) -> str:
         return hashlib.sha256(f"records of pages\0{tool_digest()}".encode()).hexdigest()
 
-    def _kept(self, key: str) -> tuple[PageRecord, str] | None:
-        """A record and a body from the store."""
-        data = None if self._store.fresh else self._store.peek(PAGES, key)
-        return None if data is None else _unpickled(data)
+    def _record(self, page: _Page) -> PageRecord:
+        record = unpack_record(page.record())
+        assert record is not None
+        return record
 
-    def _framed(self, page: _Page, frames: Frames) -> bytes:
-        data = self._store.peek(PAGES, page.request.key)
-        kept = None if data is None else _unpickled(data)
-        if kept is None:  # it was damaged, or the store cannot be written
-            kept = self._documents.drawn(page.request)
-        record, body = kept
+    def _framed(self, page: _Wanted, frames: Frames) -> bytes:
+        data = self._store.peek(PAGES, page.key)
+        packed, body = (b"", b"") if data is None else part(data)
+        record = unpack_record(packed)
+        if record is None:  # it was damaged, or the store cannot be written
+            record, text = self._documents.drawn(self._request(page))
+            body = text.encode()
         before, after = frames.around(record.draft, live=record.live)
-        return f"{before}{body}{after}".encode()
+        return before.encode() + body + after.encode()
 
 
-def _unpickled(data: bytes) -> tuple[PageRecord, str] | None:
-    try:
-        record, body = pickle.loads(data)
-    except Exception:  # whatever damaged bytes make of it
-        return None
-    return (record, body) if isinstance(record, PageRecord) and isinstance(body, str) else None
+class _Facts:
+    """What is known of all pages together."""
+
+    def __init__(self) -> None:
+        self._text: set[str] = set()
+        self._mathematics: set[str] = set()
+        self._declarations: set[str] = set()
+        self.sound = True
+        """Whether every page has the anchors that it leads to itself."""
+        self.leads: set[str] = set()
+        """Site paths that pages lead to."""
+        self.anchors: dict[str, set[str]] = {}
+        """Anchors that pages lead to on others, by the site path of these."""
+
+    def add(self, record: PageRecord) -> None:
+        """Note what a page shows and where it leads."""
+        self._text.update(record.text)
+        self._mathematics.update(record.mathematics)
+        self._declarations.update(record.declarations)
+        own = {"", "top", *record.ids}
+        for path, anchor in record.references:
+            if path == record.draft.path:
+                self.sound = self.sound and anchor in own
+            else:
+                self.leads.add(path)
+                if anchor not in ("", "top"):
+                    self.anchors.setdefault(path, set()).add(anchor)
+
+    def together(self) -> PageFacts:
+        """What the shared files must know."""
+        return PageFacts(
+            frozenset(self._text), frozenset(self._mathematics), frozenset(self._declarations)
+        )
 
 
-def sheets(library: Library) -> Iterator[Sheet]:
-    """The sheets of all pages of a course."""
-    course = library.course
-    yield pages.home_sheet(library)
+def sheets(library: Library) -> Iterator[Callable[[], Sheet]]:
+    """What makes the sheets of all pages of a course."""
+    course, partial = library.course, functools.partial
+    yield partial(pages.home_sheet, library)
     for level in course.levels:
-        yield pages.level_sheet(library, level)
+        yield partial(pages.level_sheet, library, level)
     for entry in library.order:
         if entry.document is None:
-            yield lesson.stub_sheet(library, entry)
+            yield partial(lesson.stub_sheet, library, entry)
         else:
-            yield lesson.lesson_sheet(library, entry, entry.document)
+            yield partial(lesson.lesson_sheet, library, entry, entry.document)
     for model in course.models:
-        yield pages.model_sheet(library, model)
+        yield partial(pages.model_sheet, library, model)
+    if library.reports.cases:
+        yield partial(numerics_sheet, library)
     for page in course.pages:
         if page.document is not None:
-            yield pages.page_sheet(library, page, page.document)
-    yield pages.not_found_sheet(library)
-
-
-def indexed(records: Sequence[PageRecord]) -> Iterator[str]:
-    """Site paths of the pages that search engines should list."""
-    return (record.draft.path for record in records if record.draft.indexed)
+            yield partial(pages.page_sheet, library, page, page.document)
+    yield partial(pages.not_found_sheet, library)

@@ -38,6 +38,7 @@ class Progress:
         self.live = not self.quiet and self.stream.isatty() and os.environ.get("TERM") != "dumb"
         self._lock = threading.Lock()
         self._running: dict[str, float] = {}
+        self._doing: dict[str, str] = {}
         self._stage = ""
         self._since = 0.0
         self._done = 0
@@ -71,10 +72,16 @@ class Progress:
             if not self.live:
                 self._write(f"  {name}\n")
 
+    def doing(self, name: str, what: str) -> None:
+        """What something that runs is at; only a terminal is told."""
+        with self._lock:
+            self._doing[name] = what
+
     def finished(self, name: str, verdict: str, seconds: float) -> None:
         """A script ended; the verdict is one word, such as `ok` or `timeout`."""
         with self._lock:
             self._running.pop(name, None)
+            self._doing.pop(name, None)
             self._done += 1
             if not self.live:
                 self._write(f"  {name}: {verdict} after {seconds:.2f} s\n")
@@ -95,7 +102,9 @@ class Progress:
     def _line(self, now: float) -> str:
         if not self._total:
             return f"{self._stage}  {now - self._since:.0f} s"
-        names = [f"{name} {now - since:.0f} s" for name, since in self._running.items()]
+        doing = {name: f" ({what})" for name, what in self._doing.items()}
+        running = self._running.items()
+        names = [f"{name}{doing.get(name, '')} {now - since:.0f} s" for name, since in running]
         return f"{self._stage} {self._done}/{self._total}  {', '.join(names)}"
 
     def _write(self, text: str) -> None:

@@ -4,9 +4,9 @@ Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
 
 1. `Read`: the text is parsed and its formulas are typeset; the outline is kept in the store.
 2. `Draw`: a page is drawn from its sheet and its document; body and record are kept in the store.
-3. The document and its formulas stay for the drawing, as long as there is room for them. Where they
-   are not there any more, or were read by an earlier build, the text is parsed again, and MathML
-   comes from the store.
+3. The document and its formulas stay for the drawing; where there is no room for more of them, the
+   oldest are put aside. Those that an earlier build has read, or another process, are parsed again,
+   and their MathML comes from the store.
 
 What draws is imported when there is something to draw.
 """
@@ -16,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
-import pickle
 from collections import OrderedDict
 from collections.abc import Sequence
 from types import TracebackType
@@ -26,6 +25,7 @@ from markupsafe import Markup
 
 from coursebuild.checks import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.aside import Aside, AsideError, Kept
 from coursebuild.effects.resources import template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import engine_digest, tool_digest
@@ -33,8 +33,9 @@ from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
-from coursebuild.pipeline.outlines import Outline, Task, packed
-from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Cut, Draw, Read, Request
+from coursebuild.pipeline.outlines import Outline, Task, pack, packed, unpack
+from coursebuild.pipeline.records import join, pack_record
+from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Cut, Draw, Later, Read, Request
 from coursebuild.render.record import PageRecord, record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
@@ -47,11 +48,11 @@ if TYPE_CHECKING:
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
-_ROOM = 64 << 20
+ROOM = 4 << 20
 """Bytes that documents may take which wait to be drawn, about."""
-_COST = 40
-"""Bytes that a parsed document takes for each character of its text, about."""
-_FORMULAS = 4096
+_COST = 12
+"""Bytes that a parsed document takes for each character of its text, about, with its MathML."""
+_FORMULAS = 2048
 """Formulas that are remembered."""
 
 
@@ -63,6 +64,7 @@ class _Whole:
 
 
 _HEAVY = (
+    "coursebuild.effects.v8",
     "coursebuild.render.draw",
     "coursebuild.render.highlight",
     "coursebuild.syntax.document",
@@ -71,10 +73,20 @@ _HEAVY = (
 )
 
 
-def import_all() -> None:
-    """Import what reading and drawing need, so that copies of this process share it."""
+def prepare_to_read(sample: Task) -> None:
+    """Import and make what reading and drawing need, so that copies of this process share it."""
     for name in _HEAVY:
         importlib.import_module(name)
+    from coursebuild.syntax.document import parse_document
+
+    # Much is made only when it is needed for the first time.
+    parse_document(sample.source, sample.callouts, lesson=sample.lesson)
+    mark_now("python", "")
+
+
+def prepare_to_cut() -> None:
+    """The same for cutting fonts."""
+    importlib.import_module("fontTools.subset")
 
 
 class Reader:
@@ -84,7 +96,10 @@ class Reader:
         self._store = store
         self._engine: MathEngine | None = None
         self._waiting: OrderedDict[str, _Whole] = OrderedDict()
-        self._room = _ROOM
+        self._room = ROOM
+        self._aside: Aside | None = None
+        self._put: dict[str, Kept] = {}
+        """Documents that wait as well, by the key of their text."""
         self._formulas: dict[Formula, str | MathError] = {}
         self._tools: dict[str, Tools] = {}
 
@@ -113,6 +128,8 @@ class Reader:
             case Draw():
                 self._rest()
                 return self._draw(request)
+            case Later():
+                return self.answer(request.make())
             case Cut():
                 return cut_font(request.job)
             case _:
@@ -120,41 +137,65 @@ class Reader:
 
     # --- reading
 
-    def _read(self, task: Task) -> bytes:
-        whole = self._whole(task)
+    def outline(self, task: Task) -> Outline:
+        """The outline of a text, read now."""
+        return self._outline(self._whole(task))
+
+    def _outline(self, whole: _Whole) -> Outline:
         found = formula_findings(whole.document, whole.formulas)
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
-        outline = Outline(
+        return Outline(
             skeleton=skeleton(whole.document),
             diagnostics=(*whole.diagnostics, *found),
             imports={s.path: tuple(sorted(imports(s.code.text))) for s in scripts},
             lasting=not found,
         )
+
+    def _read(self, task: Task) -> bytes:
+        whole = self._whole(task)
+        outline = self._outline(whole)
         data = packed(outline)
         if outline.lasting:  # that a formula took too long may not happen again
             self._store.keep(OUTLINES, task.key, data, local=True)
-        self._wait(task, whole)
+        self._wait(task.key, whole)
         return data
 
     def _whole(self, task: Task) -> _Whole:
         """A document with its formulas."""
         known = self._waiting.pop(task.key, None)
         if known is not None:
-            self._room += _COST * len(task.source.text)
+            self._room += _COST * len(known.document.source.text)
             return known
+        put = self._fetched(task)
+        if put is not None:
+            return put
         from coursebuild.syntax.document import parse_document
 
         parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
         formulas = document_formulas(parsed.value)
         return _Whole(parsed.value, parsed.diagnostics, self._typeset(formulas))
 
-    def _wait(self, task: Task, whole: _Whole) -> None:
+    def _wait(self, key: str, whole: _Whole) -> None:
         """Let a document wait for its page to be drawn; the oldest makes room."""
-        self._waiting[task.key] = whole
-        self._room -= _COST * len(task.source.text)
+        self._waiting[key] = whole
+        self._room -= _COST * len(whole.document.source.text)
         while self._room < 0 and self._waiting:
-            _, oldest = self._waiting.popitem(last=False)
+            name, oldest = self._waiting.popitem(last=False)
             self._room += _COST * len(oldest.document.source.text)
+            if self._aside is None or not self._aside.here:
+                self._aside = Aside(self._store.folder)
+            self._put[name] = self._aside.put(pack(oldest))
+
+    def _fetched(self, task: Task) -> _Whole | None:
+        """A document that was put aside here."""
+        put = self._put.pop(task.key, None)
+        if put is None:
+            return None
+        try:
+            found = unpack(put(), task.source)
+        except AsideError:  # by the process that this one is a copy of
+            return None
+        return found if isinstance(found, _Whole) else None
 
     def _typeset(self, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
         """MathML, from the store where these formulas were typeset together before."""
@@ -203,11 +244,12 @@ class Reader:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
         return record(draw(request.sheet, document, tools), request.base_url)
 
-    def _draw(self, request: Draw) -> PageRecord:
-        made = self.draw(request)
-        data = pickle.dumps(made, pickle.HIGHEST_PROTOCOL)
+    def _draw(self, request: Draw) -> bytes:
+        record, body = self.draw(request)
+        packed_record = pack_record(record)
+        data = join(packed_record, body)
         self._store.keep(PAGES, request.key, data, local=True)
-        return made[0]
+        return packed_record
 
     def _tools_for(self, language: str) -> Tools:
         if language not in self._tools:

@@ -24,7 +24,8 @@ from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.installed import Installed
 from coursebuild.effects.store import Store
-from coursebuild.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.effects.surroundings import Place
+from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.scripts.dependencies import (
     Dependency,
     Inputs,
@@ -34,6 +35,7 @@ from coursebuild.scripts.dependencies import (
     forgotten,
     group_key,
     inputs_of,
+    is_perturbed,
     needs,
     result_key,
     sought,
@@ -65,12 +67,16 @@ class LabTrial:
 class States:
     """How things are now, each looked at when it is first asked for and not again."""
 
-    def __init__(self, root: Path, store: Store) -> None:
+    def __init__(self, root: Path, store: Store, place: Place | None = None) -> None:
         self.root = root
-        self.places = places(root, os.environ)
+        self.places = places(root, os.environ, None if place is None else place.prefix)
         self.around = conditions(os.environ)
         self._digests = Digests(store)
-        self._installed = Installed(store, self._digests)
+        folders = None
+        if place is not None:
+            self.around = tuple(sorted((*self.around, ("environment", place.name))))
+            folders = (place.packages,)
+        self._installed = Installed(store, self._digests, folders)
         self._known: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -104,13 +110,24 @@ class States:
 
 
 class Memory:
-    """What is remembered of the scripts of a course."""
+    """What is remembered of the scripts of a course.
 
-    def __init__(self, root: Path, store: Store, *, fresh: bool = False) -> None:
+    Args:
+        root: the course folder.
+        store: where it is kept.
+        fresh: whether all is to be run again.
+        place: another interpreter that runs them. What is noted under a script's path tells of this
+            one, and stays as it is.
+    """
+
+    def __init__(
+        self, root: Path, store: Store, *, fresh: bool = False, place: Place | None = None
+    ) -> None:
+        self.elsewhere = place is not None
         self.store = store
         self.fresh = fresh or store.fresh
         """Whether all is to be run, whatever is remembered."""
-        self.states = States(root, store)
+        self.states = States(root, store, place)
         self.differing: list[tuple[ScriptRun, ScriptRun]] = []
         """Of runs made afresh: what was remembered, and what was done now with nothing changed."""
         self._clock = Clock(store)
@@ -200,6 +217,7 @@ class Memory:
             why,
             run.stdout,
             run.stderr,
+            *(_watched(run.trace) if run.trace is not None else ()),
         )
         key = ""
         if not why:
@@ -281,6 +299,8 @@ class Memory:
 
         `result` is the key of the result, where it is remembered.
         """
+        if self.elsewhere or is_perturbed(record.inputs):
+            return
         key = _last_key(record.inputs.path)
         head = f"{result}\n".encode()
         before = self.store.peek(_LAST, key)
@@ -319,6 +339,11 @@ def longest_first(
         return unknown if known is None else known
 
     return sorted(jobs, key=lambda job: -length(job))
+
+
+def _watched(trace: Trace) -> tuple[tuple[Divergence, ...], bool, tuple[str, ...]]:
+    """What of a trace is no dependency."""
+    return trace.divergences, trace.moved, trace.states
 
 
 def _last_key(path: str) -> str:

@@ -1,15 +1,15 @@
 """What is asked of a `Reader`, and what it answers.
 
-Entry points: `Read`, `Draw`.
+Entry points: `Read`, `Draw`; `Later`, a page that is put together when it is sent.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 from coursebuild.pipeline.outlines import Task
 from coursebuild.render.fonts import FontJob
-from coursebuild.render.record import PageRecord
 from coursebuild.render.sheet import Sheet
 from coursebuild.values import dataclass
 
@@ -45,6 +45,25 @@ class Cut:
     job: FontJob
 
 
-Request: TypeAlias = Read | Draw | Cut
-Answer: TypeAlias = bytes | PageRecord
-"""The outline of what was read, or the font, as bytes; the record of the page that was drawn."""
+class Later:
+    """A page of which only little is held until it is sent; it arrives as `Draw`."""
+
+    __slots__ = ("make", "path")
+
+    def __init__(self, path: str | None, make: Callable[[], Draw]) -> None:
+        """`path` is that of its document, if it has one."""
+        self.path = path
+        self.make = make
+
+    def __reduce__(self) -> tuple[Callable[[Draw], Draw], tuple[Draw]]:
+        """The page itself."""
+        return _same, (self.make(),)
+
+
+def _same(request: Draw) -> Draw:
+    return request
+
+
+Request: TypeAlias = Read | Draw | Later | Cut
+Answer: TypeAlias = bytes
+"""The outline of what was read; the packed record of the page that was drawn; the font."""

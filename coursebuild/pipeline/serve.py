@@ -18,6 +18,7 @@ import threading
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.leaving import leave
 from coursebuild.effects.packages import distributions, library_files
+from coursebuild.effects.prepared import prepared_cut
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
@@ -30,8 +31,9 @@ from coursebuild.pipeline.preview.follow import follow
 from coursebuild.pipeline.preview.live import LiveCourse
 from coursebuild.pipeline.preview.told import accept, page_news
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reading import cut_font
 from coursebuild.render.assets import Assets, page_script
-from coursebuild.render.fonts import FontJob, subset_font
+from coursebuild.render.fonts import FontJob
 from coursebuild.render.zips import Package, Surroundings, imported_modules
 from coursebuild.results import OutputFile
 
@@ -108,7 +110,8 @@ def live_course(options: Options) -> LiveCourse:
     """The course of these options, not read yet."""
 
     def subset(job: FontJob) -> bytes:
-        return options.store.kept("fonts", job.key, lambda: subset_font(job))
+        cut = prepared_cut(job.key)
+        return cut or options.store.kept("fonts", job.key, lambda: cut_font(job))
 
     assets = Assets(template_texts(), bundled_files())
     around = functools.partial(_surroundings, options)

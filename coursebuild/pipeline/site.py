@@ -24,12 +24,13 @@ from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
+from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import all_imports
-from coursebuild.pipeline.pages import Pages, indexed
+from coursebuild.pipeline.pages import Pages
 from coursebuild.render import meta, urls, zips
 from coursebuild.render.assets import Assets, templates_of
 from coursebuild.render.frame import Names
@@ -37,7 +38,7 @@ from coursebuild.render.library import Library
 from coursebuild.render.shared import PageFacts, common_characters
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, replace
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
@@ -55,14 +56,21 @@ class Site:
     """The pages that were drawn just now, and not before."""
 
 
-def site_files(course: Course, results: Results, documents: Documents, options: Options) -> Site:
-    """The site of a course whose documents are skeletons."""
-    return _Site(course, results, documents, options).made()
+def site_files(
+    course: Course, results: Results, documents: Documents, options: Options, reports: Reports
+) -> Site:
+    """The site of a course whose documents are skeletons; `reports` are those that it shows."""
+    return _Site(course, results, documents, options, reports).made()
 
 
 class _Site:
     def __init__(
-        self, course: Course, results: Results, documents: Documents, options: Options
+        self,
+        course: Course,
+        results: Results,
+        documents: Documents,
+        options: Options,
+        reports: Reports,
     ) -> None:
         self.course = course
         self.options = options
@@ -75,16 +83,17 @@ class _Site:
             self.assets,
             templates_of(self.assets.templates, CompiledTemplates(self.store)),
             words_for(self.store, self.assets.templates, course.language),
+            reports,
         )
 
     def made(self) -> Site:
         pages = Pages(self.library, self.documents, self.store)
-        names, files = self._shared([record.facts for record in pages.records])
+        names, files = self._shared(pages.facts)
         files += self._labs()
         files += self._downloads()
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
         if self.course.base_url:
-            sitemap = meta.sitemap(self.course, indexed(pages.records))
+            sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
@@ -95,9 +104,9 @@ class _Site:
 
     # --- what all pages share
 
-    def _shared(self, facts: Iterable[PageFacts]) -> tuple[Names, list[SiteFile]]:
+    def _shared(self, facts: PageFacts) -> tuple[Names, list[SiteFile]]:
         """The shared files, made only for characters and styles for which they were not made."""
-        together = _together(facts, common_characters(self.library))
+        together = replace(facts, text=facts.text | common_characters(self.library))
         parts = (together.text, together.mathematics, together.declarations)
         key = _key(tool_digest(), *("\0".join(sorted(part)) for part in parts))
         data = _Data(self.store, key, functools.partial(self._make_shared, together))
@@ -130,13 +139,25 @@ class _Site:
     def _downloads(self) -> Iterator[SiteFile]:
         """Scripts, models, archives, and files of the course."""
         for path, (script, _) in self.library.scripts.items():
-            yield OutputFile(path, script.code.text.encode())
+            key = hashlib.sha256(script.code.text.encode()).hexdigest()
+            yield KeptFile(path, key, functools.partial(self._script, path))
         for model in self.course.models:
             path = urls.model_file_path(model.name)
             yield OutputFile(path, model.source.text.encode())
-        for archive in zips.archives(self.library, self._around()):
-            yield KeptFile(archive.path, _key(tool_digest(), archive.key), archive.packed)
+        yield from self._archives()
         yield from self._course_files()
+
+    def _script(self, path: str) -> bytes:
+        return self.library.scripts[path][0].code.text.encode()
+
+    def _archives(self) -> Iterator[SiteFile]:
+        """The archives; of each only its key is held until it is written."""
+        around = self._around()
+        for make in zips.archives(self.library, around):
+            archive = make()
+            if archive is not None:
+                key = _key(tool_digest(), archive.key)
+                yield KeptFile(archive.path, key, functools.partial(_packed, make))
 
     def _course_files(self) -> Iterator[SiteFile]:
         digests = Digests(self.store)
@@ -232,15 +253,10 @@ class _Imports:
         return self._known[text]
 
 
-def _together(facts: Iterable[PageFacts], common: frozenset[str]) -> PageFacts:
-    text: set[str] = {*common}
-    mathematics: set[str] = set()
-    declarations: set[str] = set()
-    for page in facts:
-        text |= page.text
-        mathematics |= page.mathematics
-        declarations |= page.declarations
-    return PageFacts(frozenset(text), frozenset(mathematics), frozenset(declarations))
+def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
+    archive = make()
+    assert archive is not None
+    return archive.packed()
 
 
 def _key(*parts: str) -> str:

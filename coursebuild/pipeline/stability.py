@@ -1,6 +1,6 @@
 """`coursebuild stability`: measure MuJoCo on the hard cases, beside what theory says.
 
-Entry point: `stability(options, names)`.
+Entry point: `stability(options, names)`; `recorded_cases` holds it against what is recorded.
 
 1. Names mean problems, or families of them: `damped-spring` is all of its damping ratios.
 2. What was measured is kept under the engine's version, the kind of machine and the code that
@@ -35,8 +35,12 @@ _CODE = ("physics", "pipeline/stability.py", "measured/cases.py")
 """What measures and says what was measured."""
 
 
-def stability(options: Options, names: tuple[str, ...] = ()) -> tuple[CaseReport, ...]:
+def stability(
+    options: Options, names: tuple[str, ...] = (), *, again: bool = False
+) -> tuple[CaseReport, ...]:
     """What was measured on the problems that the names mean; on all where there are none.
+
+    `again`: measured now, whatever is kept.
 
     Raises:
         UsageError: no problem is called so.
@@ -51,7 +55,7 @@ def stability(options: Options, names: tuple[str, ...] = ()) -> tuple[CaseReport
     with progress.stage("measuring", len(chosen)):
         for name in chosen:
             key = hashlib.sha256(f"{name}\0{state}".encode()).hexdigest()
-            kept = options.store.load(_KIND, key)
+            kept = None if again else options.store.load(_KIND, key)
             report = None if kept is None else _decoded(kept)
             if report is None:
                 progress.started(name)

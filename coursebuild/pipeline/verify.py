@@ -14,7 +14,7 @@ Documents may be skeletons. Formulas are no part of this: see `pipeline.document
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, assert_never
 
 from coursebuild.checks import check_compiled, mjcf_texts
@@ -43,6 +43,7 @@ from coursebuild.results import (
 from coursebuild.scripts.bindings import document_bindings
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.dependencies import Inputs
+from coursebuild.scripts.divergence import is_lost
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
 from coursebuild.scripts.repeat import repeat_findings
@@ -150,12 +151,28 @@ class ExtractedScripts:
     blocked: tuple[Blocked, ...]
 
 
+class _Files(Mapping[str, bytes]):
+    """The bytes of scripts by path, of which never more than one is held."""
+
+    def __init__(self, extractions: Mapping[str, Extraction]) -> None:
+        self._extractions = extractions
+
+    def __getitem__(self, path: str) -> bytes:
+        return self._extractions[path].data
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._extractions)
+
+    def __len__(self) -> int:
+        return len(self._extractions)
+
+
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     """Bring `examples/` up to date, as far as nobody's edits are lost."""
     parsed = extract(course)
     remove_leftovers({(options.root / d.source.path).parent for d in course.documents})
     try:
-        report = write_examples(options.root, [(e.path, e.data) for e in parsed.value])
+        report = write_examples(options.root, _Files({e.path: e for e in parsed.value}))
     except OutsideProjectError as error:
         place = parsed.value[0].script.path_span if parsed.value else course.map.span(0, 0)
         told = diagnose("script-path", place, error.message, help="make it a folder of the course")
@@ -207,17 +224,22 @@ def run(
     stage: str = "running scripts",
     memory: Memory | None = None,
     server: ScriptServer | None = None,
+    perturbation: int = 0,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
     What begins and ends is told. `memory` is what is remembered; another one than that of the
     options where everything is to run. `server` is one that stays warm from run to run.
+    `perturbation`: with initial states moved, in the direction that has this number.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
-    todo = jobs(chosen)
-    texts = {extraction.path: extraction.data for extraction in chosen}
-    inputs = {job.path: memory.inputs(job, texts[job.path]) for job in todo if not job.norun}
+    todo = jobs(chosen, perturbation)
+    inputs = {
+        job.path: memory.inputs(job, extraction.data)
+        for job, extraction in zip(todo, chosen, strict=True)
+        if not job.norun
+    }
     done = memory.recall(tuple(inputs.values()))
     left = [job for job in todo if job.path not in done]
     for finished in _run(left, inputs, options, progress, stage, memory, server):
@@ -280,6 +302,8 @@ def script_lines(
     for extraction, done in zip(chosen, runs, strict=True):
         drift = done.outcome is Outcome.OK and done.path in drifted
         status = "drift" if drift else done.outcome.value
+        if done.outcome is Outcome.OK and is_lost(extraction, done):
+            status = "diverged"
         lines.append(
             ScriptLine(done.path, extraction.owner, status, done.seconds, done.cached, done.missing)
         )

@@ -70,7 +70,7 @@ def _ended(code: str) -> tuple[str, int]:
     return core, code.count("\n") + (not code.endswith("\n"))
 
 
-@functools.lru_cache(maxsize=1024)
+@functools.lru_cache(maxsize=256)
 def _read(code: str, count: int) -> _Outline:
     try:
         body = ast.parse(code).body

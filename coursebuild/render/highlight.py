@@ -49,7 +49,7 @@ def highlight(language: str, code: str) -> Markup:
     return Markup("\n").join(highlight_lines(language, code))
 
 
-@functools.lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=256)
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     """The code's lines, each marked by itself: no element reaches over the end of a line."""
     lexer = _lexer(_ALIASES.get(language.lower(), language.lower()))

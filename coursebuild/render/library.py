@@ -7,11 +7,12 @@ afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from markupsafe import Markup
 
+from coursebuild.measured.shown import Reports
 from coursebuild.model import (
     CalloutKind,
     Course,
@@ -83,6 +84,8 @@ class Library:
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
     """By `place`."""
+    reports: Reports
+    """What was measured on models and hard cases, as far as it fits the course."""
 
     @classmethod
     def of(
@@ -92,6 +95,7 @@ class Library:
         assets: Assets,
         templates: Callable[[], Environment] | None = None,
         words: Strings | None = None,
+        reports: Reports | None = None,
     ) -> Library:
         """Look everything over once, with templates and words, where there are some already."""
         return cls.made(
@@ -105,6 +109,7 @@ class Library:
             verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
             templates=templates,
             words=words,
+            reports=reports,
         )
 
     @classmethod
@@ -121,6 +126,7 @@ class Library:
         verdicts: Mapping[tuple[str, int], Verdict],
         templates: Callable[[], Environment] | None = None,
         words: Strings | None = None,
+        reports: Reports | None = None,
     ) -> Library:
         """The same from parts that whoever calls remembers; they are not copied."""
         return cls(
@@ -142,6 +148,7 @@ class Library:
             labs=labs,
             _formulas=formulas,
             verdicts=verdicts,
+            reports=reports or Reports(),
         )
 
     @property
@@ -219,14 +226,43 @@ def named_models(document: Document) -> NamedModels:
 
 def course_scripts(
     course: Course, scripts_of: Callable[[Document], tuple[Script, ...]] = document_scripts
-) -> dict[str, tuple[Script, Owner]]:
+) -> Mapping[str, tuple[Script, Owner]]:
     """The scripts of a course by path, in order; of two with one path, the first."""
-    found: dict[str, tuple[Script, Owner]] = {}
+    places: dict[str, tuple[int, Owner]] = {}
+    away = False
     for owner in owners(course):
         if owner.document is not None:
-            for script in scripts_of(owner.document):
-                found.setdefault(script.path, (script, owner))
-    return found
+            away = away or owner.document.is_away
+            for number, script in enumerate(scripts_of(owner.document)):
+                places.setdefault(script.path, (number, owner))
+    found = _Scripts(places, scripts_of)
+    return found if away else dict(found)
+
+
+class _Scripts(Mapping[str, tuple[Script, Owner]]):
+    """Scripts of documents that may be away, each fetched when it is asked for."""
+
+    def __init__(
+        self,
+        places: Mapping[str, tuple[int, Owner]],
+        scripts_of: Callable[[Document], tuple[Script, ...]],
+    ) -> None:
+        self._places = places
+        self._scripts_of = scripts_of
+
+    def __getitem__(self, path: str) -> tuple[Script, Owner]:
+        number, owner = self._places[path]
+        assert owner.document is not None
+        return self._scripts_of(owner.document)[number], owner
+
+    def __contains__(self, path: object) -> bool:
+        return path in self._places
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
 
 
 def place(recording: Recording) -> tuple[str, int]:

@@ -13,6 +13,8 @@ from coursebuild.render.frame import place_of
 from coursebuild.render.labs import number
 from coursebuild.render.lesson import LessonHead, LessonLink, drawn, edit_address, lesson_link
 from coursebuild.render.library import Library, ModelUse
+from coursebuild.render.measured import measured_view
+from coursebuild.render.numerics import numerics_sheet
 from coursebuild.render.sheet import Highlighted, Sheet
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
@@ -67,6 +69,7 @@ def home_sheet(library: Library) -> Sheet:
         "models": tuple(
             Named(place.href(urls.model_page_path(m.name)), m.name) for m in course.models
         ),
+        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
@@ -131,9 +134,16 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
         "href": place.href(urls.model_file_path(model.name)),
         "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
         "code": Highlighted("xml", model.source.text.rstrip()),
+        "measured": measured_view(library, place, model),
+        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
     return Sheet(place.path, "model", title, "", "model.html", values)
+
+
+def numerics_draft(library: Library) -> Draft:
+    """The page of the hard cases."""
+    return drawn(library, numerics_sheet(library))
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:

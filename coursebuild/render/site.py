@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
+from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.render import fonts, lesson, meta, pages, urls, zips
 from coursebuild.render.assets import Assets
@@ -38,6 +39,8 @@ class SiteOptions:
     project root."""
     around: zips.Surroundings = field(default_factory=zips.Surroundings)
     """What downloaded scripts need."""
+    reports: Reports = field(default_factory=Reports)
+    """What was measured, as far as it fits the course."""
     subset: Callable[[fonts.FontJob], bytes] = fonts.subset_font
     """How a font is cut: whoever calls may keep results, by a job's `key`."""
 
@@ -47,7 +50,7 @@ def render_site(
 ) -> tuple[OutputFile, ...]:
     """The files of the site, sorted by path. The same values give the same bytes."""
     options = options or SiteOptions()
-    library = Library.of(course, results, assets)
+    library = Library.of(course, results, assets, reports=options.reports)
     drafts, facts = [], []
     for draft, declarations in map(settled, _drafts(library)):
         drafts.append(draft)
@@ -74,6 +77,8 @@ def _drafts(library: Library) -> Iterator[Draft]:
             yield lesson.lesson_draft(library, entry, entry.document)
     for model in course.models:
         yield pages.model_draft(library, model)
+    if library.reports.cases:
+        yield pages.numerics_draft(library)
     for page in course.pages:
         if page.document is not None:
             yield pages.page_draft(library, page, page.document)

@@ -21,6 +21,8 @@ from coursebuild.values import dataclass
 HOME = "index.html"
 NOT_FOUND = "404.html"
 EXAMPLES_ZIP = "examples.zip"
+NUMERICS = "numerics/index.html"
+"""In a folder that no page of a course can have."""
 SITEMAP = "sitemap.xml"
 ROBOTS = "robots.txt"
 

@@ -9,10 +9,11 @@ way to compress.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from coursebuild.model import Course, Lesson, Script
 from coursebuild.render import urls
@@ -77,12 +78,13 @@ class Archive:
         return _zip(self.files)
 
 
-def archives(library: Library, around: Surroundings) -> tuple[Archive, ...]:
-    """That of the course and those of its lessons."""
-    found = [course_archive(library, around)] if library.scripts else []
+def archives(library: Library, around: Surroundings) -> Iterator[Callable[[], Archive | None]]:
+    """What makes that of the course and those of its lessons, or `None` for one without scripts."""
+    if library.scripts:
+        yield functools.partial(course_archive, library, around)
     by_module = _by_module(library)
-    lessons = (lesson_archive(library, around, lesson, by_module) for lesson in library.order)
-    return (*found, *(archive for archive in lessons if archive is not None))
+    for lesson in library.order:
+        yield functools.partial(lesson_archive, library, around, lesson, by_module)
 
 
 def course_archive(library: Library, around: Surroundings) -> Archive:

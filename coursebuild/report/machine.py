@@ -11,6 +11,7 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.report.sensitivity import sensitivity_value
 from coursebuild.report.text import Style, diagnostic_text
 from coursebuild.report.values import LabLine, Report, ScriptLine
 from coursebuild.rules import RULES
@@ -81,7 +82,14 @@ def to_json(report: Report) -> str:
         "silenced": s.silenced,
         "seconds": round(s.seconds, 3),
     }
-    value = {"diagnostics": diagnostics, "scripts": scripts, "labs": labs, "summary": summary}
+    value: dict[str, Any] = {
+        "diagnostics": diagnostics,
+        "scripts": scripts,
+        "labs": labs,
+        "summary": summary,
+    }
+    if report.sensitivity is not None:
+        value["sensitivity"] = sensitivity_value(report.sensitivity)
     return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
 
 

@@ -42,6 +42,10 @@ def to_text(report: Report, style: Style) -> str:
     lines += [lab_line(line, style) for line in report.labs]
     if lines:
         parts.append("".join(line + "\n" for line in lines))
+    if report.sensitivity:
+        from coursebuild.report.sensitivity import sensitivity_text
+
+        parts.append(sensitivity_text(report.sensitivity, style.paint))
     if report.remarks:
         parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
     colour = _GREEN if report.ok else _RED

@@ -6,6 +6,7 @@ Entry point: `Report`; `summary_line(report)` is its last line as text.
 from __future__ import annotations
 
 from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.measured.sensitivity import Sensitivity
 from coursebuild.values import dataclass, replace
 
 
@@ -17,7 +18,7 @@ class ScriptLine:
     lesson: str
     """Id of its lesson; for a script of a page the page's id."""
     status: str
-    """`ok`, `drift`, or how the run ended otherwise (`failed`, `timeout`, `killed`, …)."""
+    """`ok`, `drift`, `diverged`, or how the run ended otherwise (`failed`, `timeout`, …)."""
     seconds: float
     cached: bool
     missing: tuple[str, ...] = ()
@@ -74,6 +75,9 @@ class Report:
     depends: tuple[str, ...] | None = None
     """Files that all of this depends on beside those in the course's own folders, absolute or
     relative to its root; `None` where they are not known."""
+
+    sensitivity: tuple[Sensitivity, ...] | None = None
+    """Which printed digits hold; `None` where nobody asked."""
 
     @property
     def ok(self) -> bool:

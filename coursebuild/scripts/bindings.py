@@ -36,6 +36,10 @@ _FAILED = (
 )
 
 
+_REMEMBERED = 64
+"""Recorded outputs of which the lines are remembered."""
+
+
 @dataclass(frozen=True, slots=True)
 class Leaning:
     """A binding, and the change of a recorded value that it leans on."""
@@ -93,6 +97,8 @@ class Printed:
         """The lines of a recorded output."""
         key = (verdict.recording.span.path, verdict.recording.body_span.start)
         if key not in self._lines:
+            if len(self._lines) >= _REMEMBERED:
+                self._lines.clear()
             self._lines[key] = printed_lines(verdict.recording)
         return self._lines[key]
 

@@ -20,7 +20,7 @@ from typing import assert_never
 from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.values import dataclass
 
-VERSION = "1"
+VERSION = "2"
 """To be changed with how scripts are run and watched: older results then count no more."""
 
 ABSENT = "absent"
@@ -29,6 +29,7 @@ SPECIAL = "special"
 """States of files that are none; other states are hashes, or say why nothing can be read."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
+_PERTURBATION = "perturbation"
 _SHOWN = 6
 """Names of modules that are shown of a list."""
 _CHANGING = ("/proc/", "/sys/", "/dev/")
@@ -92,7 +93,14 @@ class Inputs:
 def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
     """What is known of a job whose file holds this text."""
     digest = hashlib.sha256(text).hexdigest()
+    if job.perturbation:
+        around = tuple(sorted((*around, (_PERTURBATION, str(job.perturbation)))))
     return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
+
+
+def is_perturbed(inputs: Inputs) -> bool:
+    """Whether these are of a run whose initial states are moved."""
+    return any(name == _PERTURBATION for name, _ in inputs.around)
 
 
 def group_key(inputs: Inputs) -> str:

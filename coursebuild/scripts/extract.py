@@ -9,13 +9,16 @@ apart, or when one is a folder on the way to the other. The first in the order o
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Course, Document, Lesson, Page, Script, document_blocks
 from coursebuild.results import ScriptJob
 from coursebuild.source import Span
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,29 @@ class Extraction:
     script: Script
     owner: str
     """The id of the lesson or page that it stands in."""
+    _find: Callable[[], Script] | None = field(default=None, init=False, repr=False, compare=False)
+    """Gives the script, where its document is away."""
+
+    @classmethod
+    def of(cls, document: Document, number: int, script: Script, owner: str) -> Extraction:
+        """That of the block of this number; where the document is away, the script is too."""
+        if not document.is_away:
+            return cls(script.path, _text(script), script, owner)
+        extraction = object.__new__(cls)
+        object.__setattr__(extraction, "path", script.path)
+        object.__setattr__(extraction, "owner", owner)
+        object.__setattr__(extraction, "_find", partial(_block, document, number))
+        return extraction
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """What is away: its slot is empty."""
+            if name == "script":
+                return self._find()
+            if name == "text":
+                return _text(self._find())
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def data(self) -> bytes:
@@ -69,11 +95,10 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     found: list[Diagnostic] = []
     paths = _Paths()
     for owner, document in owners(course):
-        for block in document_blocks(document):
+        for number, block in enumerate(document_blocks(document)):
             if not isinstance(block, Script):
                 continue
-            text = block.code.text.rstrip("\n") + "\n"
-            extraction = Extraction(block.path, text, block, owner)
+            extraction = Extraction.of(document, number, block, owner)
             clash = paths.clash(extraction)
             if clash is None:
                 paths.add(extraction)
@@ -83,12 +108,28 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     return Parsed(tuple(kept), tuple(found))
 
 
-def jobs(extractions: Iterable[Extraction]) -> tuple[ScriptJob, ...]:
-    """What to run."""
+def _text(script: Script) -> str:
+    return script.code.text.rstrip("\n") + "\n"
+
+
+def _block(document: Document, number: int) -> Script:
+    block = next(islice(document_blocks(document), number, None))
+    assert isinstance(block, Script)
+    return block
+
+
+def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:
+    """What to run; with initial states moved, which takes longer, in the direction of a number."""
+    patience = _PATIENCE if perturbation else 1.0
+    scripts = ((e.path, e.script) for e in extractions)
     return tuple(
-        ScriptJob(e.path, e.script.args, e.script.timeout, e.script.requires, e.script.norun)
-        for e in extractions
+        ScriptJob(p, s.args, s.timeout * patience, s.requires, s.norun, perturbation)
+        for p, s in scripts
     )
+
+
+_PATIENCE = 3.0
+"""How many times as long a script may take whose initial states are moved."""
 
 
 def _key(path: str) -> str:

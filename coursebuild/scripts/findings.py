@@ -13,6 +13,7 @@ from coursebuild.model import Course
 from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import Held, Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
+from coursebuild.scripts.divergence import divergence
 from coursebuild.scripts.drift import drift_diagnostic
 from coursebuild.scripts.extract import Extraction, extract, owners
 from coursebuild.scripts.failures import failure, silence
@@ -37,6 +38,8 @@ def script_findings(
         failed = failure(extraction, run, everything) if run is not None else None
         if failed is not None:
             found.append(failed)
+        if run is not None:
+            found += divergence(extraction, run, everything)
     printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
     owner_of = {document.source.path: owner for owner, document in owners(course)}
     for verdict in verdicts:

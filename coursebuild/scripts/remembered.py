@@ -14,7 +14,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from coursebuild.results import Outcome, ScriptRun, Trace
+from coursebuild.results import Divergence, Outcome, ScriptRun, Sign, Trace
 from coursebuild.scripts.dependencies import Dependency, Inputs, Kind, sought_files
 from coursebuild.values import dataclass
 
@@ -38,6 +38,9 @@ class Record:
     stdout: str = ""
     stderr: str = ""
     """Of one that is not remembered both are left out."""
+    divergences: tuple[Divergence, ...] = ()
+    moved: bool = False
+    states: tuple[str, ...] = ()
 
     def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
         """The run as if it had been made here; see `to_bytes` for the places."""
@@ -55,6 +58,9 @@ class Record:
                 outside=self._names(Kind.OUTSIDE),
                 modules=self._names(Kind.MODULE),
                 opaque="",
+                divergences=self.divergences,
+                moved=self.moved,
+                states=self.states,
             ),
         )
 
@@ -87,6 +93,12 @@ def to_bytes(record: Record, places: Iterable[tuple[str, str]]) -> bytes:
         "forgotten": record.forgotten,
         "stdout": record.stdout,
         "stderr": _take_out(record.stderr, places),
+        "divergences": [
+            (d.sign.value, d.time, d.model, d.path, d.line, d.depth, d.geoms)
+            for d in record.divergences
+        ],
+        "moved": record.moved,
+        "states": record.states,
     }
     # Names of files may hold bytes that are no text; only escapes can carry them.
     return json.dumps(value, ensure_ascii=True).encode()
@@ -110,6 +122,9 @@ class _Stored(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     forgotten: str
     stdout: str
     stderr: str
+    divergences: tuple[tuple[Sign, str, str, str, int, str, tuple[str, ...]], ...]
+    moved: bool
+    states: tuple[str, ...]
 
 
 def from_bytes(data: bytes) -> Record | None:
@@ -128,6 +143,9 @@ def from_bytes(data: bytes) -> Record | None:
         s.forgotten,
         s.stdout,
         s.stderr,
+        tuple(Divergence(*parts) for parts in s.divergences),
+        s.moved,
+        s.states,
     )
 
 

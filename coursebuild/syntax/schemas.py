@@ -17,8 +17,9 @@ from msgspec import Struct
 from coursebuild.syntax.course_schema import CourseFile
 from coursebuild.syntax.lab_schema import SimLab, Slider
 from coursebuild.syntax.quiz_schema import QuizFile
+from coursebuild.syntax.scenario_schema import ModelFile
 
-SchemaName: TypeAlias = Literal["quiz", "lab", "course"]
+SchemaName: TypeAlias = Literal["quiz", "lab", "course", "model"]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -26,6 +27,7 @@ _ROOTS: dict[SchemaName, tuple[type[Struct], str]] = {
     "quiz": (QuizFile, "A quiz fence"),
     "lab": (SimLab, "A lab fence of the kind simlab"),
     "course": (CourseFile, "The course map, content/course.toml"),
+    "model": (ModelFile, "The file beside a model, models/NAME.toml"),
 }
 
 

@@ -1,7 +1,7 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
-Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun` of a script;
-`fragment` of code that need not parse.
+Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges` of a
+script; `fragment` of code that need not parse.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ DEFAULT_TIMEOUT = 60.0
 LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
-_RUNNING = ("timeout", "requires", "args", "norun")
+_VALUES = ("timeout", "requires", "args")
+_FLAGS = ("norun", "diverges")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
@@ -40,13 +41,14 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     """A `python` fence: a `Script` where it has a proper `file=`, else `PlainCode`."""
     info = parse_info(fence.info)
     keys = read_keys(
-        "python", info.value.words, values=("file", *_RUNNING[:3]), flags=("norun", "fragment")
+        "python", info.value.words, values=("file", *_VALUES), flags=(*_FLAGS, "fragment")
     )
     diagnostics = [*info.diagnostics, *keys.diagnostics]
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
     misspelt = any(word.key == "file" for word in info.value.words)
     if file is None and not diagnostics:
-        diagnostics += [_needs_file(word) for key in _RUNNING if (word := keys.value.get(key))]
+        running = (keys.value.get(key) for key in (*_VALUES, *_FLAGS))
+        diagnostics += [_needs_file(word) for word in running if word is not None]
     if fragment is not None and misspelt:
         message = "a block with `file` is run, so it cannot be a `fragment`"
         diagnostics.append(diagnose("fence-key-value", fragment.span, message))
@@ -103,6 +105,7 @@ def _script(fence: Fence, file: Word, keys: Keys) -> tuple[Script | None, list[D
         args,
         norun,
         fence.body_span,
+        keys.get("diverges") is not None,
     ), diagnostics
 
 

@@ -33,21 +33,22 @@ from coursebuild.syntax.toml_scan import Item, Scalar, Scanner, Sequence, Table
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
-def parse_toml(source: Source) -> Parsed[ObjectNode | None]:
+def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode | None]:
     """The file as a table; no value, and one diagnostic, when it is not TOML. Never raises.
 
-    The value can be there along with diagnostics; a caller that finds any must not publish it.
+    `rule` is what that diagnostic is called. The value can be there along with diagnostics; a
+    caller that finds any must not publish it.
     """
     body = _body(source)
     try:
         data = tomllib.loads(body.text)
     except (ValueError, RecursionError) as error:
-        return Parsed(None, (_fault(body, str(error)),))
+        return Parsed(None, (_fault(body, str(error), rule),))
     faults: list[Diagnostic] = []
     try:
         root = Scanner(body, faults).scan()
     except FaultError as fault:  # nesting beyond the limit is TOML all the same
-        return Parsed(None, (_diagnostic(body, fault),))
+        return Parsed(None, (_diagnostic(body, fault, rule),))
     node = _join(body, root, data)
     assert isinstance(node, ObjectNode)
     return Parsed(node, tuple(faults))
@@ -92,7 +93,7 @@ def _join(body: Excerpt, item: Item, value: object) -> Node:
 # -------------------------------------------------------------------------------------- mistakes
 
 
-def _fault(body: Excerpt, message: str) -> Diagnostic:
+def _fault(body: Excerpt, message: str, rule: str) -> Diagnostic:
     """What is wrong with a text of which `tomllib` says `message`."""
     place = _PLACE.search(message)
     at = _offset(body.text, place) if place else 0
@@ -105,11 +106,11 @@ def _fault(body: Excerpt, message: str) -> Diagnostic:
     span = body.span(at, min(at + 1, len(body.text)))
     if odd and (fault is None or at <= fault.start):
         help = "remove it" if at == 0 else "replace it by a plain space, or remove it"
-        return diagnose("map-syntax", span, f"{odd} cannot stand here in TOML", help=help)
+        return diagnose(rule, span, f"{odd} cannot stand here in TOML", help=help)
     if fault is not None:
-        return _diagnostic(body, fault)
+        return _diagnostic(body, fault, rule)
     words = message[: place.start()] if place else message
-    return diagnose("map-syntax", span, words[:1].lower() + words[1:])
+    return diagnose(rule, span, words[:1].lower() + words[1:])
 
 
 def _offset(text: str, place: re.Match[str]) -> int:
@@ -120,9 +121,9 @@ def _offset(text: str, place: re.Match[str]) -> int:
     return min(starts[min(line, len(starts)) - 1] + column - 1, len(text))
 
 
-def _diagnostic(body: Excerpt, fault: FaultError) -> Diagnostic:
+def _diagnostic(body: Excerpt, fault: FaultError, rule: str) -> Diagnostic:
     span = body.span(fault.start, fault.end)
     if fault.first is None:
-        return diagnose("map-syntax", span, fault.message, help=fault.help)
+        return diagnose(rule, span, fault.message, help=fault.help)
     notes = (Note("the first one is here", fault.first.span),)
     return diagnose("field-repeated", span, fault.message, help=fault.help, notes=notes)

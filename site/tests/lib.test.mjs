@@ -86,6 +86,15 @@ test('contacts are told with their geoms', (t) => {
   assert.deepEqual([...new Set(contacts.map(({ names }) => names[1]))].sort(), ['ball', 'box'])
 })
 
+test('a geom without a name has none', (t) => {
+  const xml = `<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+    <body pos="0 0 .1"><freejoint/><geom size=".1"/></body></worldbody></mujoco>`
+  const lab = labOf(t, engine, xml)
+  lab.start()
+  lab.step(100)
+  assert.deepEqual(lab.sync().sim.contacts().map(({ names }) => names), [['', '']])
+})
+
 test('names, numbers, and what is not there', (t) => {
   const lab = labOf(t, engine, native.cases[0].xml)
   lab.start()

@@ -168,6 +168,25 @@ test('warnings and divergence', () => {
   assert.ok(blown.main.seconds < 0.2)
 })
 
+const PRESS = `<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+  <body pos="0 0 .1"><joint type="slide" axis="0 0 1"/><geom size=".1" mass="1"/></body></worldbody></mujoco>`
+
+test('bodies deep in each other are noticed, of which MuJoCo does not warn', () => {
+  const pressed = (force, xml = PRESS) =>
+    attempt(xml, {}, { controller: `data.qfrc_applied[0] = -${force}` }, { seconds: 0.5 }).failures
+  assert.deepEqual(pressed(5000).map(({ entry, kind }) => [entry, kind]), [[[], 'deep']])
+  assert.match(pressed(5000)[0].message, /^`floor` and geom 1 by 0\.1\d* m$/)
+  assert.deepEqual(pressed(300), [])
+  const plate = PRESS.replace('size=".1" mass', 'type="box" size=".1 .1 1e-4" mass').replace('0 0 .1"', '0 0 1e-4"')
+  assert.deepEqual(pressed(300, plate).map(({ kind }) => kind), ['deep'])
+  assert.deepEqual(pressed(5000, PRESS.replace('type="plane"', 'type="plane" contype="0" conaffinity="0"')), [])
+})
+
+test('bodies that the author has put into each other are not remarked on before a step', () => {
+  const inside = PRESS.replace('pos="0 0 .1"', 'pos="0 0 -.2"')
+  assert.deepEqual(attempt(inside, {}, { setup: 'data.qpos[0] = -.1', controller: 'data.qpos[0] = 1' }, { seconds: 0.1 }).failures, [])
+})
+
 test('a state that is no number can be drawn, even in the first picture that has something to draw', () => {
   const blow = 'if (data.time > 0.05) data.qvel[0] = 1e200'
   const reply = attempt(PENDULUM, { overlays: ['frames'] }, { controller: blow, setup: 'data.qpos[0] = NaN' }, { seconds: 0.1 })

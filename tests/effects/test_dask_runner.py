@@ -129,6 +129,15 @@ def root(tmp_path: Path) -> Path:
         "examples/mj.py": (
             "import mujoco\nprint(mujoco.MjModel.from_xml_path('models/m.xml').nbody)\n"
         ),
+        "examples/lost.py": (
+            "import mujoco\n"
+            "body = '<body><joint/><geom size=\"1\"/></body>'\n"
+            "xml = f'<mujoco><worldbody>{body}</worldbody></mujoco>'\n"
+            "model = mujoco.MjModel.from_xml_string(xml)\n"
+            "data = mujoco.MjData(model)\n"
+            "data.qvel[0] = 1e20\n"
+            "mujoco.mj_step(model, data)\n"
+        ),
     }
     for path, text in texts.items():
         (root / path).parent.mkdir(parents=True, exist_ok=True)
@@ -149,7 +158,7 @@ def test_results_are_the_same_as_here(cluster: Cluster, root: Path) -> None:
     jobs = [
         *(job("hello"), job("args", "a b", "é"), job("data"), job("uses"), job("fails")),
         *(job("exits"), job("bytes"), job("kills"), job("mj"), job("hello", norun=True)),
-        *(job("absent"), job("mj", requires=("no_such_module_here",))),
+        *(job("absent"), job("mj", requires=("no_such_module_here",)), job("lost")),
         job("long", timeout=0.5),
     ]
     events: list[RunEvent] = []

@@ -8,7 +8,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.results import Outcome
+from coursebuild.results import Divergence, Outcome, Sign
 from coursebuild.scripts.dependencies import Dependency, Inputs, Kind
 from coursebuild.scripts.remembered import REMEMBERED, Record, from_bytes, to_bytes
 
@@ -29,6 +29,16 @@ inputs = st.builds(
     st.lists(text, max_size=2).map(tuple),
     st.lists(st.tuples(text, text), max_size=2).map(tuple),
 )
+divergences = st.builds(
+    Divergence,
+    st.sampled_from(Sign),
+    text,
+    text,
+    text,
+    st.integers(0, 1 << 20),
+    text,
+    st.lists(text, max_size=2).map(tuple),
+)
 records = st.builds(
     Record,
     inputs,
@@ -40,6 +50,7 @@ records = st.builds(
     text,
     text,
     text.map(lambda value: value.replace("\0", "")),
+    st.lists(divergences, max_size=2).map(tuple),
 )
 
 

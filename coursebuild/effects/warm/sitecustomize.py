@@ -51,7 +51,7 @@ def _start(bare: frozenset[str]) -> None:
     if _TRACE is not None:
         from coursebuild.effects import spawned
 
-        spawned.start(_TRACE, root, bare)
+        spawned.start(_TRACE, root, bare, int(_PERTURBATION))
         return
     from coursebuild.effects import preload
 
@@ -64,6 +64,7 @@ def _start(bare: frozenset[str]) -> None:
 
 _forget_folder()
 _TRACE = os.environ.pop("COURSEBUILD_TRACE", None)
+_PERTURBATION = os.environ.pop("COURSEBUILD_PERTURBATION", "0")
 _SAID = _catch_output() if _TRACE is None else -1
 _error = _import_real_one()
 _start(frozenset(sys.modules) - ({__name__} if _error else set()))

@@ -208,7 +208,7 @@ class LiveCourse:
         course = with_owners(old, fresh)
         library = self.parts.renewed(before, course, fresh)
         known = renewed_places(known, fresh, library)
-        scripts = {path: script for path, (script, _) in library.scripts.items()}
+        scripts = {path: script.norun for path, (script, _) in library.scripts.items()}
         documents = {o.path: o.document for o in fresh if o.document is not None}
         self.parts.typeset(documents.values())
         drawn: dict[str, tuple[Drawn, bytes]] = {}
@@ -315,7 +315,13 @@ class LiveCourse:
             while True:
                 self.due = False
                 edits = self.edits
-                loaded = load(self.root, self._parse, self._ahead, self.documents.course_map)
+                loaded = load(
+                    self.root,
+                    self._parse,
+                    self._ahead,
+                    self.documents.course_map,
+                    self.documents.declarations,
+                )
                 known = places(loaded.course) if loaded.course is not None else None
                 self._forget(loaded.course)
                 with self.changed:

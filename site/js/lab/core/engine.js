@@ -156,6 +156,7 @@ function constants(mj) {
   return Object.freeze({
     obj: numbers(mj.mjtObj, 'mjOBJ_'),
     joint: numbers(mj.mjtJoint, 'mjJNT_'),
+    geom: numbers(mj.mjtGeom, 'mjGEOM_'),
     vis: numbers(mj.mjtVisFlag, 'mjVIS_'),
     frame: numbers(mj.mjtFrame, 'mjFRAME_'),
     category: numbers(mj.mjtCatBit, 'mjCAT_'),

@@ -6,6 +6,8 @@
  * SI units and the world frame.
  */
 
+import { nameOf } from './names.js'
+
 const DEGREES = 180 / Math.PI
 
 /**
@@ -140,7 +142,7 @@ export function contactList(engine, model, data, scratch) {
     const geoms = [contact.geom1, contact.geom2]
     list.push({
       geoms,
-      names: geoms.map((geom) => (geom < 0 ? '' : mj.mj_id2name(model, k.obj.GEOM, geom) ?? '')),
+      names: geoms.map((geom) => (geom < 0 ? '' : nameOf(engine, model, k.obj.GEOM, geom))),
       pos: Array.from(contact.pos),
       normal: Array.from(contact.frame.slice(0, 3)),
       dist: contact.dist,

@@ -17,3 +17,9 @@ export function siteOf(engine, model, name) {
   if (site < 0) throw new RangeError(`the model has no site "${name}"`)
   return site
 }
+
+/** The name of an object; empty where it has none, for which the bindings give whatever text lies at the null address. */
+export function nameOf(engine, model, type, i) {
+  const name = engine.mj.mj_id2name(model, type, i) ?? ''
+  return engine.mj.mj_name2id(model, type, name) === i ? name : ''
+}

@@ -5,6 +5,8 @@
  * frame (see `frame.js`). Ids are MuJoCo's; -1 means none. Angles are in degrees, lengths in metres.
  */
 
+import { nameOf } from './names.js'
+
 const TEXTURE_ROLES = 10 // mjNTEXROLE
 const ROLE_USER = 0
 const ROLE_RGB = 1
@@ -18,7 +20,7 @@ const ROLE_RGB = 1
  */
 export function describeScene(engine, model, config, camera, layout) {
   const { mj, k } = engine
-  const name = (type, i) => mj.mj_id2name(model, type, i) ?? ''
+  const name = (type, i) => nameOf(engine, model, type, i)
   const each = (count, make) => Array.from({ length: count }, (_, i) => make(i))
   const { stat, vis } = model
   return {

@@ -15,6 +15,7 @@ import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, readable } from '../core/piece.js'
 import { packed } from './base64.js'
+import { deepContact } from './deep.js'
 import { ParityRecorder } from './parity.js'
 import { picture, record, withSmallTextures } from './record.js'
 import { resetDiffers } from './reset.js'
@@ -164,6 +165,16 @@ class Trial {
     if (lab.diverged !== null) this.fail(entry, 'diverged', lab.diverged.message, lab.diverged.time)
   }
 
+  /** Note bodies that steps have brought deep into each other, once for each act. */
+  deep(lab) {
+    if (lab.steps === 0 || lab.diverged !== null) return
+    const found = deepContact(this.engine, lab.model, lab.data)
+    if (found === null) return
+    const { entry } = this.during
+    const message = `${found.names.join(' and ')} by ${Number(found.depth.toPrecision(2))} m`
+    this.fail(entry, 'deep', message, lab.time, JSON.stringify([entry, 'deep']))
+  }
+
   /** Evaluate all that is shown; a wrong value does not keep the rest from being tried. */
   look(lab) {
     const env = lab.sync()
@@ -216,6 +227,7 @@ class Trial {
     this.state(lab)
     this.look(lab)
     this.advance(lab, lab.time + PROBE.seconds, PROBE.steps)
+    this.deep(lab)
     if (lab.diverged === null) this.look(lab)
   }
 
@@ -237,6 +249,7 @@ class Trial {
       const t = lab.time + (end - lab.time) / (CHECKS + 1 - i)
       const result = this.advance(lab, t, Math.ceil(most / CHECKS), ['stopAt', 'code'])
       if (result === 'stopAt' || result === 'code') stopped = result
+      this.deep(lab)
       if (lab.diverged === null) this.look(lab)
     }
     if (stopAt !== null && stopped !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
@@ -305,6 +318,7 @@ class Trial {
       const entry = ['expect', i, 'expr']
       this.during.entry = current.trying = ['expect', i]
       this.advance(lab, t)
+      this.deep(lab)
       if (lab.diverged !== null) return
       const value = this.value(entry, this.code.expect[i], lab.sync(), numeric)
       if (value === null) continue

@@ -1,0 +1,81 @@
+"""The commands that measure: `bench` and `stability`, with what they record and check.
+
+Nothing heavy is imported before the command that needs it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from coursebuild.cli.commands import _options as options_of
+from coursebuild.cli.output import CLEAN, WRONG, style_of, write
+
+if TYPE_CHECKING:
+    from coursebuild.pipeline.bench import Benched
+    from coursebuild.pipeline.options import Options
+    from coursebuild.pipeline.recorded_cases import Cases
+
+
+def bench_command(arguments: argparse.Namespace) -> int:
+    """Report speed against error of the course's models."""
+    from coursebuild.pipeline.plots import plot_file, write_plots
+    from coursebuild.report.measured import bench_report, bench_values
+    from coursebuild.values import replace
+
+    options = options_of(arguments)
+    plot = None if arguments.plot is None else plot_file(arguments.plot)
+    try:
+        found = _benched(options, arguments)
+        if plot is not None:
+            found = replace(found, remarks=(*found.remarks, *write_plots(plot, found.scenes)))
+    finally:
+        options.store.close()
+    status = CLEAN if found.ok else WRONG
+    parts = (found.diagnostics, found.failures, found.checked, found.remarks)
+    if arguments.format == "json":
+        return write(bench_values(found.scenes, *parts), status)
+    shown = () if arguments.check else found.scenes
+    return write(bench_report(shown, *parts, style_of(sys.stdout)), status)
+
+
+def _benched(options: Options, arguments: argparse.Namespace) -> Benched:
+    from coursebuild.pipeline import bench
+
+    names, quick = tuple(arguments.scenes), arguments.quick
+    if arguments.record:
+        return bench.record(options, names, quick=quick)
+    if arguments.check:
+        return bench.check(options, names, quick=quick)
+    return bench.bench(options, names, quick=quick)
+
+
+def stability_command(arguments: argparse.Namespace) -> int:
+    """Measure MuJoCo on hard cases, beside theory."""
+    from coursebuild.report.measured import cases_report, cases_values
+
+    options = options_of(arguments)
+    try:
+        found = _cases(options, arguments)
+    finally:
+        options.store.close()
+    status = CLEAN if found.ok else WRONG
+    parts = (found.failures, found.checked, found.remarks)
+    if arguments.format == "json":
+        recorded = arguments.record or arguments.check
+        return write(cases_values(found.cases, *parts, recorded=recorded), status)
+    shown = () if arguments.check else found.cases
+    return write(cases_report(shown, *parts, style_of(sys.stdout)), status)
+
+
+def _cases(options: Options, arguments: argparse.Namespace) -> Cases:
+    from coursebuild.pipeline.recorded_cases import Cases, check_stability, record_stability
+    from coursebuild.pipeline.stability import stability
+
+    names = tuple(arguments.problems)
+    if arguments.record:
+        return record_stability(options, names)
+    if arguments.check:
+        return check_stability(options, names)
+    return Cases(stability(options, names))

@@ -1,0 +1,112 @@
+"""Text in drawings: what markup can hold, how wide it is, and how labels keep apart.
+
+Entry points: `markup_text`, `text_width`, `shortened`; `apart`, `clear_place`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from coursebuild.values import dataclass
+
+_NARROW = frozenset("ijl.,:;'|!()[] ·ft")
+_BROAD = frozenset("mwMW—%@")
+
+
+def markup_text(text: str) -> str:
+    """Text for markup; characters that no markup can hold are left out."""
+    return escape(
+        "".join(c for c in text if c >= " " and c not in "\x7f\ufffe\uffff" and not _half(c))
+    )
+
+
+def _half(char: str) -> bool:
+    """Half of a surrogate pair, which stands for a byte that is no text."""
+    return "\ud800" <= char <= "\udfff"
+
+
+def text_width(text: str, size: float) -> float:
+    """About how wide a text is in a sans-serif face of this size; rather too much."""
+    letters = 0.0
+    for char in text:
+        if char in _NARROW:
+            letters += 0.36
+        elif char in _BROAD:
+            letters += 0.92
+        elif char > "\u2e80":
+            letters += 1.05
+        else:
+            letters += 0.68 if char.isupper() else 0.58
+    return letters * size
+
+
+def shortened(text: str, room: float, size: float) -> str:
+    """A text that fits into so much room, with an ellipsis where some of it is left out."""
+    if text_width(text, size) <= room:
+        return text
+    while text and text_width(f"{text}…", size) > room:
+        text = text[:-1]
+    return f"{text}…"
+
+
+def apart(wanted: Sequence[float], gap: float, top: float, bottom: float) -> list[float]:
+    """Places as near to those wanted as may be, in their order, and each `gap` below the last.
+
+    Args:
+        wanted: rising.
+        gap: from one to the next.
+        top: where the first may be.
+        bottom: where the last may be; what does not fit begins above the top.
+    """
+    places: list[float] = []
+    for y in wanted:
+        places.append(max(y, places[-1] + gap) if places else max(y, top))
+    most = bottom
+    for i in reversed(range(len(places))):  # those that were pushed out at the bottom go up again
+        most = places[i] = min(places[i], most)
+        most -= gap
+    return places
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle that is taken."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def over(self, other: Box) -> float:
+        """The area that two have in common."""
+        wide = min(self.right, other.right) - max(self.left, other.left)
+        high = min(self.bottom, other.bottom) - max(self.top, other.top)
+        return max(wide, 0.0) * max(high, 0.0)
+
+
+def clear_place(
+    at: tuple[float, float], size: tuple[float, float], inside: Box, taken: Sequence[Box]
+) -> tuple[Box, float]:
+    """A place for a label of this size near a point, and the area that it hides there.
+
+    The first that hides nothing, nearer ones before others, or where it hides least.
+    """
+    x, y = at
+    wide, high = size
+    best: tuple[float, Box] | None = None
+    for away in (13.0, 24.0, 40.0, 60.0):
+        for side, up in ((1, -1), (-1, -1), (1, 1), (-1, 1), (1, 0), (-1, 0), (0, -1), (0, 1)):
+            left = x + away * side if side > 0 else x - away - wide if side < 0 else x - wide / 2
+            top = y + up * away - high / 2
+            left = min(max(left, inside.left), inside.right - wide)
+            top = min(max(top, inside.top), inside.bottom - high)
+            box = Box(left, top, left + wide, top + high)
+            own = Box(x - 9, y - 9, x + 9, y + 9)
+            hidden = sum(box.over(other) for other in taken) + 4 * box.over(own)
+            if best is None or hidden < best[0] - 1e-6:
+                best = (hidden, box)
+            if hidden == 0:
+                return box, 0.0
+    assert best is not None
+    return best[1], best[0]

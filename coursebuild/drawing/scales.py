@@ -1,0 +1,129 @@
+"""The scales of axes: where the ticks are, and what they say.
+
+Entry points: `ticks`, `tick_texts` (even); `log_ticks`, `decades`, `power_text`
+(logarithmic); `number_text`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+
+def ticks(low: float, high: float, about: int = 5) -> list[float]:
+    """Round numbers from `low` to `high`, about so many."""
+    span = high - low
+    if not (span > 0 and math.isfinite(span)):
+        return [low]
+    step = _step(span, about)
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    # The product has the rounding error of the step; a tick is the nearest double to what it says.
+    return [float(f"{i * step:.15g}") for i in range(first, last + 1)] or [low]
+
+
+def _step(span: float, about: int) -> float:
+    """The distance of the ticks: 1, 2, 2.5 or 5 times a power of ten."""
+    raw = span / about
+    power = 10.0 ** math.floor(math.log10(raw))
+    return next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
+
+
+def tick_texts(values: Sequence[float]) -> list[str]:
+    """Ticks as text: with as many digits as tell them apart, and a real minus."""
+    step = min((b - a for a, b in pairwise(values)), default=0.0)
+    largest = max(abs(value) for value in values)
+    if largest == 0:
+        return ["0" for _ in values]
+    allowed = 1e-6 * (step or largest)
+    plain = _digits(values, "f", allowed) if largest < 1e15 else None
+    if plain is not None and 1e-4 <= largest < 1e6:
+        return plain
+    powers = _digits(values, "e", allowed) or [_readable(f"{v:.3e}") for v in values]
+    longest = max(map(len, powers))
+    return powers if plain is None or max(map(len, plain)) > longest else plain
+
+
+def _digits(values: Sequence[float], form: str, allowed: float) -> list[str] | None:
+    """The values as text with the fewest digits that say them; `None` where none do."""
+    for digits in range(18):
+        texts = [f"{value:.{digits}{form}}" for value in values]
+        if all(abs(float(t) - v) <= allowed for t, v in zip(texts, values, strict=True)):
+            return [_readable(text) for text in texts]
+    return None
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _readable(text: str) -> str:
+    mantissa, _, exponent = text.partition("e")
+    mantissa = mantissa.replace("-", "\u2212")
+    if float(text) == 0:
+        return "0" if exponent else mantissa.lstrip("\u2212")
+    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}" if exponent else mantissa
+
+
+def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
+    """Ticks of a logarithmic axis: where, as a power of ten, and what they say.
+
+    Powers of ten, with twos and fives between them where there are few, and round numbers where
+    even those are.
+
+    Args:
+        low: the exponent at one end.
+        high: the exponent at the other, larger.
+        most: how many ticks have room.
+    """
+    first, last = math.ceil(low - 1e-9), math.floor(high + 1e-9)
+    found = [(float(n), power_text(n)) for n in decades(first, last, most)] if first <= last else []
+    if last - first < 2:
+        finer = [
+            (n + math.log10(m), _scaled(m, n))
+            for n in range(math.floor(low), last + 1)
+            for m in (1, 2, 5)
+            if low - 1e-9 <= n + math.log10(m) <= high + 1e-9
+        ]
+        if len(found) < len(finer) <= max(most, 3):
+            found = finer
+    if len(found) >= 2 or high - low > 1:
+        return found
+    values = ticks(10.0**low, 10.0**high, min(most, 5))
+    texts = tick_texts(values)
+    return [(math.log10(v), text) for v, text in zip(values, texts, strict=True) if v > 0]
+
+
+def decades(low: int, high: int, most: int) -> list[int]:
+    """Exponents from `low` to `high`, no more than `most`: all, or each second, third or fifth one.
+
+    One of them there is always.
+    """
+    step = 1
+    while high // step - -(-low // step) + 1 > max(most, 1):
+        step = _wider(step)
+    return list(range(-(-low // step) * step, high + 1, step)) or [low]
+
+
+def _wider(step: int) -> int:
+    """The next distance of decades."""
+    power: int = 10 ** (len(str(step)) - 1)
+    return next(power * m for m in (2, 3, 5, 10) if power * m > step)
+
+
+def power_text(exponent: int) -> str:
+    """A power of ten: plain where it is short."""
+    return _scaled(1, exponent)
+
+
+def number_text(value: float) -> str:
+    """A number as a tick would say it, with few digits."""
+    return tick_texts([float(f"{value:.2g}")])[0].removeprefix("1·")
+
+
+def _scaled(mantissa: int, exponent: int) -> str:
+    """A small whole number times a power of ten."""
+    if -3 <= exponent <= 3:
+        return f"{mantissa * 10**exponent if exponent >= 0 else mantissa / 10**-exponent:g}"
+    power = "10" + str(exponent).translate(_RAISED)
+    return power if mantissa == 1 else f"{mantissa}·{power}"

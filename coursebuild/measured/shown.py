@@ -1,0 +1,23 @@
+"""Reports of a course that its pages may show: those that fit the course as it is.
+
+Entry point: `Reports`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from coursebuild.measured.bench import SceneReport
+from coursebuild.measured.cases import CaseReport
+from coursebuild.measured.diet import DietReport
+from coursebuild.values import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Reports:
+    """What was recorded."""
+
+    scenes: Mapping[str, SceneReport] = field(default_factory=dict)
+    """By the model's name, as `diets`."""
+    diets: Mapping[str, DietReport] = field(default_factory=dict)
+    cases: tuple[CaseReport, ...] = ()

@@ -1,0 +1,75 @@
+"""The strokes of a work–precision plot: marks, rings, paths, and the paper around letters.
+
+Entry points: `key_mark`, `symbol`, `leader`, `ring`, `path`, `halo`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from coursebuild.drawing.marks import Box
+from coursebuild.drawing.symbols import colour, cross, dash, mark
+
+MARK, SMALL = 4.2, 2.9
+RING = 8.5
+OWN = "var(--rust, #86340c)"
+INK = "var(--ink, currentColor)"
+PAPER = "var(--paper, Canvas)"
+
+
+def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]:
+    """The mark that stands before an entry of the key."""
+    if number is not None:
+        dashes = f' stroke-dasharray="{dash(number)}"' if dash(number) else ""
+        look = f'stroke="{colour(number)}" stroke-width="1.7"{dashes}'
+        yield path(f"M{x - 13:.1f} {y:.1f}h26", look)
+        yield symbol(number, x, y, MARK, full=True)
+    elif kind == "own":
+        yield ring(x, y, 6)
+    elif kind == "lost":
+        yield path(cross(x, y, 3.6), f'stroke="{INK}" stroke-width="1.8"')
+    elif kind == "unstable":
+        yield f'<path d="M{x - 11:.1f} {y - 5:.1f}h20v10h-20Z" fill-opacity="0.2"/>'
+        yield path(f"M{x + 9:.1f} {y - 7:.1f}v14", f'stroke="{INK}" stroke-width="2"')
+    else:
+        size = SMALL if kind == "other" else MARK
+        full = INK if kind == "front" else PAPER
+        yield f'<path d="{mark(0, x, y, size)}" fill="{full}" stroke="{INK}" stroke-width="1.5"/>'
+
+
+def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
+    """The mark of a setting; `full` where it is on the front."""
+    paint = colour(number)
+    inner = f"<title>{title}</title>" if title else ""
+    return (
+        f'<path d="{mark(number, x, y, size)}" fill="{paint if full else PAPER}" '
+        f'stroke="{paint}" stroke-width="1.5">{inner}</path>'
+    )
+
+
+def ring(x: float, y: float, radius: float) -> str:
+    """What is around the scene's own setting."""
+    look = f'fill="none" stroke="{OWN}" stroke-width="1.8"'
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
+
+
+def leader(at: tuple[float, float], box: Box) -> Iterator[str]:
+    """A line from the ring to its label, where that is not beside it."""
+    x, y = at
+    near = min(max(x, box.left), box.right), min(max(y, box.top), box.bottom)
+    far = math.dist(at, near)
+    if far > RING + 10:
+        part = RING / far
+        start = f"M{x + part * (near[0] - x):.1f} {y + part * (near[1] - y):.1f}"
+        yield path(f"{start}L{near[0]:.1f} {near[1]:.1f}", f'stroke="{OWN}"')
+
+
+def path(d: str, look: str) -> str:
+    """A line."""
+    return f'<path d="{d}" fill="none" {look}/>'
+
+
+def halo() -> str:
+    """The paper around letters, so that lines below do not cross them."""
+    return f' stroke="{PAPER}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'

@@ -1,0 +1,238 @@
+"""Where geoms can get, whatever happens: a bound, not an observation.
+
+Entry points: `possible_pairs(model)`, `separate(model, pairs)`, `Reach`.
+
+1. MuJoCo looks for contact between geoms whose masks allow it, but not within a body, nor between
+   bodies that are welded to each other or do not move, between parent and child, or where an
+   `exclude` says so; and it does between those of a `pair`. This is repeated here.
+2. Two geoms are seen from the nearest body that carries both. Down from it, a point can be no
+   farther from the anchor of the first joint than the sum of the distances from anchor to anchor,
+   whatever angles the joints take; limits are not relied on, as they are soft. After one joint only
+   it cannot be nearer either.
+3. A slide adds how far it can go: that it has a range is relied on, with as much again beyond both
+   of its ends. One without a range, a free body and a mocap body can be anywhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from coursebuild.values import dataclass
+
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+_HFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
+_FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+_SLACK = 1e-6
+"""m and relative: rounding, and the engine's own margins."""
+
+Pair = tuple[int, int]
+Vector = NDArray[np.float64]
+
+
+def possible_pairs(model: Any) -> frozenset[Pair]:
+    """Pairs of geoms between which MuJoCo would look for contact, were they near each other."""
+    flags = int(model.opt.disableflags)
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if flags & int(off):
+        return frozenset()
+    found = {
+        _ordered(int(a), int(b)) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
+    }
+    parents = not flags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+    excluded = {int(one) for one in model.exclude_signature}
+    weld = model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    moves = [False] * model.nbody
+    for number in range(1, model.nbody):
+        has_joint = bool(model.body_dofnum[number])
+        moves[number] = has_joint or moves[int(model.body_parentid[number])]
+    kind, affinity = model.geom_contype, model.geom_conaffinity
+    body = model.geom_bodyid
+    for a in range(model.ngeom):
+        match = ((kind[a] & affinity[a + 1 :]) | (kind[a + 1 :] & affinity[a])) != 0
+        for b in (np.nonzero(match)[0] + a + 1).tolist():
+            one, two = int(weld[body[a]]), int(weld[body[b]])
+            if one == two or not (moves[one] or moves[two]):
+                continue
+            if parents and one and two and (above[one] == two or above[two] == one):
+                continue
+            low, high = sorted((int(body[a]), int(body[b])))
+            if (low << 16) + high in excluded or (high << 16) + low in excluded:
+                continue
+            found.add((a, b))
+    return frozenset(found)
+
+
+def _ordered(a: int, b: int) -> Pair:
+    return (a, b) if a < b else (b, a)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """All points whose distance from a centre is in a range, m; in the frame of some body."""
+
+    centre: Vector
+    least: float
+    most: float
+
+
+class Reach:
+    """Bounds for a model, worked out in its own state."""
+
+    def __init__(self, model: Any) -> None:
+        self._model = model
+        self._data = data = mujoco.MjData(model)
+        data.qpos[:] = model.qpos0
+        mujoco.mj_kinematics(model, data)
+        self._above = [self._line(b) for b in range(model.nbody)]
+        self._shells: dict[Pair, Shell | None] = {}
+        self._pair_margin = float(np.max(model.pair_margin, initial=0.0))
+
+    def _line(self, body: int) -> list[int]:
+        """A body and those above it, up to the world."""
+        found = [body]
+        while body:
+            body = int(self._model.body_parentid[body])
+            found.append(body)
+        return found
+
+    def separate(self, a: int, b: int) -> bool:
+        """Whether two geoms can never touch."""
+        model = self._model
+        one, two = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
+        others = set(self._above[two])
+        common = next(body for body in self._above[one] if body in others)
+        margin = float(model.geom_margin[a] + model.geom_margin[b]) + self._pair_margin
+        gap = margin + _SLACK * (1.0 + margin)
+        first, second = self.shell(a, common), self.shell(b, common)
+        if first is None or second is None:
+            return False
+        if _PLANE in (model.geom_type[a], model.geom_type[b]):
+            return self._from_plane(a, b, first, second, gap)
+        if not (self._has_size(a) and self._has_size(b)):
+            return False
+        distance = float(np.linalg.norm(first.centre - second.centre))
+        gap += _SLACK * (distance + first.most + second.most)
+        return (
+            distance > first.most + second.most + gap
+            or first.least > distance + second.most + gap
+            or second.least > distance + first.most + gap
+        )
+
+    def _has_size(self, geom: int) -> bool:
+        return float(self._model.geom_rbound[geom]) > 0
+
+    def _from_plane(self, a: int, b: int, first: Shell, second: Shell, gap: float) -> bool:
+        """Whether something stays in front of a plane that does not move against `common`."""
+        model = self._model
+        if model.geom_type[a] == model.geom_type[b]:
+            return True  # planes do not touch each other
+        plane, other, place = b, first, second
+        if model.geom_type[a] == _PLANE:
+            plane, other, place = a, second, first
+        if place.most > 0 or not self._has_size(b if plane == a else a):
+            return False
+        if int(model.geom_bodyid[plane]) and not self._is_fixed(int(model.geom_bodyid[plane])):
+            # Its normal is known in the world only; a plane that moves is left out.
+            return False
+        normal = self._data.geom_xmat[plane].reshape(3, 3)[:, 2]
+        height = float(normal @ (other.centre - self._data.geom_xpos[plane]))
+        return height > other.most + gap + _SLACK * (abs(height) + other.most)
+
+    def _is_fixed(self, body: int) -> bool:
+        return int(self._model.body_weldid[body]) == 0 and not self._has_mocap(body)
+
+    def _has_mocap(self, body: int) -> bool:
+        return any(int(self._model.body_mocapid[b]) >= 0 for b in self._above[body])
+
+    def shell(self, geom: int, common: int) -> Shell | None:
+        """Where a geom can be, seen from a body that carries it, in world axes of `qpos0`.
+
+        A plane counts as a point. `None`: anywhere.
+        """
+        if (geom, common) not in self._shells:
+            self._shells[geom, common] = self._shell(geom, common)
+        return self._shells[geom, common]
+
+    def _shell(self, geom: int, common: int) -> Shell | None:
+        model, data = self._model, self._data
+        point = np.asarray(data.geom_xpos[geom], dtype=np.float64)
+        line = self._above[int(model.geom_bodyid[geom])]
+        size = 0.0 if model.geom_type[geom] == _PLANE else self._radius(geom)
+        anchors: list[Vector] = []
+        turning, sliding = [], 0.0
+        for body in reversed(line[: line.index(common)]):
+            if int(model.body_mocapid[body]) >= 0:
+                return None
+            start = int(model.body_jntadr[body])
+            for joint in range(start, start + int(model.body_jntnum[body])):
+                slides = self._slides(joint)
+                if slides is None:
+                    return None
+                sliding += slides
+                anchors.append(np.asarray(data.xanchor[joint], dtype=np.float64))
+                turning.append(model.jnt_type[joint] != _SLIDE)
+        # Anchors of slides only add to the way; without a turn the point keeps its direction.
+        turns = [anchor for anchor, turn in zip(anchors, turning, strict=True) if turn]
+        if not turns:
+            return Shell(point, 0.0, sliding + size)
+        corners = [*turns, point]
+        legs = [float(np.linalg.norm(q - p)) for p, q in itertools.pairwise(corners)]
+        reach = sum(legs) + sliding
+        least = max(0.0, legs[-1] - (reach - legs[-1]) - size)
+        return Shell(turns[0], least if len(turns) == 1 else 0.0, reach + size)
+
+    def _radius(self, geom: int) -> float:
+        """About the geom's own place; a mesh or field may lie beside it."""
+        model = self._model
+        if model.geom_type[geom] != _HFIELD:
+            box = model.geom_aabb[geom]
+            return max(
+                float(model.geom_rbound[geom]),
+                float(np.linalg.norm(np.abs(box[:3]) + box[3:])),
+            )
+        return float(model.geom_rbound[geom])
+
+    def _slides(self, joint: int) -> float | None:
+        """By how much a joint can shift what it carries, m; `None`: without bound."""
+        model = self._model
+        kind = int(model.jnt_type[joint])
+        if kind == _FREE:
+            return None
+        if kind != _SLIDE:
+            return 0.0
+        low, high = (float(one) for one in model.jnt_range[joint])
+        limited = bool(model.jnt_limited[joint])
+        if int(model.opt.disableflags) & int(
+            mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        ):
+            limited = False
+        if not limited:
+            return None
+        start = float(model.qpos0[int(model.jnt_qposadr[joint])])
+        return max(abs(low - start), abs(high - start)) + abs(high - low)
+
+
+def separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
+    """Those pairs of geoms that can never touch."""
+    reach = Reach(model)
+    return frozenset(pair for pair in pairs if reach.separate(*pair))
+
+
+def moving_ball(model: Any, geoms: Iterable[int]) -> tuple[Vector, float] | None:
+    """A ball (centre, radius, m) that these geoms never leave; `None` where there is none."""
+    reach = Reach(model)
+    shells = [reach.shell(geom, 0) for geom in geoms]
+    known = [one for one in shells if one is not None]
+    if len(known) != len(shells) or not known:
+        return None
+    centre = np.mean([one.centre for one in known], axis=0)
+    radius = max(float(np.linalg.norm(one.centre - centre)) + one.most for one in known)
+    return centre, radius if math.isfinite(radius) else math.inf

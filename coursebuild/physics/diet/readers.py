@@ -1,0 +1,154 @@
+"""What of a model somebody looks at: lessons, scripts, labs, what is declared beside the model.
+
+Entry point: `Readers`.
+
+Nobody's code is understood here; it is searched for words, and where in doubt a thing counts as
+read: whoever mentions `sensordata` reads every sensor, whoever lists sensors too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from coursebuild.values import dataclass
+
+_ALL: dict[str, tuple[str, ...]] = {
+    "sensor": (
+        "sensordata",
+        "nsensordata",
+        "nsensor",
+        "sensor_adr",
+        "sensor_dim",
+        "sensor_type",
+        "sensor_name",
+        "sensors",
+        "mj_id2name",
+        "id2name",
+        r"sensor\(\s*[^'\"\s]",
+        r"rollout",
+    ),
+    "actuator": (
+        "ctrl",
+        "nu",
+        "qfrc_actuator",
+        "actuator_force",
+        "actuator_length",
+        "actuator_velocity",
+        "actuators",
+        "mj_id2name",
+        r"actuator\(\s*[^'\"\s]",
+        "set_mjcb_control",
+        "rollout",
+    ),
+    "keyframe": ("nkey", "key_qpos", "key_qvel", "key_ctrl", r'"key"\s*:\s*\d', r"spec\.keys\b"),
+    "keyframe-number": (r"mj_resetDataKeyframe\([^,()]*,[^,()]*,\s*\d",),
+    "site": ("site_xpos", "site_pos", "nsite", "site_xmat", "sites", r"\bsite\(\s*[^'\"\s]"),
+    "material": (
+        "mat_rgba",
+        "nmat",
+        "materials",
+        r"\bmat\(\s*[^'\"\s]",
+        r"\bmaterial\(\s*[^'\"\s]",
+    ),
+    "texture": ("tex_data", "ntex", "textures"),
+    "mesh": ("nmesh", "mesh_vert", "mesh_face", "mesh_pos", "meshes", r"\bmesh\(\s*[^'\"\s]"),
+    "hfield": ("hfield_data", "nhfield", "hfields", r"\bhfield\(\s*[^'\"\s]"),
+    "energy": ("energy", "Energy"),
+    "fwdinv": ("solver_fwdinv", "mj_compareFwdInv"),
+    "number": (
+        "qpos",
+        "qvel",
+        "qacc",
+        "nq",
+        "nv",
+        "nbody",
+        "ngeom",
+        "xpos",
+        "xquat",
+        "xipos",
+        "geom_xpos",
+        "body_mass",
+        "cvel",
+        "rollout",
+    ),
+    "body-number": ("nbody", "ngeom", "xpos", "xipos", "geom_xpos", "body_mass", "cvel", "bodies"),
+    "contact": ("contact", "ncon", "contacts", "cfrc_ext", "efc_force", "xfrc_applied"),
+    "shape": (
+        "body_pos",
+        "body_quat",
+        "geom_pos",
+        "geom_quat",
+        "geom_size",
+        "geom_margin",
+        "jnt_range",
+        "jnt_pos",
+        "jnt_limited",
+        "contype",
+        "conaffinity",
+        "geom_contype",
+        "geom_conaffinity",
+        "disableflags",
+        "MjSpec",
+        "mjs_addGeom",
+    ),
+}
+_WORD = r"(?<![\w]){}(?![\w])"
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """A file that uses the model."""
+
+    path: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Readers:
+    """All files that use a model."""
+
+    files: tuple[Reader, ...] = ()
+
+    def whole(self, what: str) -> str:
+        """Who reads all of a kind, or may: the path of the first; empty where nobody does."""
+        shapes = [
+            re.compile(word if word.endswith(r"\(") or "\\" in word else _WORD.format(word))
+            for word in _ALL[what]
+        ]
+        for file in self.files:
+            if any(shape.search(file.text) for shape in shapes):
+                return file.path
+        return ""
+
+    def named(self, name: str) -> str:
+        """Who mentions a name: the path of the first; empty where nobody does."""
+        if not name:
+            return ""
+        shape = re.compile(_WORD.format(re.escape(name)))
+        return next((file.path for file in self.files if shape.search(file.text)), "")
+
+    def reads(self, what: str, name: str) -> bool:
+        """Whether a thing of this kind and name is read, or may be."""
+        return bool(self.whole(what) or self.named(name))
+
+
+def readers_of(model: str, files: Iterable[Reader]) -> Readers:
+    """The files that use a model, given by its name: those that mention it.
+
+    Who puts names of models together, or lists their folder, may use any.
+    """
+    last = model.rpartition("/")[2]
+    mention = re.compile(_WORD.format(re.escape(last)))
+    any_model = re.compile(
+        r"(?:glob|iterdir|listdir|scandir)\(|\{\w*\}(?:\.xml|['\"`])|\+\s*['\"`]\.xml"
+    )
+    about = re.compile(r"models?\b")
+    return Readers(
+        tuple(
+            file
+            for file in files
+            if mention.search(file.text)
+            or (any_model.search(file.text) and about.search(file.text))
+        )
+    )

@@ -1,0 +1,190 @@
+"""`coursebuild check --against VERSION`: what the scripts do with another version of MuJoCo.
+
+Entry point: `against(options, names, version)`.
+
+1. The scripts run here, or ran: what one of them uses is known from its run.
+2. They run in an environment with the other version and otherwise the same packages (see
+   `effects.environments`). Results are remembered by the versions, like those of here.
+3. Those that do something else run once more there, and in a fresh environment with the version of
+   here: what this shows is told (see `scripts.elsewhere`).
+4. The models and MJCF blocks are compiled there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coursebuild.checks import mjcf_texts
+from coursebuild.diagnostics import Severity
+from coursebuild.effects.environments import environment, needed, other_version
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.locks import project_lock
+from coursebuild.effects.surroundings import Place
+from coursebuild.effects.versions import engine_version, python_version
+from coursebuild.model import Course
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options, UsageError, select
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory
+from coursebuild.pipeline.verify import compile_models, extract_scripts, run
+from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
+from coursebuild.results import ScriptRun
+from coursebuild.scripts.dependencies import Kind
+from coursebuild.scripts.elsewhere import Standing, is_comparable, judged, standings
+from coursebuild.scripts.extract import Extraction, extract
+from coursebuild.scripts.failures import failure
+from coursebuild.values import dataclass, field
+
+
+def against(options: Options, names: tuple[str, ...], version: str) -> AgainstReport:
+    """What the scripts of the lessons that the names mean do with this version of MuJoCo.
+
+    Raises:
+        UsageError: it is no other version, or a name means nothing.
+        EffectError: the version cannot be had, or the course cannot be read.
+    """
+    other = other_version(version)
+    progress = Progress(quiet=options.quiet)
+    options.store.listen(progress.say)
+    with project_lock(options.root, progress.say):
+        loaded = load(options.root)
+        course = loaded.course
+        if course is None:
+            told = next(d for d in loaded.diagnostics if d.severity is Severity.ERROR)
+            raise EffectError(
+                f"the course cannot be read: {told.span.path}:{told.span.line}: {told.message}",
+                help="`coursebuild check` tells all that is wrong",
+            )
+        documents = select(course, names, options.root).documents
+        extracted = extract_scripts(course, options)
+        chosen = tuple(
+            e for e in extracted.runnable if documents is None or e.document in documents
+        )
+        work = _Work(course, options, progress, chosen, other)
+        blocked = tuple(
+            ScriptAgainst(b.path, "", "uncompared", "the file there is not what its lesson says")
+            for b in extracted.blocked
+        )
+        return work.report(blocked if documents is None else ())
+
+
+@dataclass(slots=True)
+class _Work:
+    """The comparison of some scripts."""
+
+    course: Course
+    options: Options
+    progress: Progress
+    chosen: tuple[Extraction, ...]
+    other: str
+    here: dict[str, ScriptRun] = field(default_factory=dict)
+
+    def report(self, blocked: tuple[ScriptAgainst, ...]) -> AgainstReport:
+        """Everything that there is to tell."""
+        runs = run(self.chosen, self.options, self.progress)
+        self.here = {one.path: one for one in runs}
+        place = self._place(self.other)
+        here = standings(self.course, self.here, runs)
+        kept = {path: is_comparable(standing) for path, standing in here.items()}
+        compared = [e for e in self.chosen if kept[e.path] is None]
+        there = self._run(compared, place, f"running scripts with MuJoCo {self.other}")
+        differing = [e for e in compared if not there[e.path].holds]
+        again = self._run(differing, place, "running scripts there again", fresh=True)
+        control, trouble = self._control(differing)
+        lines = []
+        for extraction in self.chosen:
+            path, told = extraction.path, kept[extraction.path]
+            if told is not None:
+                lines.append(ScriptAgainst(path, extraction.owner, told.status, told.why))
+            elif there[path].holds:
+                lines.append(ScriptAgainst(path, extraction.owner, "same"))
+            else:
+                found = judged(there[path], control.get(path), again[path], engine_version())
+                why = found.why + (f": {trouble}" if trouble and path not in control else "")
+                lines.append(self._line(extraction, there[path], found.status, why))
+        return AgainstReport(
+            engine_version(),
+            self.other,
+            python_version(),
+            (*lines, *blocked),
+            self._models(place),
+        )
+
+    def _line(
+        self, extraction: Extraction, there: Standing, status: str, why: str
+    ) -> ScriptAgainst:
+        everything = extract(self.course).value
+        return ScriptAgainst(
+            extraction.path,
+            extraction.owner,
+            status,
+            why,
+            there.changes,
+            there.diffs,
+            failure(extraction, there.run, everything),
+        )
+
+    def _place(self, engine: str) -> Place:
+        """The environment with a version of MuJoCo and the packages that the scripts use here."""
+        memory = Memory(self.options.root, self.options.store)
+        noted = [memory.last(extraction.path) for extraction in self.chosen]
+        dependencies = [d for record in noted if record is not None for d in record.dependencies]
+        states = [d.state for d in dependencies if d.kind is Kind.MODULE]
+        return environment(self.options.root, engine, needed(states), self.progress.say)
+
+    def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, Standing], str]:
+        """What they do in a fresh environment with the version of here; why there is none."""
+        if not scripts:
+            return {}, ""
+        try:
+            place = self._place(engine_version())
+        except EffectError as error:
+            return {}, error.message
+        stage = f"running scripts in a fresh environment with MuJoCo {engine_version()}"
+        return self._run(scripts, place, stage), ""
+
+    def _run(
+        self, scripts: Sequence[Extraction], place: Place, stage: str, *, fresh: bool = False
+    ) -> dict[str, Standing]:
+        """How the scripts do there, by path."""
+        from coursebuild.effects.runner import ScriptServer
+
+        options = self.options
+        memory = Memory(options.root, options.store, fresh=fresh, place=place)
+        with ScriptServer(place=place) as server:
+            runs = run(scripts, options, self.progress, stage, memory, server)
+        return standings(self.course, self.here, runs)
+
+    def _models(self, place: Place) -> tuple[ModelLine, ...]:
+        """Of each model and MJCF block that compiles here, whether it does there."""
+        from coursebuild.effects import mjcf
+
+        texts = mjcf_texts(self.course)
+        if not self.course.models and not texts:
+            return ()
+        compiled, _ = compile_models(self.course, self.options, self.progress)
+        here = dict(compiled)
+        models = [model for model in self.course.models if not here[model.name].error]
+        root, plain = self.options.root, [text.text for text in texts]
+        _, texts_here = mjcf.compile_all(root, (), plain)
+        good = [t for t, result in zip(texts, texts_here, strict=True) if not result.error]
+        with self.progress.stage(f"compiling models with MuJoCo {self.other}"):
+            there, parts = mjcf.compile_all(
+                root, models, [text.text for text in good], python=place.python
+            )
+        places = [(model.source.path, 1) for model in models]
+        places += [(text.block.span.path, text.block.span.line) for text in good]
+        return tuple(
+            ModelLine(path, line, mjcf.readable_error(result.error))
+            for (path, line), result in zip(places, (*there, *parts), strict=True)
+        )
+
+
+def forbid(given: bool, what: str) -> None:
+    """Say that something cannot be combined with `--against`.
+
+    Raises:
+        UsageError: it was given.
+    """
+    if given:
+        raise UsageError(f"--against cannot be combined with {what}")

@@ -1,0 +1,187 @@
+"""`coursebuild bench`: speed against error of the course's models.
+
+Entry points: `bench(options, names, quick=…)`, `record(…)`, `check(…)`.
+
+1. Names mean models. One that does not compile is told, and the others are measured.
+2. What was measured is kept under all that it depends on, a scenario at a time: a run that was
+   stopped goes on where it was. Times say something of this machine only, so they are not shared.
+3. One run of a course measures at a time, since two would disturb each other's times; the second
+   finds what the first has measured.
+4. `record` writes what was measured into `content/reports/`; `check` measures again, whatever is
+   kept, and holds figures of accuracy against what is recorded there.
+"""
+
+from __future__ import annotations
+
+from coursebuild.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.measured.bench import SceneReport
+from coursebuild.measured.departures import Checked, scene_departures
+from coursebuild.measured.records import (
+    BENCH,
+    Failure,
+    bench_path,
+    decode_bench,
+    encode_bench,
+)
+from coursebuild.model.scenarios import Bands
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.reports import command, read_record, recorded_models, write_record
+from coursebuild.pipeline.scene_run import Measuring, SceneRun
+from coursebuild.pipeline.scenes import Scene, Scenes, find_scenes
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Benched:
+    """What a run found."""
+
+    scenes: tuple[SceneReport, ...]
+    """By name."""
+    diagnostics: tuple[Diagnostic, ...]
+    """Of models and what is declared for them."""
+    checked: tuple[Checked, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything could be measured, and is as it was recorded."""
+        departed = any(one.departures for one in self.checked)
+        return not (self.diagnostics or self.failures or departed)
+
+
+def bench(
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+    measuring: Measuring | None = None,
+) -> Benched:
+    """Measure the models that the names mean; all where there are none.
+
+    Raises:
+        UsageError: no model is called so.
+    """
+    return _bench(options, names, measuring, quick=quick)
+
+
+def _bench(
+    options: Options,
+    names: tuple[str, ...],
+    measuring: Measuring | None,
+    *,
+    quick: bool,
+    cards: bool = False,
+) -> Benched:
+    found = find_scenes(options.root, names)
+    run = SceneRun(options, measuring, quick=quick, cards=cards)
+    reports = run.all(found.scenes)
+    return Benched(reports, sort_diagnostics((*found.diagnostics, *run.diagnostics)))
+
+
+def record(
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+    measuring: Measuring | None = None,
+) -> Benched:
+    """Measure, and write each model's report into the course.
+
+    Raises:
+        UsageError: no model is called so, or only a part is to be measured.
+    """
+    _whole("--record", quick=quick)
+    found = _bench(options, names, measuring, quick=False, cards=True)
+    failures: list[Failure] = []
+    remarks: list[str] = []
+    for scene in found.scenes:
+        path = bench_path(scene.model)
+        said = write_record(options.root, path, encode_bench(scene))
+        if isinstance(said, Failure):
+            failures.append(said)
+        else:
+            remarks.append(said)
+    return Benched(
+        found.scenes, found.diagnostics, failures=tuple(failures), remarks=tuple(remarks)
+    )
+
+
+def check(
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+    measuring: Measuring | None = None,
+) -> Benched:
+    """Measure again, and hold it against what is recorded.
+
+    A model without a recorded report, or with one that cannot be read, is not measured.
+
+    Raises:
+        UsageError: no model is called so, or only a part is to be measured.
+    """
+    _whole("--check", quick=quick)
+    found = find_scenes(options.root, names)
+    failures: list[Failure] = []
+    recorded: dict[str, SceneReport] = {}
+    for scene in found.scenes:
+        report, failure = _recorded(options, scene.name)
+        if report is not None:
+            recorded[scene.name] = report
+        if failure is not None:
+            failures.append(failure)
+    run = SceneRun(options, measuring, quick=False, again=True)
+    reports = run.all([scene for scene in found.scenes if scene.name in recorded])
+    bands = {scene.name: _bands(scene) for scene in found.scenes}
+    checked = [_checked(recorded[one.model], one, bands[one.model]) for one in reports]
+    return Benched(
+        reports,
+        sort_diagnostics((*found.diagnostics, *run.diagnostics)),
+        tuple(checked),
+        tuple(failures),
+        () if names else _of_no_model(options, found),
+    )
+
+
+def _whole(option: str, *, quick: bool) -> None:
+    if quick:
+        raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
+
+
+def _bands(scene: Scene) -> Bands:
+    return Bands() if scene.declared is None else scene.declared.bands
+
+
+def _recorded(options: Options, model: str) -> tuple[SceneReport | None, Failure | None]:
+    path, make = bench_path(model), command("bench", (model,), "--record")
+    found, failure = read_record(options.root, path, decode_bench, make)
+    if found is not None and found.model != model:
+        why = f"{path} holds a report of the model `{found.model}`"
+        return None, Failure(why, f"make it again with `{make}`")
+    if found is not None and found.quick:
+        why = f"{path} holds a report of `{BENCH} --quick`, which measures only a part"
+        return None, Failure(why, f"make it again with `{make}`")
+    return found, failure
+
+
+def _checked(recorded: SceneReport, measured: SceneReport, bands: Bands) -> Checked:
+    remarks = []
+    if recorded.digest != measured.digest:
+        remarks.append("the model or its scenarios have changed since it was recorded")
+    for what, old, new in (
+        ("MuJoCo", recorded.machine.engine, measured.machine.engine),
+        ("NumPy", recorded.machine.numpy, measured.machine.numpy),
+        ("Python", recorded.machine.python, measured.machine.python),
+        ("", recorded.machine.system, measured.machine.system),
+    ):
+        if old != new:
+            remarks.append(f"recorded with {what} {old}, measured with {new}".replace("  ", " "))
+    departures = scene_departures(recorded, measured, bands)
+    return Checked(measured.model, bench_path(measured.model), departures, tuple(remarks))
+
+
+def _of_no_model(options: Options, found: Scenes) -> tuple[str, ...]:
+    """Recorded reports that nothing is held against any more."""
+    gone = sorted(recorded_models(options.root) - set(found.names))
+    return tuple(f"{bench_path(name)} belongs to no model" for name in gone)

@@ -1,0 +1,261 @@
+"""A model of the course as the scene diet sees it: its files, who reads it, what is to be kept.
+
+Entry point: `DietModel`.
+
+1. Who reads a model are the files of the course that mention it, and all code of the course if
+   there is one.
+2. A file that another model uses too, or that is not in `models/`, is not changed.
+3. Changes are collected, read again as files, compiled and compared with what was run; only then
+   are they written, all of them or none.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.mjcf import model_files
+from coursebuild.effects.read import CourseFiles, read_bytes
+from coursebuild.effects.write import write_atomic
+from coursebuild.measured.bench import Machine
+from coursebuild.measured.diet import DietReport, DietScenario, StaleKeep
+from coursebuild.model import Declarations, MjcfModel
+from coursebuild.pipeline.scenes import Scene, scene_digest
+from coursebuild.source import Source, Span
+
+if TYPE_CHECKING:
+    from coursebuild.physics.diet.model_text import ModelText
+    from coursebuild.physics.diet.readers import Readers
+    from coursebuild.physics.diet.survey import Survey
+
+_TEXT = ".coursebuild-text.xml"
+"""No file has this name: MuJoCo takes the text in its place."""
+_CODE_FILES = (".js", ".mjs", ".py", ".ts", ".json")
+
+
+class CannotError(Exception):
+    """Why a model cannot be looked at."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+class DietModel:
+    """A model of the course, its files, and who reads it."""
+
+    def __init__(self, root: Path, files: CourseFiles, scene: Scene) -> None:
+        self.root = root
+        self.scene = scene
+        self.path = scene.model.source.path
+        self.keeps = {} if scene.declared is None else _keeps(scene.declared)
+        self.locked = _locked(root, files, self.path, scene.model.source.text)
+        self.readers = _readers(root, files, scene)
+        self.original: dict[str, bytes] = {}
+        """What was read of the disk."""
+        self.changed: dict[str, bytes] = {}
+
+    def read(self, path: str) -> bytes | None:
+        """The bytes of a file, as changed so far."""
+        if path in self.changed:
+            return self.changed[path]
+        if path not in self.original:
+            if not (self.root / path).is_file():
+                return None
+            try:
+                self.original[path] = read_bytes(self.root, path)
+            except EffectError:
+                return None
+        return self.original[path]
+
+    def compile(self, text: bytes) -> Any:
+        """A text as if it stood in the model's place."""
+        import mujoco
+
+        place = str((self.root / self.path).parent / _TEXT)
+        try:
+            return mujoco.MjModel.from_xml_path(place, assets={place: text})
+        except mujoco.FatalError as error:
+            raise ValueError(str(error)) from None
+
+    def survey(self, *, quick: bool, tell: Callable[[str], None]) -> tuple[Survey, ModelText]:
+        """Try everything.
+
+        Raises:
+            CannotError: it cannot be looked at.
+        """
+        from coursebuild.physics.diet.cases import cases
+        from coursebuild.physics.diet.markup import MarkupError
+        from coursebuild.physics.diet.model_text import ModelTextError, open_model
+        from coursebuild.physics.diet.survey import Order, survey
+        from coursebuild.physics.scene import SceneError
+
+        source = self.scene.model.source
+        try:
+            text = open_model(self.path, self.read, self.compile)
+            declared = self.scene.declared
+            order = Order(
+                text,
+                cases(text.model, declared, quick=quick),
+                self.readers,
+                self.keeps,
+                self.locked,
+                _numbered(declared),
+                time.thread_time,
+                quick,
+                tell,
+            )
+        except MarkupError as error:
+            said = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
+            help = "MuJoCo reads it all the same; other tools do not"
+            raise CannotError(diagnose("model-error", source.span(0, 0), said, help=help)) from None
+        except SceneError as error:
+            span = error.span or source.span(0, 0)
+            message = error.message
+            raise CannotError(diagnose("scenario-model", span, message, help=error.help)) from None
+        except (ModelTextError, ValueError) as error:
+            said = f"the diet cannot look at the model `{self.scene.name}`: {error}"
+            raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
+        return survey(order), text
+
+    def report(self, survey: Survey, here: Machine, *, quick: bool) -> DietReport:
+        """What was found, as a value."""
+        return DietReport(
+            model=self.scene.name,
+            digest=self.scene.digest,
+            quick=quick,
+            machine=here,
+            readers=tuple(one.path for one in self.readers.files),
+            scenarios=tuple(
+                DietScenario(
+                    one.case.name,
+                    one.case.steps,
+                    one.judgement.status.value,
+                    one.judgement.reasons,
+                )
+                for one in survey.seen
+            ),
+            findings=survey.findings,
+            tried=survey.tried,
+            fixed=survey.fixed,
+            slim=survey.slim,
+            slim_difference=survey.slim_difference,
+            stale=tuple(self._stale(key) for key in survey.stale),
+        )
+
+    def _stale(self, key: str) -> StaleKeep:
+        declared = self.scene.declared
+        assert declared is not None
+        place = _place(declared, key)
+        return StaleKeep(key, place.path, place.line, place.column)
+
+    def change(self, survey: Survey, text: ModelText) -> None:
+        """Take over what is to be changed, if it still compiles to the model that was run."""
+        from coursebuild.physics.diet.markup import MarkupError
+        from coursebuild.physics.diet.model_text import ModelTextError, open_model, saved
+
+        before = dict(self.changed)
+        self.changed |= text.files(survey.edits)
+        try:
+            again = open_model(self.path, self.read, self.compile).model
+            same = saved(again) == saved(text.compiled(survey.edits))
+        except (MarkupError, ModelTextError, ValueError):
+            same = False
+        if not same:
+            self.changed = before
+            message = f"the changed model `{self.scene.name}` is not the one that was run"
+            raise CannotError(diagnose("model-error", self.scene.model.source.span(0, 0), message))
+
+    def digest(self) -> str:
+        """Of the model as it lies on the disk now."""
+        text = self.read(self.path) or b""
+        model = MjcfModel(self.scene.name, Source(self.path, text.decode("utf-8")))
+        return scene_digest(self.root, model, self.scene.declared)
+
+    def write(self) -> None:
+        """Put the changed files into their places; all of them, or none.
+
+        Raises:
+            EffectError: one cannot be written, or somebody changed it.
+        """
+        written: list[str] = []
+        try:
+            for path, data in sorted(self.changed.items()):
+                write_atomic(self.root, path, data, expected=self.original[path])
+                written.append(path)
+        except EffectError:
+            for path in written:
+                write_atomic(self.root, path, self.original[path], expected=self.changed[path])
+            self.changed.clear()
+            raise
+
+
+def _keeps(declared: Declarations) -> dict[str, str]:
+    return {" ".join(one.finding.split()): one.reason for one in declared.keep}
+
+
+def _place(declared: Declarations, key: str) -> Span:
+    for one in declared.keep:
+        if " ".join(one.finding.split()) == key:
+            return one.finding_span
+    return declared.source.span(0, 0)
+
+
+def _numbered(declared: Declarations | None) -> frozenset[str]:
+    """What scenarios give by number."""
+    found: set[str] = set()
+    for one in () if declared is None else declared.scenarios:
+        found |= {"qpos"} if one.qpos else set()
+        found |= {"qvel"} if one.qvel else set()
+        found |= {"controls"} if one.controls else set()
+    return frozenset(found)
+
+
+def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
+    """Files of the model that are not to be changed, and why."""
+    parts = model_files(root, path, text)
+    locked = {part: f"{part} is not in models/" for part in parts if not _is_model(part)}
+    mine = {path, *parts}
+    for other in files.models:
+        if other.source.path == path:
+            continue
+        shared = set(model_files(root, other.source.path, other.source.text)) & mine
+        if other.source.path not in mine:
+            for part in sorted(shared):
+                locked.setdefault(part, f"{other.source.path} uses {part} too")
+    return locked
+
+
+def _is_model(path: str) -> bool:
+    return path.startswith("models/") and path.endswith(".xml")
+
+
+def _readers(root: Path, files: CourseFiles, scene: Scene) -> Readers:
+    """The files of the course that use a model, and what is to be measured on it."""
+    from coursebuild.physics.diet.readers import Reader, Readers, readers_of
+
+    texts = [Reader(s.path, s.text) for s in (*files.lessons, *files.pages)]
+    found = list(readers_of(scene.name, texts).files)
+    if found:  # what lessons and labs are made with may read anything for them
+        for path in files.files:
+            if path.endswith(_CODE_FILES) and not path.startswith("content/reports/"):
+                data = _text(root, path)
+                found += [] if data is None else [Reader(path, data)]
+    declared = scene.declared
+    if declared is not None:
+        names = [one.measure.name for one in declared.scenarios if one.measure is not None]
+        names += ["energy" for one in declared.scenarios if "energy" in (one.conserved or ())]
+        if names:
+            found.append(Reader(declared.source.path, "\n".join(names)))
+    return Readers(tuple(found))
+
+
+def _text(root: Path, path: str) -> str | None:
+    try:
+        return read_bytes(root, path).decode("utf-8", "replace")
+    except EffectError:
+        return None

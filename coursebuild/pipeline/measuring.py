@@ -1,0 +1,88 @@
+"""Measuring one scenario of a scene: the compiled model, the clock, and what goes wrong.
+
+Entry points: `scenarios_of(root, scene)`, `measured(loaded, …)`.
+
+The clock is the processor time of this thread: it stands still while others run. Nothing is
+collected as garbage while it counts.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.measured.bench import ScenarioReport
+from coursebuild.physics.bench import measure_scenario
+from coursebuild.physics.scene import Scene as PhysicsScene
+from coursebuild.physics.scene import SceneError, scenes
+from coursebuild.pipeline.scenes import Scene
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A scene, compiled in this process."""
+
+    scene: Scene
+    model: Any
+    """An `mjModel`."""
+    scenarios: tuple[PhysicsScene, ...]
+
+
+def scenarios_of(root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+    """Compile a scene, and work out its scenarios; or why they cannot be."""
+    source = scene.model.source
+    path = str(root / source.path)
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(_ignore)  # it would be written into the working directory
+    try:
+        model = mujoco.MjModel.from_xml_path(path, assets={path: source.text.encode()})
+        found = scenes(model, scene.declared, quick=quick)
+    except SceneError as error:
+        return _told(scene, error)
+    finally:
+        mujoco.set_mju_user_warning(before)
+    return Loaded(scene, model, found)
+
+
+def measured(
+    loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+) -> ScenarioReport | Diagnostic:
+    """Measure a scenario, by its number; or why it cannot be."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return measure_scenario(
+            loaded.model,
+            loaded.scenarios[number],
+            quick=quick,
+            clock=time.thread_time_ns if timed else None,
+            said=tell,
+        )
+    except SceneError as error:
+        return _told(loaded.scene, error)
+    finally:
+        if collecting:
+            gc.enable()
+
+
+def _ignore(_: str) -> None:
+    pass
+
+
+def _told(scene: Scene, error: SceneError) -> Diagnostic:
+    place = error.span
+    if place is None:
+        place = scene.model.source.span(0, 0) if scene.declared is None else _beside(scene)
+    return diagnose("scenario-model", place, error.message, help=error.help)
+
+
+def _beside(scene: Scene) -> Any:
+    assert scene.declared is not None
+    return scene.declared.source.span(0, 0)

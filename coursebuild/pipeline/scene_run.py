@@ -1,0 +1,169 @@
+"""Measuring scenes one after the other, from what is kept where that is there.
+
+Entry point: `SceneRun(options, …).all(scenes)`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import msgspec
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.code import code_digest
+from coursebuild.effects.locks import project_lock
+from coursebuild.effects.machine import machine
+from coursebuild.measured.bench import Machine, ScenarioReport, SceneReport
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.scenes import Scene
+
+if TYPE_CHECKING:
+    from coursebuild.pipeline.measuring import Loaded
+
+_SCENE, _SCENARIO = "bench", "bench-scenarios"
+"""Kinds of what is kept."""
+_T = TypeVar("_T")
+_CODE = ("physics", "measured/bench.py", "pipeline/measuring.py", "pipeline/cards.py")
+"""What measures and says what was measured."""
+_LOCK = "bench-lock"
+
+
+class Measuring(Protocol):
+    """What measures: `pipeline.measuring`."""
+
+    def scenarios_of(self, root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+        """The scenarios of a scene, ready to run, or why they cannot be."""
+
+    def measured(
+        self, loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+    ) -> ScenarioReport | Diagnostic:
+        """What was measured in one of them, or why nothing can be."""
+
+
+class SceneRun:
+    """Measures scenes one after the other."""
+
+    def __init__(
+        self,
+        options: Options,
+        measuring: Measuring | None,
+        *,
+        quick: bool,
+        again: bool = False,
+        cards: bool = False,
+    ) -> None:
+        self.options = options
+        self.quick = quick
+        self.again = again
+        """Whether nothing is taken from what is kept, and times do not matter."""
+        self.cards = cards
+        """Whether it is also told what the models are made of."""
+        self.diagnostics: list[Diagnostic] = []
+        self.progress = Progress(quiet=options.quiet)
+        self._measuring = measuring
+        options.store.listen(self.progress.say)
+
+    def all(self, scenes: Sequence[Scene]) -> tuple[SceneReport, ...]:
+        """Every scene that can be measured."""
+        if not scenes:
+            return ()
+        here, code = machine(), code_digest(*_CODE)
+        reports = []
+        with self.progress.stage("measuring", len(scenes)):
+            for scene in scenes:
+                report = self._one(scene, here, code)
+                if report is not None:
+                    reports.append(report)
+        return tuple(reports)
+
+    def _one(self, scene: Scene, here: Machine, code: str) -> SceneReport | None:
+        parts = (scene.name, scene.digest, f"{self.quick}", code, *_named(here))
+        kept = self._kept(_SCENE, parts, SceneReport)
+        if kept is not None and (kept.card is not None or not self.cards):
+            return kept
+        with project_lock(self.options.root, self.progress.say, name=_LOCK):
+            self.progress.started(scene.name)
+            began = time.monotonic()
+            report = self._report(scene, here, parts)
+            verdict = "not measured" if report is None else "measured"
+            self.progress.finished(scene.name, verdict, time.monotonic() - began)
+            return report
+
+    def _report(self, scene: Scene, here: Machine, parts: tuple[str, ...]) -> SceneReport | None:
+        kept = self._kept(_SCENE, parts, SceneReport)  # by whom we waited for, perhaps
+        if kept is None:
+            found = self._scenarios(scene, parts)
+            if found is None:
+                return None
+            kept = SceneReport(scene.name, scene.digest, self.quick, here, found)
+            self._keep(_SCENE, parts, kept)
+        if self.cards and kept.card is None:
+            from coursebuild.pipeline.cards import with_card
+
+            self.progress.doing(scene.name, "what it is made of")
+            kept = with_card(self.options.root, scene, kept)
+            self._keep(_SCENE, parts, kept)
+        return kept
+
+    def _scenarios(self, scene: Scene, parts: tuple[str, ...]) -> tuple[ScenarioReport, ...] | None:
+        """Each scenario, from what is kept or measured now; nothing where one cannot be."""
+        loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
+        if isinstance(loaded, Diagnostic):
+            self.diagnostics.append(loaded)
+            return None
+        reports = []
+        for number in range(len(loaded.scenarios)):
+            own = (*parts, f"{number}")
+            report = self._kept(_SCENARIO, own, ScenarioReport)
+            if report is None:
+                found = self.measuring.measured(
+                    loaded,
+                    number,
+                    quick=self.quick,
+                    timed=not self.again,
+                    tell=lambda text: self.progress.doing(scene.name, text),
+                )
+                if isinstance(found, Diagnostic):
+                    self.diagnostics.append(found)
+                    return None
+                report = found
+                self._keep(_SCENARIO, own, report)
+            reports.append(report)
+        return tuple(reports)
+
+    @property
+    def measuring(self) -> Measuring:
+        """What measures, which is heavy."""
+        if self._measuring is None:
+            from coursebuild.pipeline import measuring
+
+            self._measuring = measuring
+        return self._measuring
+
+    # --- what is kept
+
+    def _kept(self, kind: str, parts: tuple[str, ...], what: type[_T]) -> _T | None:
+        data = None if self.again else self.options.store.load(kind, _key(parts))
+        if data is None:
+            return None
+        try:
+            return msgspec.json.decode(data, type=what)
+        except msgspec.DecodeError:  # by another version of this code
+            return None
+
+    def _keep(self, kind: str, parts: tuple[str, ...], value: object) -> None:
+        if not self.again:
+            self.options.store.keep(kind, _key(parts), msgspec.json.encode(value), local=True)
+
+
+def _key(parts: tuple[str, ...]) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _named(here: Machine) -> tuple[str, ...]:
+    return here.engine, here.python, here.numpy, here.system, here.cpu

@@ -1,0 +1,203 @@
+"""The models of a course that can be measured, with what is declared for them.
+
+Entry points: `find_scenes(root, names)`, `scene_digest`.
+
+1. A scene is a file of `models/` that others do not include. One that is named is a scene in any
+   case.
+2. What does not compile, and what is declared wrongly, is a diagnostic; the other scenes are
+   measured all the same.
+3. Figures depend on the model with all files that it pulls in, and on its scenarios: the digest is
+   theirs. It does not depend on the machine, nor on what else the file beside the model says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from coursebuild.checks.scenarios import check_scenarios
+from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean, nearest, sort_diagnostics
+from coursebuild.effects.mjcf import compile_models, model_files, readable_error
+from coursebuild.effects.read import CourseFiles, read_course
+from coursebuild.model import Declarations, MjcfModel, Visible
+from coursebuild.pipeline.options import UsageError
+from coursebuild.results import CompileResult, ModelFacts
+from coursebuild.source import Source, Span
+from coursebuild.syntax.scenarios import parse_declarations
+from coursebuild.values import dataclass
+
+_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A model that can be measured."""
+
+    model: MjcfModel
+    declared: Declarations | None
+    """What the file beside it says; `None` where there is none."""
+    facts: ModelFacts
+    digest: str
+    """Of all that its figures depend on in the course."""
+
+    @property
+    def name(self) -> str:
+        """Its file below `models/`, without suffix."""
+        return self.model.name
+
+
+@dataclass(frozen=True, slots=True)
+class Scenes:
+    """What was found."""
+
+    scenes: tuple[Scene, ...]
+    """By name."""
+    diagnostics: tuple[Diagnostic, ...]
+    names: tuple[str, ...]
+    """Every model of the course, also those that cannot be measured."""
+
+
+def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
+    """The scenes that the names mean; all where there are none.
+
+    A name is that of a file below `models/`, with or without its suffix and folder.
+
+    Raises:
+        UsageError: no model is called so.
+        EffectError: MuJoCo cannot be loaded.
+    """
+    read = read_course(root)
+    models = {model.name: model for model in read.value.models}
+    chosen = _named(names, models) if names else _whole(root, list(models.values()))
+    declared, found = _declared(read.value, chosen, every=not names)
+    found += [d for d in read.diagnostics if d.span.path.startswith("models/")]
+    scenes: list[Scene] = []
+    results = compile_models(root, chosen) if chosen else ()
+    for model, result in zip(chosen, results, strict=True):
+        if result.facts is None:
+            found.append(_broken(model, result))
+            continue
+        says = declared.get(model.name)
+        if says is not None:
+            wrong = list(check_scenarios(says, result.facts))
+            found += wrong
+            if wrong:
+                continue
+        elif model.name in declared:
+            continue  # what is beside it cannot be read, and was told
+        scenes.append(Scene(model, says, result.facts, scene_digest(root, model, says)))
+    return Scenes(tuple(scenes), sort_diagnostics(found), tuple(sorted(models)))
+
+
+def scene_digest(root: Path, model: MjcfModel, declared: Declarations | None) -> str:
+    """Of a model with the files that it pulls in, and of its scenarios."""
+    digest = hashlib.sha256()
+
+    def add(*parts: bytes) -> None:
+        for part in parts:
+            digest.update(b"%d:" % len(part) + part)
+
+    add(model.source.text.encode("utf-8", "surrogatepass"))
+    for path in model_files(root, model.source.path, model.source.text):
+        file = root / path
+        if file.is_file():
+            # A file elsewhere has another path on another machine.
+            shown = path if not path.startswith("/") else f"/{file.name}"
+            add(shown.encode("utf-8", "surrogateescape"), _content(file))
+    add(_said(declared).encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()
+
+
+def _content(file: Path) -> bytes:
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except OSError:
+        return b"unreadable"
+
+
+def _said(declared: Declarations | None) -> str:
+    """All that is declared and changes a figure, wherever it stands in the file."""
+    parts: list[object] = [Visible() if declared is None else declared.visible]
+    for one in () if declared is None else declared.scenarios:
+        parts.append(
+            (
+                *(one.name, one.title, one.keyframe, one.qpos, one.qvel, one.duration, one.sample),
+                *(one.controls, one.hold, one.measure, one.reference, one.closed),
+                *(one.conserved, one.timesteps),
+            )
+        )
+    return repr(parts)
+
+
+# --- which
+
+
+def _named(names: Sequence[str], models: dict[str, MjcfModel]) -> list[MjcfModel]:
+    wanted: set[str] = set()
+    for name in names:
+        bare = name.removeprefix("./").removeprefix("models/")
+        found = next((n for n in (name, bare, bare.removesuffix(".xml")) if n in models), None)
+        if found is None:
+            near = nearest(bare.removesuffix(".xml"), models)
+            help = f"did you mean `{near}`?" if near is not None else did_you_mean("", models)
+            raise UsageError(f"no model is called `{name}`" + (f"; {help}" if help else ""))
+        wanted.add(found)
+    return [models[name] for name in sorted(wanted)]
+
+
+def _whole(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel]:
+    """Those that are no parts of others."""
+    parts = {
+        path for model in models for path in model_files(root, model.source.path, model.source.text)
+    }
+    return [m for m in models if m.source.path not in parts and not _PART.match(m.source.text)]
+
+
+# --- what is wrong
+
+
+def _declared(
+    files: CourseFiles, chosen: Sequence[MjcfModel], *, every: bool
+) -> tuple[dict[str, Declarations | None], list[Diagnostic]]:
+    """What is declared for the chosen models; `None` for what cannot be understood."""
+    wanted = {model.name for model in chosen}
+    declared: dict[str, Declarations | None] = {}
+    found: list[Diagnostic] = []
+    paths = {model.source.path for model in files.models}
+    for source in files.declarations:
+        name = source.path.removeprefix("models/").removesuffix(".toml")
+        if name in wanted:
+            parsed = parse_declarations(source)
+            declared[name] = parsed.value
+            found += parsed.diagnostics
+        elif every and f"models/{name}.xml" not in {*paths, *files.unreadable}:
+            found.append(_without_model(source, paths))
+    return declared, found
+
+
+def _without_model(source: Source, models: set[str]) -> Diagnostic:
+    model = source.path.removesuffix(".toml") + ".xml"
+    near = nearest(model, models)
+    help = f"is it `{near}`?" if near is not None else "put it beside its model"
+    message = f"there is no model {model} to which these scenarios belong"
+    return diagnose("scenario-model", source.span(0, 0), message, help=help)
+
+
+def _broken(model: MjcfModel, result: CompileResult) -> Diagnostic:
+    message = f"the model `{model.name}` does not compile: {readable_error(result.error)}"
+    return diagnose("model-error", _line(model.source, result.line), message)
+
+
+def _line(source: Source, line: int | None) -> Span:
+    """The text of a line, without the space around it."""
+    if line is None or not 1 <= line <= len(source.line_starts):
+        return source.span(0, 0)
+    text = source.line_text(line)
+    start = source.line_starts[line - 1]
+    if not text.strip():
+        return source.span(start, start + len(text))
+    indent = len(text) - len(text.lstrip())
+    return source.span(start + indent, start + len(text.rstrip()))

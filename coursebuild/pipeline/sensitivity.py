@@ -1,0 +1,93 @@
+"""`check --sensitivity`, and what `update` asks of what it records: which printed digits hold.
+
+Entry point: `measure(course, options, progress, scripts, runs, documents)`.
+
+Of scripts that use MuJoCo and whose output is recorded and as recorded, four runs are made with
+their initial states moved (see `effects.mujoco_nudging`), each with three times the time limit.
+They are remembered like other runs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection, Sequence
+
+from coursebuild.effects.runner import ScriptServer
+from coursebuild.measured.sensitivity import RUNS, Sensitivity
+from coursebuild.model import Course, Recording, document_blocks
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory
+from coursebuild.pipeline.verify import run
+from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.extract import Extraction
+from coursebuild.scripts.sensitivity import sensitivity, worth_moving
+
+_NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
+
+
+def measure(
+    course: Course,
+    options: Options,
+    progress: Progress,
+    scripts: Sequence[Extraction],
+    runs: Sequence[ScriptRun],
+    documents: Collection[str] | None = None,
+) -> tuple[Sensitivity, ...]:
+    """How sensitive the recorded outputs of these scripts are; of those that were run.
+
+    `runs` are theirs, in the same order; `documents` the paths of those whose recorded outputs
+    count, all of them without it.
+    """
+    recordings = _recordings(course, documents)
+    pairs = [
+        (script, base)
+        for script, base in zip(scripts, runs, strict=True)
+        if base.outcome not in _NOT_RUN
+    ]
+    todo = [
+        script
+        for script, base in pairs
+        if worth_moving(course, recordings.get(script.path, ()), base)
+    ]
+    moved = _moved(todo, options, progress)
+    return tuple(
+        sensitivity(
+            course,
+            script.path,
+            script.owner,
+            recordings.get(script.path, ()),
+            base,
+            moved.get(script.path, ()),
+        )
+        for script, base in pairs
+    )
+
+
+def _moved(
+    scripts: Sequence[Extraction], options: Options, progress: Progress
+) -> dict[str, list[ScriptRun]]:
+    """The runs of each script with moved states, by its path."""
+    found: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
+    if not scripts:
+        return found
+    memory = Memory(options.root, options.store)
+    with contextlib.ExitStack() as stack:
+        server = None if options.executor else stack.enter_context(ScriptServer())
+        for number in range(1, RUNS + 1):
+            stage = f"moving initial states, {number} of {RUNS}"
+            for one in run(scripts, options, progress, stage, memory, server, perturbation=number):
+                found[one.path].append(one)
+    return found
+
+
+def _recordings(course: Course, documents: Collection[str] | None) -> dict[str, list[Recording]]:
+    """The recorded outputs that can be compared, by the path of their script."""
+    found: dict[str, list[Recording]] = {}
+    for document in course.documents:
+        if documents is not None and document.source.path not in documents:
+            continue
+        for block in document_blocks(document):
+            if isinstance(block, Recording) and block.script is not None and block.readable:
+                found.setdefault(block.script, []).append(block)
+    return found

@@ -1,0 +1,224 @@
+"""The page of the hard cases: what was measured on MuJoCo, beside what theory says.
+
+Entry point: `numerics_sheet(library)`. There is such a page where hard cases are recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
+from coursebuild.measured.points import KNOWN, seconds_text, status_text
+from coursebuild.measured.records import STABILITY_PATH
+from coursebuild.render import urls
+from coursebuild.render.figures import Grid, again, exact, grid, percent, power, said, sentence
+from coursebuild.render.library import Library
+from coursebuild.render.measured import largest
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.strings import Strings
+from coursebuild.values import dataclass
+
+_QUANTITIES = ("position", "attitude", "velocity")
+_Rows = list[tuple[tuple[str, ...], str]]
+"""Cells, and the integrator that they are of."""
+
+
+@dataclass(frozen=True, slots=True)
+class CaseView:
+    """A hard case."""
+
+    name: str
+    title: str
+    about: tuple[str, ...]
+    """What it is and what it was held against, a sentence each."""
+    grids: tuple[Grid, ...]
+    errors: tuple[Grid, ...]
+    """Errors by timestep, which are many."""
+    notes: tuple[str, ...]
+    command: str
+
+
+@dataclass(frozen=True, slots=True)
+class CaseGroup:
+    """Cases of one number."""
+
+    number: int
+    title: str
+    cases: tuple[CaseView, ...]
+
+
+def numerics_sheet(library: Library) -> Sheet:
+    """What the page of the hard cases shows."""
+    words, place = library.words, urls.Place(urls.NUMERICS)
+    cases = library.reports.cases
+    numbers = sorted({one.case for one in cases})
+    groups = tuple(_group(words, n, [one for one in cases if one.case == n]) for n in numbers)
+    values = {
+        "home": place.href(urls.HOME),
+        "groups": groups,
+        "engine": ", ".join(sorted({one.engine for one in cases})),
+        "file": place.href(urls.file_path(STABILITY_PATH)),
+        "command": again("stability", "--record"),
+    }
+    title = words("numerics.title")
+    return Sheet(
+        place.path, "numerics", title, words("numerics.description"), "numerics.html", values
+    )
+
+
+def _group(words: Strings, number: int, cases: Sequence[CaseReport]) -> CaseGroup:
+    first = cases[0].title
+    key = f"numerics.case_{number}"
+    title = words(key) if len(cases) > 1 and words.has(key) else first
+    return CaseGroup(number, title, tuple(_case(words, one) for one in cases))
+
+
+def _case(words: Strings, report: CaseReport) -> CaseView:
+    grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
+    return CaseView(
+        report.name,
+        report.title,
+        tuple(_about(words, report)),
+        tuple(one for one in grids if one is not None),
+        tuple(_errors(words, report)),
+        tuple(_notes(words, report)),
+        again("stability", report.name),
+    )
+
+
+def _about(words: Strings, report: CaseReport) -> list[str]:
+    told = [sentence(report.note)] if report.note else []
+    found = report.reference
+    if found is not None:
+        kind = f"measured.reference_{found.kind}"
+        told.append(said(words, kind, source=found.source, floor=power(found.floor, 1)))
+        if found.second:
+            told.append(words("measured.second", source=found.second))
+        if found.agreement is not None:
+            told.append(said(words, "measured.agreement", difference=power(found.agreement, 2)))
+    return told
+
+
+def _merged(rows: _Rows) -> tuple[list[str], list[tuple[str, ...]]]:
+    """The integrators, those of equal rows together, and the rows."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for cells, integrator in rows:
+        together.setdefault(cells, []).append(integrator)
+    return [", ".join(names) for names in together.values()], list(together)
+
+
+def _grid(
+    words: Strings, label: str, titles: Sequence[str], rows: _Rows, *, left: str = ""
+) -> Grid | None:
+    if not rows:
+        return None
+    names, cells = _merged(rows)
+    columns = [(words("measured.integrator"), names)]
+    columns += [(title, [row[n] for row in cells]) for n, title in enumerate(titles)]
+    return grid(label, columns, words=(left,))
+
+
+def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
+    rows = [(_boundary(words, line), line.integrator) for line in report.boundaries]
+    names = ("largest", "theory", "difference", "beyond", "growth", "remark")
+    titles = [words(f"measured.{name}") for name in names]
+    label = words("numerics.boundaries", title=report.title)
+    return _grid(words, label, titles, rows, left=words("measured.remark"))
+
+
+def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
+    theory = seconds_text(line.theory) if line.theory else ""
+    if line.formula and not line.theory:
+        theory = words("numerics.all" if line.theory is None else "numerics.none")
+    islands = ""
+    if not line.monotone:
+        shown = ", ".join(seconds_text(float(f"{h:.3g}")) for h in line.islands)
+        islands = words("numerics.islands", times=shown)
+    return (
+        largest(words, line.largest, line.searched),
+        theory,
+        percent(line.difference),
+        status_text(line.beyond) if line.beyond else "",
+        "" if line.growth is None else f"{line.growth:.9f}",
+        islands,
+    )
+
+
+def _figures(words: Strings, report: CaseReport) -> Grid | None:
+    """Quantities that are known."""
+    if not report.figures:
+        return None
+    rows: _Rows = [(_figure(words, line), line.integrator) for line in report.figures]
+    names, cells = _merged(rows)
+    keys = ("quantity", "measured", "exact", "difference", "source")
+    titles = [words(f"numerics.{key}") for key in keys]
+    columns = [(title, [row[n] for row in cells]) for n, title in enumerate(titles)]
+    integrator = words("measured.integrator")
+    columns.insert(1, (integrator, names))
+    label = words("numerics.figures", title=report.title)
+    return grid(label, columns, words=(integrator, titles[-1]))
+
+
+def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
+    measured = words("numerics.infinite") if line.measured is None else exact(line.measured)
+    difference = ""
+    if line.exact is not None and line.measured is not None:
+        difference = power(line.measured - line.exact, 2)
+    name = f"{line.name} ({line.unit})" if line.unit else line.name
+    return name, measured, exact(line.exact), difference, line.source
+
+
+def _orders(words: Strings, report: CaseReport) -> Grid | None:
+    shown = [o for o in report.orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
+    rows: _Rows = []
+    for one in shown:
+        values = (one.position, one.attitude, one.velocity)
+        rows.append((tuple("" if v is None else f"{v:.3f}" for v in values), one.integrator))
+    titles = [words(f"measured.order_{name}") for name in _QUANTITIES]
+    return _grid(words, words("numerics.orders", title=report.title), titles, rows)
+
+
+def _errors(words: Strings, report: CaseReport) -> list[Grid]:
+    """Errors by timestep and integrator, a table for each quantity."""
+    found = []
+    lines = {(one.timestep, one.integrator): one for one in report.errors}
+    steps = sorted({one.timestep for one in report.errors}, reverse=True)
+    names = sorted({one.integrator for one in report.errors}, key=_rank)
+    for quantity in _QUANTITIES:
+        if all(getattr(one, quantity) is None for one in report.errors):
+            continue
+        columns = [(words("measured.timestep"), [seconds_text(step) for step in steps])]
+        for name in names:
+            cells = [_error(lines.get((step, name)), quantity) for step in steps]
+            columns.append((name, cells))
+        unit = words(f"measured.{quantity}")
+        label = words("numerics.errors", quantity=unit, title=report.title)
+        found.append(grid(label, columns))
+    return found
+
+
+def _rank(name: str) -> int:
+    return KNOWN.index(name) if name in KNOWN else len(KNOWN)
+
+
+def _error(line: ErrorLine | None, quantity: str) -> str:
+    if line is None:
+        return ""
+    pair: tuple[float, float] | None = getattr(line, quantity)
+    return status_text(line.status) if line.status != "ok" else power(pair and pair[0])
+
+
+def _notes(words: Strings, report: CaseReport) -> list[str]:
+    notes = []
+    softened = sorted({line.timestep for line in report.errors if line.refsafe})
+    if softened:
+        times = ", ".join(seconds_text(step) for step in softened)
+        notes.append(words("measured.refsafe", settings=times))
+    together: dict[tuple[str, ...], list[str]] = {}
+    for line in report.errors:
+        if line.status != "ok":
+            told = (status_text(line.status), *line.reasons)
+            text = f"{line.integrator} at {seconds_text(line.timestep)}"
+            together.setdefault(told, []).append(text)
+    notes += [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
+    return notes

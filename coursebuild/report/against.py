@@ -1,0 +1,225 @@
+"""What scripts do with another version of MuJoCo: values, and as text and JSON.
+
+Entry points: `AgainstReport`, `against_text`, `against_json`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.report.text import Style, visible, visible_lines
+from coursebuild.report.values import plural
+from coursebuild.results import Change, DriftKind
+from coursebuild.values import dataclass
+
+_BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
+_COLOURS = {"same": _GREEN, "changed": _RED, "fails": _RED}
+_NAMED = 20
+_WIDTH = 60
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptAgainst:
+    """One script."""
+
+    path: str
+    lesson: str
+    """Id of its lesson or page."""
+    status: str
+    """`same`, `changed`, `fails` (both by MuJoCo), `unclear`, `drifted` or `uncompared`."""
+    why: str = ""
+    """For the last three, a clause."""
+    changes: tuple[Change, ...] = ()
+    diffs: tuple[str, ...] = ()
+    failure: Diagnostic | None = None
+    """How it failed with the other version."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelLine:
+    """A model or MJCF block that compiles here."""
+
+    path: str
+    line: int
+    error: str
+    """What the other version says; empty where it compiles there too."""
+
+
+@dataclass(frozen=True, slots=True)
+class AgainstReport:
+    """All of a comparison."""
+
+    engine: str
+    """The version of MuJoCo here."""
+    other: str
+    python: str
+    scripts: tuple[ScriptAgainst, ...]
+    models: tuple[ModelLine, ...]
+
+
+def against_json(report: AgainstReport) -> str:
+    """As one JSON object."""
+    scripts = [
+        {
+            "path": s.path,
+            "lesson": s.lesson,
+            "status": s.status,
+            "by_mujoco": s.status in ("changed", "fails"),
+            "why": s.why,
+            "changes": [_change_values(change) for change in s.changes],
+            "diffs": s.diffs,
+            "failure": None if s.failure is None else _failure_values(s.failure),
+        }
+        for s in report.scripts
+    ]
+    models = [{"path": m.path, "line": m.line, "error": m.error} for m in report.models]
+    lost = sum(bool(model.error) for model in report.models)
+    value = {
+        "engine": report.engine,
+        "against": report.other,
+        "python": report.python,
+        "scripts": scripts,
+        "models": models,
+        "summary": {
+            **_counts(report.scripts),
+            "models_lost": lost,
+        },
+    }
+    return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+
+
+_STATUSES = ("same", "changed", "fails", "unclear", "drifted", "uncompared")
+
+
+def _change_values(change: Change) -> dict[str, object]:
+    return {
+        "kind": change.kind.value,
+        "path": change.span.path,
+        "line": change.span.line,
+        "column": change.span.column,
+        "recorded": change.recorded,
+        "printed": change.ran,
+        "relative_error": change.relative_error,
+        "digits": change.digits,
+    }
+
+
+def _failure_values(failure: Diagnostic) -> dict[str, object]:
+    return {
+        "rule": failure.rule,
+        "path": failure.span.path,
+        "line": failure.span.line,
+        "message": failure.message,
+        "said": failure.label,
+    }
+
+
+def against_text(report: AgainstReport, style: Style) -> str:
+    """As text: what changed first, number by number, then the rest and the sums."""
+    parts = [
+        "\n".join(_script(s, report.other, style)) + "\n"
+        for s in report.scripts
+        if s.changes or s.diffs or s.failure is not None
+    ]
+    quiet = [s for s in report.scripts if not (s.changes or s.diffs or s.failure is not None)]
+    lines = [f"{_verdict(s, style)} {visible(s.path)}{_because(s)}" for s in quiet]
+    lost = [model for model in report.models if model.error]
+    lines += [
+        f"{style.paint('fails     ', _RED)} {visible(m.path)}:{m.line}"
+        f"  no longer compiles: {visible(m.error)}"
+        for m in lost
+    ]
+    if lines:
+        parts.append("".join(f"{line}\n" for line in lines))
+    parts.append(_sum(report, len(lost)) + "\n")
+    return "\n".join(parts)
+
+
+def _because(script: ScriptAgainst) -> str:
+    return f"  ({visible(script.why)})" if script.why else ""
+
+
+def _verdict(script: ScriptAgainst, style: Style) -> str:
+    return style.paint(f"{script.status:<10}", _COLOURS.get(script.status, _YELLOW))
+
+
+def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
+    """A script that does something else there."""
+    who = f"MuJoCo {other}"
+    told = _because(script) or f"  by {who}"
+    lines = [f"{_verdict(script, style)} {style.paint(visible(script.path), _BOLD)}{told}"]
+    if script.failure is not None:
+        span, message = script.failure.span, script.failure.message
+        said = f": {script.failure.label}" if script.failure.label else ""
+        lines.append(visible(f"  {span.path}:{span.line}: {message}{said}"))
+    named = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
+    for change in named[:_NAMED]:
+        place = f"{change.span.path}:{change.span.line}:{change.span.column}"
+        lines.append(visible(f"  {place}: {_change(change, who)}"))
+    if len(named) > _NAMED:
+        lines.append(f"  and {plural(len(named) - _NAMED, 'more difference')}")
+    before = "--- recorded" if script.changes else "--- here"
+    for diff in script.diffs:
+        rest = diff.split("\n")[2:]
+        shown = visible_lines("\n".join((before, f"+++ {who}", *rest)))
+        lines += [style.paint(f"  {line}", _FAINT) for line in shown.split("\n")]
+    return lines
+
+
+def _change(change: Change, who: str) -> str:
+    recorded, printed = (_shown(text) for text in (change.recorded, change.ran))
+    match change.kind:
+        case DriftKind.ROUNDING | DriftKind.NUMERIC:
+            return f"recorded {recorded}; {who} printed {printed}{_closeness(change)}"
+        case DriftKind.TEXT:
+            return f"recorded `{recorded}`; {who} printed `{printed}`"
+        case DriftKind.MISSING:
+            lines = change.recorded.count("\n") + 1
+            return f"{who} did not print {plural(lines, 'line')} from `{recorded}` on"
+        case DriftKind.EXTRA:
+            lines = change.ran.count("\n") + 1
+            return f"{who} printed {plural(lines, 'more line')} here: `{printed}`"
+
+
+def _shown(text: str) -> str:
+    first = text.strip().split("\n")[0]
+    return first if len(first) <= _WIDTH else first[: _WIDTH - 1] + "…"
+
+
+def _closeness(change: Change) -> str:
+    if change.relative_error is None:
+        return ""
+    error = f"relative error {change.relative_error:.1e}"
+    if change.digits is None:
+        return f" ({error})"
+    agree = {0: "no digit agrees", 1: "1 digit agrees"}
+    return f" ({error}, {agree.get(change.digits, f'{change.digits} digits agree')})"
+
+
+def _sum(report: AgainstReport, lost: int) -> str:
+    counts = _counts(report.scripts)
+    words = {
+        "same": "the same",
+        "changed": f"changed by MuJoCo {report.other}",
+        "fails": f"failing with MuJoCo {report.other}",
+        "unclear": "different for a reason that is not clear",
+        "drifted": "drifted already",
+        "uncompared": "not compared",
+    }
+    told = [f"{counts[status]} {words[status]}" for status in _STATUSES if counts[status]]
+    lines = f"{plural(len(report.scripts), 'script')}: {', '.join(told) or 'nothing to compare'}"
+    if report.models:
+        texts = plural(len(report.models), "MJCF text")
+        verb = "compiles" if len(report.models) == 1 else "compile"
+        lines += f"; {len(report.models) - lost} of {texts} {verb} there"
+    head = f"MuJoCo {report.other} against {report.engine}, Python {report.python}"
+    return f"{head}: {lines}"
+
+
+def _counts(scripts: Iterable[ScriptAgainst]) -> dict[str, int]:
+    counts = dict.fromkeys(_STATUSES, 0)
+    for script in scripts:
+        counts[script.status] += 1
+    return counts

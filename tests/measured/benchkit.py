@@ -1,0 +1,177 @@
+"""Reports that nobody measured, for tests of what is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from coursebuild.measured.bench import (
+    Machine,
+    OrderRow,
+    ScenarioReport,
+    SceneReport,
+    Setting,
+    StableRow,
+    Verdict,
+    WorkPrecisionRow,
+)
+
+MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
+VERDICT = Verdict(True, None, None, None, False, "The scene’s own setting is on the front.")
+_KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
+
+
+def setting(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> Setting:
+    solving = {"solver": "", "iterations": 0, "cone": "", **other}
+    return Setting(integrator=integrator, timestep=timestep, **solving)
+
+
+def row(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> WorkPrecisionRow:
+    """A row that is well; any field can be given, and those of its setting too."""
+    named = {name: other.pop(name) for name in ("solver", "iterations", "cone") if name in other}
+    fields: dict[str, Any] = {
+        "status": "ok",
+        "reasons": (),
+        "position": (1e-3, 5e-4),
+        "attitude": None,
+        "velocity": (2e-3, 1e-3),
+        "figure": None,
+        "energy_drift": None,
+        "momentum_drift": None,
+        "penetration": 0.0,
+        "slip": None,
+        "model_error": None,
+        "refsafe": False,
+        "steps": round(1 / timestep),
+        "cost": 0.002 / timestep,
+        "realtime": 5e4 * timestep,
+        "spread": 1.02,
+        "growth": None,
+        "own": False,
+        "front": False,
+        "dominated_by": None,
+    }
+    fields["setting"] = setting(integrator, timestep, **named)
+    return WorkPrecisionRow(**{**fields, **other})
+
+
+def lost(integrator: str = "Euler", timestep: float = 0.1, **other: Any) -> WorkPrecisionRow:
+    """A row that diverged, and so was not timed."""
+    nothing = dict.fromkeys(("position", "velocity", "cost", "realtime", "spread"))
+    fields = {"status": "diverged", "reasons": ("the state is not finite",), **nothing, **other}
+    return row(integrator, timestep, **fields)
+
+
+def scenario(rows: Sequence[WorkPrecisionRow], **other: Any) -> ScenarioReport:
+    fields: dict[str, Any] = {
+        "name": "swing",
+        "title": "A pendulum swings",
+        "duration": 1.0,
+        "horizon": 1.0,
+        "hold": 0.0,
+        "reference": "ode",
+        "source": "Bulirsch–Stoer over mj_forward",
+        "floor": 1e-12,
+        "second": "half the tolerance",
+        "agreement": 3e-13,
+        "lyapunov": None,
+        "figure": "",
+        "velocity_floor": 1e-11,
+        "orders": (),
+        "stable": (),
+        "verdict": VERDICT,
+    }
+    return ScenarioReport(**{**fields, "rows": tuple(rows), **other})
+
+
+def swing() -> ScenarioReport:
+    """Three integrators over a ladder; Euler is lost at the longest timestep."""
+    rows = []
+    for integrator, order, work in _KNOWN:
+        for timestep in (0.05, 0.02, 0.01, 0.005, 0.002, 0.001):
+            if integrator == "Euler" and timestep == 0.05:
+                rows.append(lost(integrator, timestep))
+                continue
+            error = max(0.4 * (20 * timestep) ** order * 0.3, 1e-11)
+            rows.append(
+                row(
+                    integrator,
+                    timestep,
+                    position=(error, error / 2),
+                    velocity=(2 * error, error),
+                    cost=work * 0.002 / timestep,
+                    own=integrator == "Euler" and timestep == 0.002,
+                    front=integrator == "RK4",
+                    dominated_by=None if integrator == "RK4" else 13,
+                )
+            )
+    text = "RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate."
+    return scenario(
+        rows,
+        orders=(OrderRow("Euler", 1.0, None, 0.99), OrderRow("RK4", 4.0, None, None)),
+        stable=(
+            StableRow("Euler", 0.04, True, (1e-3, 0.1)),
+            StableRow("implicit", None, True, (1e-3, 0.1)),
+            StableRow("RK4", 0.09, False, (1e-3, 0.1)),
+        ),
+        verdict=Verdict(False, 13, 0.39, 1 / 32, True, text),
+    )
+
+
+def scene(*scenarios: ScenarioReport, **other: Any) -> SceneReport:
+    fields = {"model": "arm", "digest": "0" * 64, "quick": False, "machine": MACHINE, **other}
+    return SceneReport(scenarios=scenarios or (swing(),), **fields)
+
+
+def awkward() -> ScenarioReport:
+    """What is hard to show: other solvers, growth, refsafe, chaos, an odd timestep."""
+    newton = {"solver": "Newton", "iterations": 100, "cone": "pyramidal", "position": None}
+    rows = [
+        row(
+            own=True,
+            energy_drift=-0.0604,
+            attitude=(1e-11, 1e-11),
+            cost=1,
+            realtime=1234.5,
+            dominated_by=2,
+            penetration=1e-3,
+            seen=3.21,
+            **newton,
+        ),
+        row(
+            "RK4",
+            status="slow-growth",
+            reasons=("velocities reached 12 times what can be",),
+            refsafe=True,
+            growth=1.0123456789,
+            **newton,
+        ),
+        row(
+            "implicitfast",
+            1 / 3000,
+            front=True,
+            attitude=(2.5e-4, 1e-5),
+            energy_drift=1e-9,
+            seen=0.00123,
+            **{**newton, "solver": "CG", "iterations": 7, "cone": "elliptic"},
+        ),
+        lost(
+            "RK4", 0.1, status="reset", reasons=("the clock was reset",), **{**newton, "cone": ""}
+        ),
+    ]
+    text = "implicitfast at 333.333 µs is better in every respect."
+    return scenario(
+        rows,
+        title="",
+        duration=10.0,
+        horizon=2.5,
+        lyapunov=3.21,
+        hold=0.02,
+        figure="site:tip (m)",
+        reference="self",
+        second="",
+        agreement=None,
+        stable=(StableRow("Euler", 0.0, False, (1e-4, 0.1)),),
+        verdict=Verdict(False, 2, 0.5, 0.1, None, text),
+        notes=("a note that does not fit into one line of a terminal, as there are some, too",),
+    )

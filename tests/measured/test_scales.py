@@ -1,0 +1,91 @@
+"""Logarithmic axes, and text that has its place."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.drawing.marks import Box, apart, clear_place, markup_text, text_width
+from coursebuild.drawing.scales import decades, log_ticks, number_text, power_text
+from coursebuild.drawing.symbols import cross, dash, mark
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "texts"),
+    [
+        (-12.3, -1.2, 7, "10⁻¹² 10⁻¹⁰ 10⁻⁸ 10⁻⁶ 10⁻⁴ 0.01"),
+        (-0.4, 0.6, 6, "0.5 1 2"),
+        (-1.2, 1.1, 6, "0.1 1 10"),
+        (0.0, 300.0, 6, "1 10¹⁰⁰ 10²⁰⁰ 10³⁰⁰"),
+        (0.2, 0.9, 5, "2 5"),
+        (2.1, 2.2, 4, "130 140 150"),
+        (-5.5, -4.1, 5, "5·10⁻⁶ 10⁻⁵ 2·10⁻⁵ 5·10⁻⁵"),
+        (-0.02, 0.03, 2, "1"),
+    ],
+)
+def test_ticks_of_a_logarithmic_axis(low: float, high: float, most: int, texts: str) -> None:
+    assert " ".join(text for _, text in log_ticks(low, high, most)) == texts
+
+
+@given(low=st.floats(-290, 290), span=st.floats(0.05, 500), most=st.integers(2, 12))
+def test_ticks_rise_and_are_within_the_axis(low: float, span: float, most: int) -> None:
+    high = min(low + span, 300.0)
+    found = log_ticks(low, high, most)
+    assert all(low - 1e-6 <= at <= high + 1e-6 for at, _ in found)
+    assert all(a < b for (a, _), (b, _) in pairwise(found))
+    assert len({text for _, text in found}) == len(found)
+
+
+@given(low=st.integers(-300, 300), span=st.integers(0, 600), most=st.integers(1, 20))
+def test_decades_are_no_more_than_there_is_room(low: int, span: int, most: int) -> None:
+    found = decades(low, low + span, most)
+    assert 1 <= len(found) <= most
+    assert all(low <= n <= low + span for n in found)
+
+
+def test_numbers_as_words() -> None:
+    assert [power_text(n) for n in (-4, -3, 0, 3, 4)] == ["10⁻⁴", "0.001", "1", "1000", "10⁴"]
+    assert [number_text(x) for x in (1e-11, 2.5e-7, 0.01)] == ["10⁻¹¹", "2.5·10⁻⁷", "0.01"]
+
+
+@given(st.text())
+def test_markup_can_hold_any_text(text: str) -> None:
+    from xml.etree import ElementTree
+
+    ElementTree.fromstring(f"<text>{markup_text(text)}</text>".encode())
+
+
+def test_width_grows_with_the_text() -> None:
+    assert text_width("", 12) == 0
+    assert text_width("ill", 12) < text_width("WWW", 12)
+    assert text_width("ab", 24) == 2 * text_width("ab", 12)
+
+
+@given(wanted=st.lists(st.floats(0, 100), max_size=6), gap=st.floats(1, 10))
+def test_labels_keep_apart(wanted: list[float], gap: float) -> None:
+    places = apart(sorted(wanted), gap, 0, 100)
+    assert all(b - a >= gap - 1e-9 for a, b in pairwise(places))
+    assert all(place <= 100 + 1e-9 for place in places)
+
+
+def test_a_label_goes_where_it_hides_nothing() -> None:
+    inside = Box(0, 0, 200, 100)
+    box, hidden = clear_place((20, 50), (60, 15), inside, [Box(0, 0, 200, 45)])
+    assert hidden == 0
+    assert box.top >= 45
+    everywhere = [Box(0, 0, 200, 100)]
+    box, hidden = clear_place((195, 50), (60, 15), inside, everywhere)
+    assert hidden > 0
+    assert box.right <= 200
+
+
+def test_marks_and_dashes_differ() -> None:
+    assert len({mark(n, 0, 0, 4) for n in range(7)}) == 7
+    assert len({dash(n) for n in range(7)}) == 7
+    assert mark(7, 1, 2, 4) == mark(0, 1, 2, 4)
+    assert cross(1, 2, 3) == "M-2.0 -1.0l6 6m0 -6l-6 6"
+    assert math.isfinite(float(mark(1, 0, 0, 4)[1:].split()[0]))

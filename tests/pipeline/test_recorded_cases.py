@@ -1,0 +1,113 @@
+"""`coursebuild stability --record` and `--check`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from coursebuild.cli import main
+from coursebuild.measured.records import STABILITY_PATH, decode_stability, encode_stability
+from coursebuild.values import replace
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    (tmp_path / "content").mkdir()
+    (tmp_path / "content" / "course.toml").write_text("")
+    return tmp_path
+
+
+def run(course: Path, *arguments: str) -> int:
+    return main(["-C", str(course), "stability", *arguments, "-q"])
+
+
+def names(course: Path) -> list[str]:
+    return [case.name for case in decode_stability((course / STABILITY_PATH).read_bytes())]
+
+
+def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course, "projectile", "--record") == 0
+    out = capsys.readouterr().out
+    assert out.startswith("projectile  case 4: Projectile\n")
+    assert out.endswith(f"\nwrote {STABILITY_PATH}\n")
+    assert run(course, "projectile", "--check") == 0
+    assert capsys.readouterr().out == f"stability  as recorded in {STABILITY_PATH}\n"
+    assert run(course, "projectile", "--record") == 0
+    assert capsys.readouterr().out.endswith(f"\n{STABILITY_PATH} is as it was\n")
+
+
+def test_recording_some_cases_leaves_the_others(course: Path) -> None:
+    run(course, "projectile", "--record")
+    before = (course / STABILITY_PATH).read_bytes()
+    assert run(course, "stack-1", "--record") == 0
+    assert names(course) == ["projectile", "stack-1"]
+    path = course / STABILITY_PATH
+    old = replace(decode_stability(before)[0], name="no-more")
+    path.write_bytes(encode_stability([old]))
+    assert run(course, "projectile", "--record") == 0
+    assert names(course) == ["projectile"]
+
+
+def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run(course, "projectile", "--record")
+    path = course / STABILITY_PATH
+    (case,) = decode_stability(path.read_bytes())
+    wrong = tuple(
+        replace(line, measured=-0.06) if line.integrator == "Euler" else line
+        for line in case.figures
+    )
+    path.write_bytes(encode_stability([replace(case, engine="3.7.0", figures=wrong)]))
+    capsys.readouterr()
+    assert run(course, "projectile", "--check") == 1
+    head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()
+    assert head == f"stability  1 figure not as recorded in {STABILITY_PATH}"
+    assert remark.startswith("  recorded with MuJoCo 3.7.0, measured with ")
+    assert name == "  projectile"
+    assert figure.startswith(
+        "    Euler    error of the height after 1 s at 10 ms, against theory  -0.01095  "
+    )
+    assert run(course, "projectile", "--check", "--format", "json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["cases", "checked", "failures", "remarks"]
+    (departure,) = found["checked"][0]["departures"]
+    assert departure["recorded"] == "-0.01095"
+
+
+def test_a_case_that_was_not_recorded(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run(course, "projectile", "--record")
+    capsys.readouterr()
+    assert run(course, "stack-1", "--check") == 1
+    assert capsys.readouterr().out.endswith(
+        "\n  stack-1\n"
+        "    figure  recorded  measured  band\n"
+        "    case     nothing     there  the same\n"
+    )
+
+
+def test_where_there_is_no_report_or_a_damaged_one(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(course, "--check") == 1
+    assert capsys.readouterr().out == (
+        f"error: {STABILITY_PATH} is not there\n"
+        "  help: make it with `coursebuild stability --record`, and commit it\n"
+    )
+    path = course / STABILITY_PATH
+    path.parent.mkdir()
+    path.write_bytes(b"{}")
+    assert run(course, "--check") == 1
+    assert capsys.readouterr().out == (
+        f"error: {STABILITY_PATH} holds no report of `coursebuild stability`\n"
+        "  help: make it again with `coursebuild stability --record`\n"
+    )
+    assert run(course, "projectile", "--record") == 1
+    assert "holds no report of" in capsys.readouterr().out
+    assert path.read_bytes() == b"{}"
+
+
+def test_not_both(course: Path) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(course, "--record", "--check")
+    assert caught.value.code == 2

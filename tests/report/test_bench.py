@@ -1,0 +1,257 @@
+"""Speed against error as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from benchkit import awkward, lost, row, scenario, scene, setting, swing
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.diagnostics import diagnose
+from coursebuild.measured.bench import WorkPrecisionRow
+from coursebuild.measured.departures import Checked, Departure
+from coursebuild.measured.points import seconds_text, setting_text
+from coursebuild.measured.records import Failure
+from coursebuild.report import Style
+from coursebuild.report.bench import bench_text
+from coursebuild.report.bench_json import COLUMNS, bench_json
+from coursebuild.report.checked import checked_text, failure_text
+from coursebuild.report.measured import bench_report, cases_values
+from coursebuild.report.table import Column, cells_of, table
+from coursebuild.source import Source
+from coursebuild.values import replace
+
+EXPECTED = Path(__file__).parent
+
+
+def test_text_at_80_columns() -> None:
+    text = bench_text([scene(awkward(), quick=True)], Style(width=80))
+    assert text == (EXPECTED / "bench-80.txt").read_text("utf-8")
+    assert all(cells_of(line) <= 80 for line in text.splitlines())
+
+
+def test_text_at_160_columns() -> None:
+    text = bench_text([scene(awkward(), quick=True)], Style(width=160))
+    assert text == (EXPECTED / "bench-160.txt").read_text("utf-8")
+    assert all(cells_of(line) <= 160 for line in text.splitlines())
+
+
+def test_orders_and_limits_and_the_verdict() -> None:
+    text = bench_text([scene()], Style(width=80))
+    assert "    >    5  Euler           2 ms  4.80e-03  9.60e-03      1  ok        →14\n" in text
+    assert "     *  14  RK4            20 ms  3.07e-03  6.14e-03   0.39  ok\n" in text
+    assert "         1  Euler          50 ms                             diverged\n" in text
+    assert (
+        "    RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate.\n\n"
+        "    order of  position  velocity\n"
+        "    Euler         1.00      0.99\n"
+        "    RK4           4.00\n\n"
+        "    largest stable  timestep\n"
+        "    Euler           40 ms\n"
+        "    implicit        all to 100 ms\n"
+        "    RK4             90 ms\n"
+        "    not monotone, stable again beyond: RK4\n\n"
+        "    Euler at 50 ms: diverged; the state is not finite\n"
+    ) in text
+
+
+def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
+    text = bench_text([scene()], Style(colour=True, width=80))
+    assert re.search(r"\x1b\[1m>    5  Euler .*\x1b\[0m", text)
+    assert re.search(r"\x1b\[32m *\* +14  RK4 .*\x1b\[0m", text)
+    assert re.search(r"\x1b\[1;31m +1  Euler .*diverged\x1b\[0m", text)
+    assert re.sub(r"\x1b\[[\d;]*m", "", text) == bench_text([scene()], Style(width=80))
+
+
+def test_where_nothing_was_measured() -> None:
+    text = bench_text([scene(scenario([])), replace(scene(), scenarios=())], Style(width=80))
+    assert "    no setting was measured\n" in text
+    assert text.endswith("A Processor @ 2 GHz\n  no scenario was measured\n")
+    assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
+
+
+def test_everything_lost() -> None:
+    text = bench_text([scene(scenario([lost(), lost("RK4")]))], Style(width=80))
+    assert "Euler at 100 ms; RK4 at 100 ms: diverged; the state is not finite" in text
+
+
+def test_names_cannot_change_the_terminal() -> None:
+    name = "a\x1b[31m\u202e\n\t名前"
+    odd = scenario([row(name)], name=name, title=name, source=name, notes=(name,))
+    text = bench_text([scene(odd, model=name)], Style(width=80))
+    assert "\x1b" not in text and "\u202e" not in text
+    assert "名前" in text
+
+
+def test_huge_and_tiny_numbers() -> None:
+    rows = [
+        row("Euler", 1e-9, position=(1e300, 1e-300), energy_drift=1e200, cost=1e-12, realtime=1e15),
+        row("RK4", 1e9, position=(0.0, 0.0), energy_drift=-1e-300, cost=1e12, realtime=1e-15),
+    ]
+    text = bench_text([scene(scenario(rows, floor=0.0))], Style(width=80))
+    assert "1.00e+300" in text and "0.00e+00" in text
+    assert "1e-09 s" in text and "1e+09 s" in text
+
+
+def test_words() -> None:
+    newton = setting(solver="Newton", iterations=100, cone="elliptic")
+    assert setting_text(newton) == "Euler at 2 ms, Newton, 100 iterations, elliptic cone"
+    assert setting_text(replace(newton, iterations=5), newton) == "Euler at 2 ms, 5 iterations"
+    assert [seconds_text(x) for x in (20.0, 1.0, 0.5, 1 / 60, 1e-3, 2.5e-5, 1e-9)] == [
+        *("20 s", "1 s", "500 ms", "16.6667 ms", "1 ms", "25 µs", "1e-09 s")
+    ]
+
+
+# --- tables
+
+
+def test_a_table_keeps_what_has_room() -> None:
+    columns = [
+        Column("name", ("a", "bb"), 0, left=True),
+        Column("wide", ("x" * 30, "y"), 1, left=True),
+        Column("n", ("1", "22"), 2),
+        Column("none", ("", " "), 0),
+    ]
+    assert table(columns, 80) == [
+        "name  wide                             n",
+        "a     xxxxxxxxxxxxxxxxxxxxxxxxxxxxxx   1",
+        "bb    y                               22",
+    ]
+    assert table(columns, 20) == ["name   n", "a      1", "bb    22"]
+    assert table(columns, 1) == ["name", "a", "bb"]
+
+
+def test_wide_characters_take_two_cells() -> None:
+    assert table([Column("a", ("名前", "b"), 0, left=True), Column("n", ("1", "2"), 0)], 80) == [
+        "a     n",
+        "名前  1",
+        "b     2",
+    ]
+
+
+# --- JSON
+
+NUMBER = (int, float, type(None))
+KINDS: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("scene", "scenario", "engine_version", "python_version"), (str,)),
+    **dict.fromkeys(("numpy_version", "system", "cpu", "integrator", "solver"), (str,)),
+    **dict.fromkeys(("cone", "reference_kind", "figure", "status"), (str,)),
+    **dict.fromkeys(("quick", "refsafe", "front", "own"), (bool,)),
+    **dict.fromkeys(("row", "iterations", "steps"), (int,)),
+    "monotone": (bool, type(None)),
+    "dominated_by": (int, type(None)),
+    "reasons": (list,),
+}
+
+
+def rows_of(text: str) -> list[dict[str, object]]:
+    found = json.loads(text, parse_constant=lambda name: (_ for _ in ()).throw(ValueError(name)))
+    assert list(found) == ["rows", "scenarios", "diagnostics", "failures", "checked", "remarks"]
+    for one in found["rows"]:
+        assert tuple(one) == COLUMNS
+        for name, value in one.items():
+            kinds = KINDS.get(name, NUMBER)
+            assert isinstance(value, kinds), name
+            assert (type(value) is bool) == (bool in kinds and value is not None), name
+    rows: list[dict[str, object]] = found["rows"]
+    return rows
+
+
+def test_json_is_a_table_with_every_column() -> None:
+    rows = rows_of(bench_json([scene(swing(), awkward())]))
+    assert len(rows) == len(swing().rows) + len(awkward().rows)
+    own = next(one for one in rows if one["own"])
+    assert own["scene"] == "arm" and own["scenario"] == "swing" and own["row"] == 4
+    assert own["integrator"] == "Euler" and own["timestep"] == 0.002
+    assert own["position_error"] == 4.8e-3 and own["position_error_end"] == 2.4e-3
+    assert own["order_position"] == 1.0 and own["order_attitude"] is None
+    assert own["largest_stable_timestep"] == 0.04 and own["monotone"] is True
+    assert own["dominated_by"] == 13 and own["front"] is False
+    assert rows[0]["status"] == "diverged" and rows[0]["cost"] is None
+    assert rows[0]["reasons"] == ["the state is not finite"]
+    assert rows[6]["largest_stable_timestep"] is None  # all are stable
+    assert rows[18]["visible_error"] == 3.21 and rows[18]["reference_kind"] == "self"
+
+
+def test_json_says_what_holds_for_a_whole_scenario() -> None:
+    (found,) = json.loads(bench_json([scene()]))["scenarios"]
+    assert found["scene"] == "arm" and found["digest"] == "0" * 64
+    assert found["verdict"]["better"] == 13 and found["verdict"]["noticeable"] is True
+    assert found["stable"][1] == {
+        "integrator": "implicit",
+        "largest": None,
+        "monotone": True,
+        "searched": [0.001, 0.1],
+    }
+
+
+def test_json_says_what_is_wrong() -> None:
+    span = Source("models/arm.xml", "<mujoco/>").span(0, 3)
+    departure = Departure("swing", "RK4 at 1 ms", "error of position", "1", "2", "± 5 %")
+    found = json.loads(
+        bench_json(
+            [],
+            [diagnose("model-error", span, "the model `arm` does not compile: no")],
+            [Failure("a", "b")],
+            [Checked("arm", "x.json", (departure,), ("c",))],
+            ["d"],
+        )
+    )
+    assert found["diagnostics"][0]["message"] == "the model `arm` does not compile: no"
+    assert found["diagnostics"][0]["line"] == 1
+    assert found["failures"] == [{"message": "a", "help": "b"}]
+    assert found["checked"][0]["departures"][0]["measured"] == "2"
+    assert found["remarks"] == ["d"]
+    assert json.loads(cases_values((), (), (), (), recorded=False)) == []
+
+
+@given(value=st.floats())
+def test_json_has_no_number_that_is_none(value: float) -> None:
+    odd: WorkPrecisionRow = replace(row(), position=(value, value), cost=value, growth=value)
+    rows_of(bench_json([scene(scenario([odd], horizon=value, floor=value))]))
+
+
+# --- what was recorded
+
+CHECKED = Checked(
+    "arm",
+    "content/reports/arm.bench.json",
+    (
+        Departure("swing", "RK4 at 1 ms", "error of position", "1.92e-08", "3.1e-08", "± 5 %"),
+        Departure("swing", "", "reference", "ode", "self", "the same"),
+        Departure("drop", "Euler", "order of velocity", "1", "nothing", "± 0.05"),
+    ),
+    ("recorded with MuJoCo 3.13.0, measured with 3.14.0",),
+)
+
+
+def test_departures_as_text() -> None:
+    assert (
+        checked_text([CHECKED, replace(CHECKED, name="leg", departures=())], Style())
+        == """\
+arm  3 figures not as recorded in content/reports/arm.bench.json
+  recorded with MuJoCo 3.13.0, measured with 3.14.0
+
+  swing
+    setting      figure             recorded  measured  band
+    RK4 at 1 ms  error of position  1.92e-08   3.1e-08  ± 5 %
+                 reference               ode      self  the same
+
+  drop
+    setting  figure             recorded  measured  band
+    Euler    order of velocity         1   nothing  ± 0.05
+
+leg  as recorded in content/reports/arm.bench.json
+  recorded with MuJoCo 3.13.0, measured with 3.14.0
+"""
+    )
+
+
+def test_a_failure_as_text() -> None:
+    assert failure_text(Failure("a\x1b", "b"), Style()) == "error: a␛\n  help: b\n"
+    assert failure_text(Failure("a"), Style(colour=True)) == (
+        "\x1b[1;31merror\x1b[0m\x1b[1m: a\x1b[0m\n"
+    )
