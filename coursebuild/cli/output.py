@@ -75,7 +75,7 @@ def report_text(report: Report, options: Options) -> str:
     if options.quiet:
         if not report.diagnostics:
             return ""
-        report = replace(report, scripts=(), labs=(), remarks=())
+        report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
     return render_report(report, "text", style_of(sys.stdout))
 
 

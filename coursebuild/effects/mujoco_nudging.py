@@ -249,7 +249,7 @@ class _Plan:
     """What of a state of a model is moved, and in which direction."""
 
     def __init__(self, mujoco: Any, numpy: Any, model: Any, run: int) -> None:
-        joints = mujoco.mjtJoint
+        free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
         self._numpy = numpy
         tree_of_dof = numpy.array(model.dof_treeid)
         kinds, starts = model.jnt_type, model.jnt_qposadr
@@ -260,9 +260,9 @@ class _Plan:
         self._quaternions: list[tuple[int, int]] = []
         """Of each its place in qpos and its tree."""
         for kind, at, tree in zip(kinds, starts, trees, strict=True):
-            at, tree = int(at), int(tree)
-            place = at + 3 if kind == joints.mjJNT_FREE else at
-            if kind in (joints.mjJNT_FREE, joints.mjJNT_BALL):
+            kind, at, tree = int(kind), int(at), int(tree)
+            place = at + 3 if kind == free else at
+            if kind in (free, ball):
                 self._plain[place : place + 4] = False
                 self._quaternions.append((place, tree))
                 self._tree_of_qpos[at : place + 4] = tree
@@ -278,8 +278,9 @@ class _Plan:
         """Move what is new, in place; whether anything was."""
         numpy = self._numpy
         before = [array.copy() for array in (qpos, qvel, act)]
-        for array, signs, which in zip((qpos, qvel, act), self._signs, new, strict=True):
-            array[which] *= 1.0 + SIZE * signs[which]
+        which = (new[0] & self._plain, *new[1:])
+        for array, signs, these in zip((qpos, qvel, act), self._signs, which, strict=True):
+            array[these] *= 1.0 + SIZE * signs[these]
         signs = self._signs[0]
         for at, _ in self._quaternions:
             part = slice(at, at + 4)

@@ -3,10 +3,9 @@
 Entry points: `watch`, once MuJoCo has been imported; `finish`, when the script has ended. Nothing
 is noted until `mujoco_tracing.tracer` is set.
 
-1. MuJoCo warns before it resets a state that is lost, or goes on with one: a handler of ours hears
-   of it, whatever the script resets afterwards, from any thread, and at no cost to a step. What
-   MuJoCo would have written to standard error is written, and nothing to `MUJOCO_LOG.TXT`. A
-   handler that the script sets is called as well. MuJoCo turns the clock back in no other case.
+1. MuJoCo warns before it resets a state that is lost, or goes on with one: that is heard (see
+   `mujoco_warnings`), whatever the script resets afterwards, from any thread, and at no cost to a
+   step. MuJoCo turns the clock back in no other case.
 2. Every `MjData` is looked at when it is reset, when the script has let go of it, and at the end:
    its warning counters, whether its state is finite, and how deep its bodies lie in each other,
    which MuJoCo does not warn of.
@@ -17,10 +16,10 @@ but this holds it, it is looked at and let go as well.
 
 from __future__ import annotations
 
-import posix
 import sys
 
 from coursebuild.effects import mujoco_nudging, mujoco_tracing
+from coursebuild.effects.mujoco_warnings import Warnings
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -78,9 +77,7 @@ class _Watch:
         types = mujoco.mjtGeom
         self._flat = [int(types.mjGEOM_PLANE), int(types.mjGEOM_HFIELD)]
         """The types of geoms that have no inside to be deep in."""
-        self._handler: object = None
-        self._theirs: Callable[[str], object] | None = None
-        """The handler of warnings that the script has set."""
+        self._warnings = Warnings(mujoco, self._heard)
         self._held: dict[int, Any] = {}
         self._enough = 2
         """How many are held before some are let go."""
@@ -97,69 +94,20 @@ class _Watch:
             self._follow(data, name, self._made_self)
         for name in ("__copy__", "__deepcopy__"):
             self._follow(data, name, lambda args, keywords, made: self._made(made))
+        spec = getattr(self._mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
+        if spec is not None:
+            self._follow(spec, "recompile", lambda args, keywords, made: self._made(made[1]))
         for name in ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug"):
             real = getattr(self._mujoco, name, None)
             if real is not None:
                 mujoco_tracing.replace_function(self._mujoco, name, wrapped(real, self._reset))
-        self._handle()
+        self._warnings.install()
 
     def finish(self) -> None:
         for key in list(self._held):
             self._look_last(self._held.pop(key))
 
     # --- warnings
-
-    def _handle(self) -> None:
-        """Set our handler, where this MuJoCo lets us, and see to it that it stays."""
-        import ctypes  # which importing MuJoCo has imported
-
-        try:
-            library = ctypes.PyDLL(self._mujoco._functions.__file__)
-            pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
-        except (AttributeError, OSError, ValueError):
-            return
-        if pointer.value is not None:  # somebody's that was set when MuJoCo was imported
-            return
-        self._handler = handler = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(self._warning)
-        ours = ctypes.cast(handler, ctypes.c_void_p).value
-        pointer.value = ours
-        set_real, get_real = self._mujoco.set_mju_user_warning, self._mujoco.get_mju_user_warning
-
-        def both(message: str) -> object:
-            self._heard(message)
-            return self._theirs(message) if self._theirs is not None else None
-
-        def set_handler(*args: Any, **keywords: Any) -> Any:
-            theirs = args[0] if len(args) == 1 and not keywords else None
-            if callable(theirs) and not hasattr(theirs, "restype"):  # not a function in C
-                set_real(both)
-                self._theirs = theirs
-                return
-            try:
-                set_real(*args, **keywords)
-            except BaseException as error:
-                if error.__traceback__ is not None:
-                    error.__traceback__ = error.__traceback__.tb_next
-                raise
-            self._theirs = None
-            if pointer.value is None:
-                pointer.value = ours
-
-        def get_handler(*args: Any, **keywords: Any) -> Any:
-            found = get_real(*args, **keywords)
-            return self._theirs if found is both else found
-
-        for real, new in ((set_real, set_handler), (get_real, get_handler)):
-            wrapper = mujoco_tracing.wrapped(new, _nothing, like=real)
-            mujoco_tracing.replace_function(self._mujoco, real.__name__, wrapper)
-
-    def _warning(self, message: bytes) -> None:
-        """MuJoCo warns, and the script has no handler: do what MuJoCo does without one."""
-        try:
-            posix.write(2, b"WARNING: " + message + b"\n\n")
-            self._heard(message.decode("utf-8", "replace"))
-        except Exception:  # nobody would see it, in the middle of a step
-            pass
 
     def _heard(self, message: str) -> None:
         if mujoco_tracing.tracer is None:
@@ -227,7 +175,7 @@ class _Watch:
                 self._once(data, kind, "")
         if not all(finite(values).all() for values in (data.qpos, data.qvel, data.act)):
             self._once(data, "state", "")
-        elif data.ncon:
+        elif data.ncon and hasattr(data, "model"):
             self._contacts(data)
 
     def _contacts(self, data: Any) -> None:
@@ -274,6 +222,8 @@ def _nothing(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
 
 def _name(data: Any) -> str:
     """The name of a model; empty where it has none of its own."""
+    if not hasattr(data, "model"):  # before MuJoCo 3.1
+        return ""
     name = str(data.model.names.partition(b"\0")[0], "utf-8", "replace")
     return "" if name == _UNNAMED else name
 

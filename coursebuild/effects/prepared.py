@@ -1,7 +1,7 @@
-"""Fonts that come with the tool cut already, or ready to be cut.
+"""What comes with the tool made ahead: fonts cut already, or ready to be cut, and templates.
 
-Entry points: `prepared_cut`, `prepared_source`. `site/prepare_fonts.py` makes the files when
-site/dist is made.
+Entry points: `prepared_cut`, `prepared_source`; `prepared_template`. `site/prepare_fonts.py` and
+`site/prepare_templates.py` make the files when site/dist is made.
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
 2. Every font is there a second time, with all done that does not depend on the course: what is cut
@@ -9,7 +9,7 @@ site/dist is made.
    often.
 
 Where the way of cutting is another than when the files were made, no key is found, and everything
-is cut from the whole fonts.
+is cut from the whole fonts. So it is with templates that were changed since, which are compiled.
 """
 
 from __future__ import annotations
@@ -41,6 +41,21 @@ def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
         return None
     file: str = found["file"]
     return (assets_dir() / FOLDER / file).read_bytes()
+
+
+def prepared_template(name: str) -> str | None:
+    """The Python of a template, by the name that `render.assets.generated` gives it."""
+    return _templates().get(name)
+
+
+@functools.cache
+def _templates() -> dict[str, str]:
+    try:
+        text = (assets_dir() / FOLDER / "templates.json").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return {}
+    templates: dict[str, str] = json.loads(text)
+    return templates
 
 
 @functools.cache

@@ -103,16 +103,15 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What was tried and is needed, or saves no time."""
+    """What could be left out and is no finding: it is needed, or saves no time."""
 
     kind: str
     message: str
     places: tuple[str, ...]
-    label: str
     difference: float | None
     """As of a finding; `None` where the changed run was lost, or there was none."""
     reason: str
-    """Why it could not be tried; empty where it was."""
+    """Why it was not run; empty where it was, and changed the result."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from coursebuild.measured.points import Chart, Line, Point
 from coursebuild.measured.words import lane_text
 from coursebuild.values import dataclass
 
-WIDE, NARROW = 720.0, 350.0
+WIDE, NARROW = 620.0, 350.0
 _HEIGHT = {WIDE: 320.0, NARROW: 260.0}
 """Of the plot itself, in the units of the drawing."""
 LANE, TALL_LANE = 18.0, 32.0

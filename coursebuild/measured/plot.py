@@ -174,19 +174,21 @@ class _Picture:
         yield path(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}", look)
         box = self._visible_box()
         yield (
-            f'<text x="{frame.left + 6:.1f}" y="{box.bottom - 3:.1f}" '
+            f'<text x="{box.left:.1f}" y="{box.bottom - 3:.1f}" '
             f'font-size="{TICK_SIZE:g}"{halo()}>{_VISIBLE}</text>'
         )
 
     def _visible_box(self) -> Box:
-        """Where it says so: beside the line, on the side where less is."""
+        """Where it says so: at an end of the line, above or below it, where it hides least."""
         frame, y = self.frame, self.frame.y(1.0)
         wide = text_width(_VISIBLE, TICK_SIZE)
-        above = Box(frame.left + 6, y - 17, frame.left + 6 + wide, y - 2)
-        below = Box(frame.left + 6, y + 2, frame.left + 6 + wide, y + 17)
         taken = list(self._marked())
-        hidden = [sum(box.over(other) for other in taken) for box in (above, below)]
-        return above if hidden[0] <= hidden[1] else below
+        places = [
+            Box(left, top, left + wide, top + 15)
+            for left in (frame.left + 6, frame.right - 6 - wide)
+            for top in (y - 17, y + 2)
+        ]
+        return min(places, key=lambda box: sum(box.over(other) for other in taken))
 
     def _lane(self, lane: Lane) -> Iterator[str]:
         """What was lost of an integrator: the unstable range, crosses, and words."""

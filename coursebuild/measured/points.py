@@ -234,7 +234,8 @@ def solving_parts(setting: Setting, like: Setting | None = None) -> list[str]:
     if setting.solver and (like is None or setting.solver != like.solver):
         parts.append(setting.solver)
     if setting.iterations and (like is None or setting.iterations != like.iterations):
-        parts.append(f"{setting.iterations} iterations")
+        many = "iteration" if setting.iterations == 1 else "iterations"
+        parts.append(f"{setting.iterations} {many}")
     if setting.cone and (like is None or setting.cone != like.cone):
         parts.append(f"{setting.cone} cone")
     return parts

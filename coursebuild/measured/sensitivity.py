@@ -50,7 +50,7 @@ class Doubt:
     most: str
     """The smallest and the largest value that was printed in its place."""
     instead: str
-    """The number with only the digits that hold; empty where none does."""
+    """The number with only the digits that hold; empty where none does, and of a count."""
     compared: bool
     """Whether the verification would take the difference for drift."""
 

@@ -74,6 +74,6 @@ def lane_text(line: Line) -> str:
     if line.stable == 0:
         return f"{line.integrator} is never stable"
     if line.stable is not None:
-        return f"{line.integrator} is stable up to {seconds_text(line.stable)}"
+        return f"{line.integrator} is stable up to {seconds_text(line.stable, 3)}"
     many = len(line.lost)
     return f"{line.integrator} lost {'a run' if many == 1 else f'{many} runs'}"

@@ -15,45 +15,33 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from coursebuild.measured.bench import (
     OrderRow,
     ScenarioReport,
     Setting,
-    StableRow,
     Verdict,
     WorkPrecisionRow,
 )
 from coursebuild.model.scenarios import Declarations
 from coursebuild.physics.costs import Cost, costs, subnormal
-from coursebuild.physics.detector import Judgement, Status
-from coursebuild.physics.engine import Run, begun, invariants, simulate_model, varied
+from coursebuild.physics.engine import varied
 from coursebuild.physics.front import Placed, Point, front, verdict, words
 from coursebuild.physics.grid import apply, own_setting, settings
-from coursebuild.physics.knowing import Known, difference, itself, know
+from coursebuild.physics.knowing import Known
+from coursebuild.physics.limits import stable
 from coursebuild.physics.measure import (
     Error,
     Errors,
-    energy_drift,
-    energy_scale,
-    momentum_drift,
     order,
 )
 from coursebuild.physics.pilot import Pilot, pilot
 from coursebuild.physics.problem import STANDARD, Integrator
-from coursebuild.physics.rows import Conserved, Measured, figure_name, measured, visible_error
-from coursebuild.physics.scene import Scene, scenes, thickness
-from coursebuild.physics.stability import Trial, attempted, scan
+from coursebuild.physics.rows import Measured, figure_name, measured
+from coursebuild.physics.scene import Scene, scenes
+from coursebuild.physics.stability import attempted
 from coursebuild.physics.timing import Clock
-from coursebuild.values import dataclass
-
-CONSERVED = 1e-8
-"""Relative change, over the reference, of what is called conserved."""
-SEARCH = (0.25, 64.0)
-"""Between which multiples of the model's timestep the largest stable one is looked for."""
-MOST_STEPS = 200_000
-"""Steps of one trial of a timestep."""
+from coursebuild.physics.truth import Cone, conserved, energy_beyond, references
 
 
 def measure_scene(
@@ -94,23 +82,23 @@ def measure_scenario(
     said(f"{scene.name}: a first run")
     first = pilot(model, scene)
     said(f"{scene.name}: the reference")
-    by_cone = _references(model, scene, first, quick)
+    by_cone = references(model, scene, first, quick=quick)
     own = own_setting(model, scene, first)
     chosen = settings(model, scene, first, quick=quick)
     known = by_cone[own.cone].known
-    conserved = _conserved(model, scene, first, known)
+    invariant = conserved(model, scene, first, known)
     found = []
     for setting in chosen:
         said(f"{scene.name}: {words(setting)}")
-        reference = by_cone[setting.cone].known
-        found.append(measured(model, scene, first, reference, conserved, setting))
+        cone = by_cone[setting.cone]
+        found.append(measured(model, scene, first, cone.known, invariant, setting, cone.sticks))
     taken: list[Cost | None] = [None] * len(found)
     if clock is not None:
         said(f"{scene.name}: times")
         taken = _times(model, scene, first, found, chosen.index(own), clock, quick)
     said(f"{scene.name}: stable timesteps")
-    stable = _stable(model, scene, first, quick)
-    beyond = _beyond(model, scene, first, known)
+    largest = stable(model, scene, first, quick=quick)
+    beyond = energy_beyond(model, scene, first, known)
     points = [_point(row, cost, by_cone) for row, cost in zip(found, taken, strict=True)]
     placed = front(points)
     comparable = found[chosen.index(own)].judgement.ok
@@ -136,91 +124,12 @@ def measure_scenario(
         figure=figure_name(model, scene),
         rows=rows,
         orders=_orders(found, known, own) if first.smooth else (),
-        stable=stable,
+        stable=largest,
         verdict=_verdict(chosen, points, placed, found, chosen.index(own), by_cone),
     )
 
 
-# ------------------------------------------------------------------------------------- references
-
-
-@dataclass(frozen=True, slots=True)
-class _Cone:
-    """What errors under a cone are measured against."""
-
-    known: Known
-    model_error: float | None
-    """What remains of the error however small the timestep, m or rad."""
-    seen: float
-    """The same in a picture, where it is not in the errors already."""
-
-
-def _references(model: Any, scene: Scene, first: Pilot, quick: bool) -> dict[str, _Cone]:
-    """By cone; by "" where nothing touches."""
-    known = know(model, scene, first, quick=quick)
-    if not first.contact:
-        return {"": _Cone(known, None, 0.0)}
-    limits = {}
-    for cone, number in (
-        ("elliptic", mujoco.mjtCone.mjCONE_ELLIPTIC),
-        ("pyramidal", mujoco.mjtCone.mjCONE_PYRAMIDAL),
-    ):
-        other = varied(model, Integrator.EULER, scene.own)
-        other.opt.cone = number
-        limits[cone] = itself(other, scene, first, quick=quick)
-    found = {}
-    for cone, limit in limits.items():
-        truth = known if known.kind == "closed" else limits["elliptic"]
-        count = min(len(limit.states.times), len(truth.states.times))
-        gap = difference(limit.until(count).motion, truth.until(count).motion)
-        if known.kind == "closed":
-            found[cone] = _Cone(known, gap.place, 0.0)
-        elif cone == "elliptic":
-            found[cone] = _Cone(limit, None, 0.0)
-        else:
-            seen = visible_error(model, scene, limit.until(count).states, truth.until(count).states)
-            found[cone] = _Cone(limit, gap.place, seen)
-    return found
-
-
-def _conserved(model: Any, scene: Scene, first: Pilot, known: Known) -> Conserved:
-    """What the author says is conserved, or else what the reference conserves."""
-    declared = scene.declared.conserved if scene.declared is not None else None
-    data, other = begun(first.setup, model), begun(first.setup, model)
-    states = [(data.qpos, data.qvel), *zip(known.states.qpos, known.states.qvel, strict=True)]
-    table = np.array([invariants(model, other, qpos, qvel) for qpos, qvel in states])
-    run = Run(
-        known.states.times,
-        known.states.qpos,
-        known.states.qvel,
-        table[:, :2],
-        table[:, 2:],
-        0.0,
-        Judgement(Status.OK),
-        known.states.act,
-    )
-    scale = energy_scale(run)
-    if declared is not None:
-        energy = "energy" in declared and scale > 0
-        return Conserved(scale if energy else None, "angular-momentum" in declared)
-    if not first.smooth or known.kind == "self":
-        return Conserved(None, momentum=False)
-    drifts = energy_drift(run), momentum_drift(run)
-    held = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
-    return Conserved(scale if held[0] else None, held[1])
-
-
-def _beyond(model: Any, scene: Scene, first: Pilot, known: Known) -> float | None:
-    """Mean kinetic energy beyond the horizon, J, in the smallest steps; `None` without such."""
-    if known.horizon > scene.scenario.duration - scene.scenario.sample * 1.5:
-        return None
-    fine = varied(model, Integrator.IMPLICITFAST, min(scene.timesteps) / 2)
-    if first.smooth:
-        fine.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    run = simulate_model(first.setup, fine)
-    later = run.energy[1:][run.times > known.horizon * (1 + 1e-9), 1]
-    mean = float(later.mean())
-    return mean if math.isfinite(mean) and mean > 0 else None
+# ------------------------------------------------------------------------------------------ words
 
 
 def _notes(model: Any, scene: Scene, first: Pilot, known: Known) -> tuple[str, ...]:
@@ -242,7 +151,7 @@ def _verdict(
     placed: Sequence[Placed],
     found: Sequence[Measured],
     own: int,
-    by_cone: dict[str, _Cone],
+    by_cone: dict[str, Cone],
 ) -> Verdict:
     """On the scene's own setting, number `own`."""
     mine = found[own]
@@ -277,7 +186,7 @@ def _times(
     return taken
 
 
-def _point(row: Measured, cost: Cost | None, by_cone: dict[str, _Cone]) -> Point | None:
+def _point(row: Measured, cost: Cost | None, by_cone: dict[str, Cone]) -> Point | None:
     if cost is None or row.seen is None:
         return None
     if row.figure is not None:
@@ -292,7 +201,7 @@ def _row(
     row: Measured,
     cost: Cost | None,
     place: Placed,
-    by_cone: dict[str, _Cone],
+    by_cone: dict[str, Cone],
     own: Setting,
     beyond: float | None,
     comparable: bool,
@@ -312,7 +221,7 @@ def _row(
         momentum_drift=row.momentum_drift,
         mean_energy=None if mean is None or beyond is None else mean / beyond - 1,
         penetration=row.penetration,
-        slip=None,
+        slip=row.slip,
         model_error=by_cone[row.setting.cone].model_error,
         refsafe=row.refsafe,
         steps=row.steps,
@@ -370,30 +279,3 @@ def _order(rows: Sequence[Measured], part: str, floor: float) -> float | None:
     ]
     fit = order([step for step, _ in pairs], [error for _, error in pairs], floor)
     return None if fit is None else fit.value
-
-
-# -------------------------------------------------------------------------------------- stability
-
-
-def _stable(model: Any, scene: Scene, first: Pilot, quick: bool) -> tuple[StableRow, ...]:
-    """The largest stable timestep of every integrator."""
-    duration = scene.scenario.duration
-    low, high = (part * scene.own for part in SEARCH)
-    search = (max(low, duration / MOST_STEPS), min(high, duration / 20))
-    if search[1] <= search[0]:
-        return ()
-    one, thick = varied(model, Integrator.EULER, scene.own), thickness(model)
-    rows = []
-    for integrator in STANDARD:
-
-        def attempt(step: float, integrator: Integrator = integrator) -> Trial:
-            apply(one, Setting(integrator.value, step, "", 0, ""))
-            try:
-                return attempted(first.setup, one, round(duration / step), thick)
-            except mujoco.FatalError:
-                return Trial(step, Status.DIVERGED, math.nan)
-
-        found = scan(attempt, search, grid=6 if quick else 12, resolution=1e-2 if quick else 1e-3)
-        largest = None if math.isinf(found.largest) else found.largest
-        rows.append(StableRow(integrator.value, largest, not found.islands, search))
-    return tuple(rows)

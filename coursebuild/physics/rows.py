@@ -28,6 +28,7 @@ from coursebuild.physics.pilot import Bounded, Pilot
 from coursebuild.physics.problem import Array, Integrator
 from coursebuild.physics.rotation import angle_between
 from coursebuild.physics.scene import Scene, thickness
+from coursebuild.physics.slip import Sticks, slip
 from coursebuild.values import dataclass
 
 
@@ -58,6 +59,7 @@ class Measured:
     mean_energy: float | None
     """Mean kinetic energy from the horizon to the end, J; `None` where nothing is beyond."""
     penetration: float
+    slip: float | None
     refsafe: bool
     steps: int
 
@@ -66,9 +68,18 @@ REFUSED = "MuJoCo does not run it"
 
 
 def measured(
-    model: Any, scene: Scene, first: Pilot, known: Known, conserved: Conserved, setting: Setting
+    model: Any,
+    scene: Scene,
+    first: Pilot,
+    known: Known,
+    conserved: Conserved,
+    setting: Setting,
+    sticks: Sticks | None = None,
 ) -> Measured:
-    """Run a scene under a setting, and compare it with its reference."""
+    """Run a scene under a setting, and compare it with its reference.
+
+    `sticks`: what sticks in the reference; `None` where nothing touches.
+    """
     one = varied(model, Integrator(setting.integrator), setting.timestep)
     apply(one, setting)
     steps = round(scene.scenario.duration / setting.timestep)
@@ -78,9 +89,9 @@ def measured(
     except mujoco.FatalError as error:
         lost = Judgement(Status.DIVERGED, (f"{REFUSED}: {error}",))
         return Measured(
-            setting, lost, None, None, None, None, None, None, None, 0.0, refsafe, steps
+            setting, lost, None, None, None, None, None, None, None, 0.0, None, refsafe, steps
         )
-    found = figure = seen = noticeable = None
+    found = figure = seen = noticeable = creep = None
     if run.judgement.ok:
         count = len(known.states.times)
         states = States(run.times[:count], run.qpos[:count], run.qvel[:count], run.act[:count])
@@ -90,6 +101,7 @@ def measured(
         shown = visible_error(model, scene, states, known.states)
         seen, noticeable = max(shown, floor), None if shown < 1 <= floor else shown >= 1
         figure = _figure(model, scene, states, known)
+        creep = None if sticks is None else slip(model, scene, states, sticks)
     return Measured(
         setting,
         run.judgement,
@@ -101,6 +113,7 @@ def measured(
         momentum_drift(run) if conserved.momentum else None,
         _mean_energy(run, known.horizon),
         run.penetration,
+        creep,
         refsafe,
         steps,
     )

@@ -90,9 +90,9 @@ def thickness(model: Any) -> Array:
     That of a plane or a height field is infinite: nothing is on its other side.
     """
     half = np.full(int(model.ngeom) + 1, np.inf)
-    bottomless = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    bottomless = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
     for geom in range(int(model.ngeom)):
-        if model.geom_type[geom] not in bottomless:
+        if int(model.geom_type[geom]) not in bottomless:
             half[geom] = float(model.geom_aabb[geom, 3:].min()) or np.inf
     return half
 

@@ -13,7 +13,7 @@ Entry points: `bench(options, names, quick=…)`, `record(…)`, `check(…)`.
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.measured.bench import SceneReport
 from coursebuild.measured.departures import Checked, scene_departures
 from coursebuild.measured.records import (
@@ -47,7 +47,8 @@ class Benched:
     def ok(self) -> bool:
         """Whether everything could be measured, and is as it was recorded."""
         departed = any(one.departures for one in self.checked)
-        return not (self.diagnostics or self.failures or departed)
+        wrong = any(one.severity is Severity.ERROR for one in self.diagnostics)
+        return not (wrong or self.failures or departed)
 
 
 def bench(

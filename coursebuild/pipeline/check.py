@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.locks import project_lock
-from coursebuild.measured.sensitivity import Sensitivity
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
@@ -25,8 +25,10 @@ from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import plural
 from coursebuild.scripts.extract import extract
-from coursebuild.scripts.sensitivity import noise
 from coursebuild.values import replace
+
+if TYPE_CHECKING:
+    from coursebuild.measured.sensitivity import Sensitivity
 
 
 def check(
@@ -78,8 +80,8 @@ def _check(
     found += no_lessons(course)
     sensitive = None
     if sensitivity:
-        sensitive = _sensitivity(course, options, progress, verified, chosen)
-        found += [warning for one in sensitive for warning in noise(one)]
+        sensitive, warnings = _sensitivity(course, options, progress, verified, chosen)
+        found += warnings
     found += shown_reports(options.root, course).diagnostics
     if shard is None or not any(True for _ in extract(course).value):
         found += _no_scripts(course, chosen, verified.scripts, found)
@@ -98,13 +100,16 @@ def _check(
 
 def _sensitivity(
     course: Course, options: Options, progress: Progress, verified: Verified, chosen: Selection
-) -> tuple[Sensitivity, ...]:
+) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
+    """Which printed digits hold, and the warnings of those that do not."""
     from coursebuild.pipeline.sensitivity import measure
+    from coursebuild.scripts.sensitivity import noise
 
     by_path = {run.path: run for run in verified.results.runs}
     ran = [extraction for extraction in extract(course).value if extraction.path in by_path]
     runs = [by_path[extraction.path] for extraction in ran]
-    return measure(course, options, progress, ran, runs, chosen.documents)
+    measured = measure(course, options, progress, ran, runs, chosen.documents)
+    return measured, [warning for one in measured for warning in noise(one)]
 
 
 def _part(shard: Shard, verified: Verified) -> str:

@@ -68,6 +68,11 @@ class Dieted:
     remarks: tuple[str, ...] = ()
 
     @property
+    def wrong(self) -> Dieted:
+        """Without the models in which nothing is to be done."""
+        return replace(self, reports=tuple(one for one in self.reports if not one.ok))
+
+    @property
     def ok(self) -> bool:
         """Whether nothing is left to be done."""
         return not (self.diagnostics or self.failures) and all(one.ok for one in self.reports)

@@ -79,8 +79,9 @@ class DietModel:
         place = str((self.root / self.path).parent / _TEXT)
         try:
             return mujoco.MjModel.from_xml_path(place, assets={place: text})
-        except mujoco.FatalError as error:
-            raise ValueError(str(error)) from None
+        except (ValueError, mujoco.FatalError) as error:
+            shown = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
+            raise ValueError(shown) from None
 
     def survey(self, *, quick: bool, tell: Callable[[str], None]) -> tuple[Survey, ModelText]:
         """Try everything.
@@ -88,6 +89,8 @@ class DietModel:
         Raises:
             CannotError: it cannot be looked at.
         """
+        import mujoco
+
         from coursebuild.physics.diet.cases import cases
         from coursebuild.physics.diet.markup import MarkupError
         from coursebuild.physics.diet.model_text import ModelTextError, open_model
@@ -96,7 +99,7 @@ class DietModel:
 
         source = self.scene.model.source
         try:
-            text = open_model(self.path, self.read, self.compile)
+            text = open_model(self.path, self.read, self.compile, check=not self.changed)
             declared = self.scene.declared
             order = Order(
                 text,
@@ -109,6 +112,7 @@ class DietModel:
                 quick,
                 tell,
             )
+            return survey(order), text
         except MarkupError as error:
             said = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
             help = "MuJoCo reads it all the same; other tools do not"
@@ -117,10 +121,10 @@ class DietModel:
             span = error.span or source.span(0, 0)
             message = error.message
             raise CannotError(diagnose("scenario-model", span, message, help=error.help)) from None
-        except (ModelTextError, ValueError) as error:
-            said = f"the diet cannot look at the model `{self.scene.name}`: {error}"
+        except (ModelTextError, ValueError, mujoco.FatalError) as error:
+            words = " ".join(str(error).split())
+            said = f"the diet cannot look at the model `{self.scene.name}`: {words}"
             raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
-        return survey(order), text
 
     def report(self, survey: Survey, here: Machine, *, quick: bool) -> DietReport:
         """What was found, as a value."""
@@ -161,14 +165,13 @@ class DietModel:
         before = dict(self.changed)
         self.changed |= text.files(survey.edits)
         try:
-            again = open_model(self.path, self.read, self.compile).model
+            again = open_model(self.path, self.read, self.compile, check=False).model
             same = saved(again) == saved(text.compiled(survey.edits))
         except (MarkupError, ModelTextError, ValueError):
             same = False
         if not same:
             self.changed = before
-            message = f"the changed model `{self.scene.name}` is not the one that was run"
-            raise CannotError(diagnose("model-error", self.scene.model.source.span(0, 0), message))
+            raise self._another()
 
     def digest(self) -> str:
         """Of the model as it lies on the disk now."""
@@ -179,19 +182,45 @@ class DietModel:
     def write(self) -> None:
         """Put the changed files into their places; all of them, or none.
 
+        What then stands on the disk must compile to the model that was run.
+
         Raises:
-            EffectError: one cannot be written, or somebody changed it.
+            EffectError: a file cannot be written, or somebody changed it.
+            CannotError: the files make another model.
         """
+        if not self.changed:
+            return
+        from coursebuild.physics.diet.model_text import open_model, saved
+
+        wanted = saved(open_model(self.path, self.read, self.compile, check=False).model)
         written: list[str] = []
         try:
             for path, data in sorted(self.changed.items()):
                 write_atomic(self.root, path, data, expected=self.original[path])
                 written.append(path)
-        except EffectError:
+            self._verify(wanted)
+        except (EffectError, CannotError):
             for path in written:
                 write_atomic(self.root, path, self.original[path], expected=self.changed[path])
             self.changed.clear()
             raise
+
+    def _verify(self, wanted: bytes) -> None:
+        from coursebuild.physics.diet.model_text import saved
+
+        try:
+            if (
+                saved(self.compile(self.changed.get(self.path) or self.original[self.path]))
+                == wanted
+            ):
+                return
+        except ValueError:
+            pass
+        raise self._another()
+
+    def _another(self) -> CannotError:
+        message = f"the changed model `{self.scene.name}` is not the one that was run"
+        return CannotError(diagnose("model-error", self.scene.model.source.span(0, 0), message))
 
 
 def _keeps(declared: Declarations) -> dict[str, str]:

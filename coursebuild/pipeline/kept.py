@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 
+from coursebuild.effects.prepared import prepared_template
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.render.strings import Strings
@@ -24,6 +25,10 @@ class CompiledTemplates:
     def load(self, name: str) -> bytes | None:
         """The code of a template, by a name that says all that it depends on but the tool."""
         return None if self._store.fresh else self._store.peek(_TEMPLATES, self._key(name))
+
+    def generated(self, name: str) -> str | None:
+        """The Python of a template, where that came with the tool."""
+        return prepared_template(name)
 
     def keep(self, name: str, data: bytes) -> None:
         """Keep the code of a template."""

@@ -77,6 +77,11 @@ class Progress:
         with self._lock:
             self._doing[name] = what
 
+    def known(self) -> None:
+        """Something need not run: what it gives is kept."""
+        with self._lock:
+            self._done += 1
+
     def finished(self, name: str, verdict: str, seconds: float) -> None:
         """A script ended; the verdict is one word, such as `ok` or `timeout`."""
         with self._lock:

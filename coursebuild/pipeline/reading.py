@@ -13,6 +13,7 @@ What draws is imported when there is something to draw.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import importlib
 import json
@@ -40,6 +41,7 @@ from coursebuild.render.record import PageRecord, record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
+from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
@@ -52,8 +54,13 @@ ROOM = 4 << 20
 """Bytes that documents may take which wait to be drawn, about."""
 _COST = 12
 """Bytes that a parsed document takes for each character of its text, about, with its MathML."""
-_FORMULAS = 2048
+_FORMULAS = 1024
 """Formulas that are remembered."""
+_COLLECT = 64
+"""Texts after which what the parser left behind is looked for: the collector's own measure would
+let a process grow by tens of megabytes first."""
+_RENEW = 256
+"""Texts after which the engine is made anew, since it keeps a little of every formula."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +87,12 @@ def prepare_to_read(sample: Task) -> None:
     from coursebuild.syntax.document import parse_document
 
     # Much is made only when it is needed for the first time.
-    parse_document(sample.source, sample.callouts, lesson=sample.lesson)
+    read = parse_document(sample.source.present(), sample.callouts, lesson=sample.lesson).value
     mark_now("python", "")
+    if document_formulas(read):
+        from coursebuild.effects.v8 import preload
+
+        preload()
 
 
 def prepare_to_cut() -> None:
@@ -100,6 +111,7 @@ class Reader:
         self._aside: Aside | None = None
         self._put: dict[str, Kept] = {}
         """Documents that wait as well, by the key of their text."""
+        self._read_texts = 0
         self._formulas: dict[Formula, str | MathError] = {}
         self._tools: dict[str, Tools] = {}
 
@@ -158,6 +170,11 @@ class Reader:
         if outline.lasting:  # that a formula took too long may not happen again
             self._store.keep(OUTLINES, task.key, data, local=True)
         self._wait(task.key, whole)
+        self._read_texts += 1
+        if self._read_texts % _RENEW == 0:
+            self._rest()
+        if self._read_texts % _COLLECT == 0:
+            gc.collect()
         return data
 
     def _whole(self, task: Task) -> _Whole:
@@ -166,12 +183,13 @@ class Reader:
         if known is not None:
             self._room += _COST * len(known.document.source.text)
             return known
-        put = self._fetched(task)
+        source = task.source.present()
+        put = self._fetched(task.key, source)
         if put is not None:
             return put
         from coursebuild.syntax.document import parse_document
 
-        parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
+        parsed = parse_document(source, task.callouts, lesson=task.lesson)
         formulas = document_formulas(parsed.value)
         return _Whole(parsed.value, parsed.diagnostics, self._typeset(formulas))
 
@@ -186,13 +204,13 @@ class Reader:
                 self._aside = Aside(self._store.folder)
             self._put[name] = self._aside.put(pack(oldest))
 
-    def _fetched(self, task: Task) -> _Whole | None:
+    def _fetched(self, key: str, source: Source) -> _Whole | None:
         """A document that was put aside here."""
-        put = self._put.pop(task.key, None)
+        put = self._put.pop(key, None)
         if put is None:
             return None
         try:
-            found = unpack(put(), task.source)
+            found = unpack(put(), source)
         except AsideError:  # by the process that this one is a copy of
             return None
         return found if isinstance(found, _Whole) else None
@@ -218,8 +236,8 @@ class Reader:
             made = [next(fresh) if found is None else found for found in known]
             if all(isinstance(one, str) for one in made):
                 self._store.keep(_MATHML, key, json.dumps(made).encode(), local=True)
-        if len(self._formulas) > _FORMULAS:
-            self._formulas.clear()
+        while len(self._formulas) > _FORMULAS:
+            del self._formulas[next(iter(self._formulas))]
         found = dict(zip(formulas, made, strict=True))
         self._formulas.update((f, one) for f, one in found.items() if isinstance(one, str))
         return found

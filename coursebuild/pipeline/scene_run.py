@@ -84,7 +84,8 @@ class SceneRun:
     def _one(self, scene: Scene, here: Machine, code: str) -> SceneReport | None:
         parts = (scene.name, scene.digest, f"{self.quick}", code, *_named(here))
         kept = self._kept(_SCENE, parts, SceneReport)
-        if kept is not None and (kept.card is not None or not self.cards):
+        if kept is not None and (kept.card is not None or not self.cards or not kept.scenarios):
+            self.progress.known()
             return kept
         with project_lock(self.options.root, self.progress.say, name=_LOCK):
             self.progress.started(scene.name)
@@ -102,7 +103,7 @@ class SceneRun:
                 return None
             kept = SceneReport(scene.name, scene.digest, self.quick, here, found)
             self._keep(_SCENE, parts, kept)
-        if self.cards and kept.card is None:
+        if self.cards and kept.card is None and kept.scenarios:
             from coursebuild.pipeline.cards import with_card
 
             self.progress.doing(scene.name, "what it is made of")

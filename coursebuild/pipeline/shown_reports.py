@@ -8,6 +8,7 @@ of MuJoCo that is installed. Any other is left out of the site, and told.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
@@ -21,6 +22,7 @@ from coursebuild.measured.cases import CaseReport
 from coursebuild.measured.diet import DietReport
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
+from coursebuild.pipeline.reports import command
 from coursebuild.source import Source
 
 _FOLDER = "content/reports/"
@@ -72,10 +74,10 @@ class _Reader:
         return Parsed(Reports(scenes, diets, cases), tuple(self._found))
 
     def _of_model(
-        self, path: str, model: str, command: str, decode: Callable[[bytes], _Scene]
+        self, path: str, model: str, kind: str, decode: Callable[[bytes], _Scene]
     ) -> _Scene | None:
         """The report on a model, if it fits."""
-        make = f"coursebuild {command} {model} --record"
+        make = command(kind, (model,), "--record")
         if model not in self._models:
             near = nearest(model, self._models)
             help = f"is it of `{near}`?" if near is not None else "remove it"
@@ -104,7 +106,7 @@ class _Reader:
         from coursebuild.measured.records import RecordError
 
         try:
-            return decode(read_bytes(self._root, path))
+            return _decoded(decode, read_bytes(self._root, path))
         except EffectError as error:
             self._told(path, error.message, error.help)
         except RecordError as error:
@@ -132,6 +134,12 @@ class _Reader:
     def _told(self, path: str, message: str, help: str) -> None:
         place = Source(path, "").span(0, 0)
         self._found.append(diagnose("report-stale", place, message, help=help))
+
+
+@functools.lru_cache(maxsize=32)
+def _decoded(decode: Callable[[bytes], _T], data: bytes) -> _T:
+    """What a preview reads at each save, and few of them change."""
+    return decode(data)
 
 
 def _again(make: str) -> str:

@@ -57,7 +57,9 @@ def stability(
             key = hashlib.sha256(f"{name}\0{state}".encode()).hexdigest()
             kept = None if again else options.store.load(_KIND, key)
             report = None if kept is None else _decoded(kept)
-            if report is None:
+            if report is not None:
+                progress.known()
+            else:
                 progress.started(name)
                 began = time.monotonic()
                 report = _measured(name)

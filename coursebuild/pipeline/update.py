@@ -9,13 +9,15 @@ Entry point: `update(options, names, dry_run=…)`.
    changed it meanwhile.
 3. The bound numbers of the lessons as they are now are checked, so that prose which a new output
    makes false is told.
+4. Scripts whose output was written run again with their initial states moved a little: digits that
+   change with them are noise, and should not have been printed.
 """
 
 from __future__ import annotations
 
 import difflib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.effects.errors import EffectError
@@ -64,6 +66,9 @@ def _update(
     now = loaded if dry_run or not edits else load(options.root)
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
     found += _afterwards(now.course or course, scripts, first, again)
+    if edits and not dry_run and now.course is not None:
+        changed = {r.script for r in _recordings(course, chosen) if _is_touched(r, edits, ())}
+        found += _noise(now.course, chosen, changed, first, options, progress)
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks = ("every recorded output is up to date",)
     lines = script_lines(scripts, first, ())
@@ -98,6 +103,25 @@ def _again(
     memory = Memory(options.root, options.store, fresh=True)
     ran = {r.path: r for r in run(left, options, progress, "running scripts again", memory)}
     return tuple(ran.get(one.path, one) for one in first)
+
+
+def _noise(
+    now: Course,
+    chosen: Selection,
+    changed: Collection[str | None],
+    first: Sequence[ScriptRun],
+    options: Options,
+    progress: Progress,
+) -> list[Diagnostic]:
+    """Warnings of digits that were recorded and are noise, of the scripts whose output changed."""
+    from coursebuild.pipeline.sensitivity import measure
+    from coursebuild.scripts.sensitivity import noise
+
+    ran = {one.path: one for one in first if one.path in changed}
+    scripts = [extraction for extraction in extract(now).value if extraction.path in ran]
+    runs = [ran[extraction.path] for extraction in scripts]
+    measured = measure(now, options, progress, scripts, runs, chosen.documents)
+    return [warning for one in measured for warning in noise(one)]
 
 
 def _is_touched(

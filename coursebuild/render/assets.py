@@ -75,6 +75,9 @@ class Compiled(Protocol):
     def load(self, name: str) -> bytes | None:
         """What was kept under a name."""
 
+    def generated(self, name: str) -> str | None:
+        """The Python that `generated` made ahead of the template of this name."""
+
     def keep(self, name: str, data: bytes) -> None:
         """Keep a template's code."""
 
@@ -105,21 +108,41 @@ def template_environment(
     return environment
 
 
-def _bytecode_cache(compiled: Compiled) -> BytecodeCache:
+def generated(templates: tuple[tuple[str, str], ...]) -> dict[str, str]:
+    """The Python that templates become, by a name for all that it depends on."""
+    from jinja2.bccache import BytecodeCache
+
+    environment, cache = template_environment(templates), BytecodeCache()
+    return {
+        _name(cache.get_cache_key(path), cache.get_source_checksum(text)): environment.compile(
+            text, path, raw=True
+        )
+        for path, text in templates
+        if path.endswith(".html")
+    }
+
+
+def _name(key: str, checksum: str) -> str:
     import jinja2
+
+    return f"{jinja2.__version__}/{key}/{checksum}"
+
+
+def _bytecode_cache(compiled: Compiled) -> BytecodeCache:
     from jinja2.bccache import Bucket, BytecodeCache
 
     class Cache(BytecodeCache):
         def load_bytecode(self, bucket: Bucket) -> None:
-            data = compiled.load(_name(bucket))
+            name = _name(bucket.key, bucket.checksum)
+            data = compiled.load(name)
             if data is not None:
                 bucket.bytecode_from_string(data)
+            elif (code := compiled.generated(name)) is not None:
+                bucket.code = compile(code, "<template>", "exec")
+                self.dump_bytecode(bucket)
 
         def dump_bytecode(self, bucket: Bucket) -> None:
-            compiled.keep(_name(bucket), bucket.bytecode_to_string())
-
-    def _name(bucket: Bucket) -> str:
-        return f"{jinja2.__version__}/{bucket.key}/{bucket.checksum}"
+            compiled.keep(_name(bucket.key, bucket.checksum), bucket.bytecode_to_string())
 
     return Cache()
 

@@ -221,7 +221,7 @@ def _parts(tools: Tools, text: str) -> tuple[CodePart, ...]:
     lines = tools.mark("python", text.rstrip("\n"))
     return tuple(
         CodePart(
-            Markup("\n").join(lines[part.first - 1 : part.last]),
+            Markup("\n".join(lines[part.first - 1 : part.last])),
             part.folded,
             _fold_label(tools.words, part),
         )

@@ -43,7 +43,8 @@ def _copies(file: OutputFile, keep: Keep) -> Iterator[OutputFile]:
 
 
 def _quality(data: bytes) -> int:
-    return 9 if len(data) >= _LARGE else 11
+    """Of Brotli; one more for small files would be two percent fewer bytes for twice the time."""
+    return 9 if len(data) >= _LARGE else 10
 
 
 def _brotli(data: bytes) -> bytes:

@@ -77,7 +77,7 @@ class PageContext:
         """A formula; one on a line of its own scrolls inside itself where it is too wide."""
         mathml = self.tools.mathml(tex, display)
         if display:
-            return self.template("blocks/formula.html", mathml=mathml)
+            return self.tools.enclose("blocks/formula.html", "mathml", mathml)
         return Markup(formulas.breakable(mathml))
 
     def code(self, language: str, text: str) -> Markup:

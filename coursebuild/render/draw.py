@@ -5,23 +5,21 @@ Entry point: `draw(sheet, document, tools)`.
 
 from __future__ import annotations
 
+from markupsafe import Markup
+
+from coursebuild.measured.bench import ScenarioReport
 from coursebuild.model import Document, Paragraph, plain_text
 from coursebuild.render import urls
 from coursebuild.render.article import article, contents
 from coursebuild.render.context import PageContext
 from coursebuild.render.draft import Draft as Draft
-from coursebuild.render.sheet import Highlighted, Sheet
+from coursebuild.render.sheet import Highlighted, Plotted, Sheet
 from coursebuild.render.tools import Tools
 
 
 def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
     """The page without its frame; the same values give the same page."""
-    values = {
-        name: tools.highlight(value.language, value.text)
-        if isinstance(value, Highlighted)
-        else value
-        for name, value in sheet.values.items()
-    }
+    values = {name: _drawn(value, tools) for name, value in sheet.values.items()}
     description = sheet.description
     if document is not None and sheet.shown is not None:
         page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
@@ -39,6 +37,26 @@ def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
         og_type=sheet.og_type,
         indexed=sheet.indexed,
     )
+
+
+def _drawn(value: object, tools: Tools) -> object:
+    match value:
+        case Highlighted():
+            return tools.highlight(value.language, value.text)
+        case Plotted():
+            return tuple(_plots(n, report) for n, report in enumerate(value.reports, 1))
+        case _:
+            return value
+
+
+def _plots(number: int, report: ScenarioReport) -> tuple[Markup, ...]:
+    from coursebuild.measured.plot import plot_svg  # which few pages need
+
+    drawn = (
+        plot_svg(report, name=f"_plot-{number}-{kind}", narrow=kind == "narrow")
+        for kind in ("wide", "narrow")
+    )
+    return tuple(Markup(svg) for svg in drawn if svg)
 
 
 def _first_sentences(document: Document) -> str:

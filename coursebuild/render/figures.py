@@ -21,6 +21,16 @@ _THIN = "\u2009"
 
 
 @dataclass(frozen=True, slots=True)
+class Part:
+    """Rows of a table under a title of their own."""
+
+    title: str
+    remark: str
+    count: int
+    """How many."""
+
+
+@dataclass(frozen=True, slots=True)
 class Grid:
     """A table."""
 
@@ -33,6 +43,20 @@ class Grid:
     """Columns of words; numbers stand at the right."""
     marked: tuple[int, ...] = ()
     """Rows that stand out."""
+    parts: tuple[Part, ...] = ()
+    """All rows in order; empty where they are not parted."""
+
+    @property
+    def bodies(self) -> tuple[tuple[Part | None, tuple[tuple[int, tuple[str, ...]], ...]], ...]:
+        """The rows with their numbers, by part."""
+        numbered = tuple(enumerate(self.rows))
+        if not self.parts:
+            return ((None, numbered),)
+        found, at = [], 0
+        for part in self.parts:
+            found.append((part, numbered[at : at + part.count]))
+            at += part.count
+        return tuple(found)
 
 
 def grid(
@@ -41,12 +65,13 @@ def grid(
     *,
     words: tuple[str, ...] = (),
     marked: tuple[int, ...] = (),
+    parts: tuple[Part, ...] = (),
 ) -> Grid:
     """A table of columns, those without any text left out; `words` are titles of such of words."""
     shown = [(title, cells) for n, (title, cells) in enumerate(columns) if not n or any(cells)]
     left = tuple(n for n, (title, _) in enumerate(shown) if not n or title in words)
     rows = tuple(zip(*(cells for _, cells in shown), strict=True))
-    return Grid(label, tuple(title for title, _ in shown), rows, left, marked)
+    return Grid(label, tuple(title for title, _ in shown), rows, left, marked, parts)
 
 
 def power(value: float | None, digits: int = 3) -> Markup:
@@ -85,8 +110,16 @@ def percent(value: float | None) -> Markup:
 
 
 def said(words: Strings, key: str, **values: str) -> Markup:
-    """A text of the interface with values that may be markup."""
-    return Markup(escape(words(key)).format(**values))
+    """A text of the interface with values; numbers among them stay in one line."""
+    kept = {
+        name: whole(text) if isinstance(text, Markup) else text for name, text in values.items()
+    }
+    return Markup(escape(words(key)).format(**kept))
+
+
+def whole(number: Markup) -> Markup:
+    """A number that no line end breaks."""
+    return Markup('<span class="whole">{}</span>').format(number)
 
 
 def factor(value: float | None) -> str:

@@ -46,7 +46,7 @@ _ALIASES = {"mjcf": "xml", "urdf": "xml"}
 
 def highlight(language: str, code: str) -> Markup:
     """The code with its tokens marked; plain escaped text where no lexer knows the language."""
-    return Markup("\n").join(highlight_lines(language, code))
+    return Markup("\n".join(highlight_lines(language, code)))
 
 
 @functools.lru_cache(maxsize=256)

@@ -113,10 +113,13 @@ def _is_page(path: str) -> bool:
 
 
 def page_references(
-    path: str, html: str, base_url: str
+    path: str, html: str, base_url: str, *, plain: bool = False
 ) -> tuple[frozenset[str], frozenset[Reference]]:
-    """The ids in the text of a page, and where its addresses lead."""
-    page = _quickly_read(html)
+    """The ids in the text of a page, and where its addresses lead.
+
+    `plain`: it is known that the page is written as `styles.is_plain` says.
+    """
+    page = _quickly_read(html, plain=plain)
     if page is None:
         page = _read(html)
     base = _Base.of(base_url)
@@ -215,13 +218,16 @@ _ATTRIBUTE = re.compile(r"""\s([\w:-]+)="([^"<>]*)\"""")
 _RAW_TEXT = re.compile(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
 
 
-def _quickly_read(html: str) -> _Page | None:
-    """The same as `_read` but for the lines, where all tags are written as we write them."""
-    if not _TAGS.fullmatch(html) or _RAW_TEXT.search(html):
+def _quickly_read(html: str, *, plain: bool = False) -> _Page | None:
+    """The same as `_read` but for the lines, where all tags are written as we write them.
+
+    `plain`: it is known that they are.
+    """
+    if not (plain or _TAGS.fullmatch(html)) or _RAW_TEXT.search(html):
         return None
     ids: set[str] = set()
     addresses: list[_Address] = []
-    for tag, attributes in _WITH_ATTRIBUTES.findall(html):
+    for tag, attributes in _telling(html) if plain else _WITH_ATTRIBUTES.findall(html):
         wanted = _ADDRESSES.get(tag, ())
         if not wanted and ' id="' not in attributes:
             continue
@@ -233,3 +239,22 @@ def _quickly_read(html: str) -> _Page | None:
                 found = _srcset(url) if name == "srcset" else (url,)
                 addresses += [_Address(one, 0) for one in found]
     return _Page(frozenset(ids), tuple(addresses))
+
+
+_TELLING = ("id", "name", *sorted({name for names in _ADDRESSES.values() for name in names}))
+
+
+def _telling(html: str) -> Iterator[tuple[str, str]]:
+    """The tags of a plain page that may have ids or addresses, each with its attributes."""
+    places: set[tuple[int, int]] = set()
+    for name in _TELLING:
+        wanted = f' {name}="'
+        at = html.find(wanted)
+        while at >= 0:
+            start, end = html.rfind("<", 0, at), html.find(">", at)
+            if start >= 0 and html.find(">", start, at) < 0:  # else it stands in a text
+                places.add((start, end))
+            at = html.find(wanted, at + 1)
+    for start, end in sorted(places):
+        tag, _, attributes = html[start + 1 : end].partition(" ")
+        yield tag, f" {attributes}"

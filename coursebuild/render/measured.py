@@ -16,9 +16,9 @@ from coursebuild.measured.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.measured.diet import DietReport, Finding, Saving
-from coursebuild.measured.plot import plot_svg
 from coursebuild.measured.points import (
-    FLOORS,
+    Quantity,
+    quantities,
     seconds_text,
     setting_text,
     solving_parts,
@@ -39,12 +39,25 @@ from coursebuild.render.figures import (
     sentence,
     size,
     where,
+    whole,
 )
 from coursebuild.render.library import Library
 from coursebuild.render.strings import Strings
 from coursebuild.values import dataclass
 
-_ERRORS = ("figure", "position", "attitude", "velocity")
+_QUANTITIES = {
+    "seen": "measured.seen",
+    "position": "measured.position",
+    "attitude": "measured.attitude",
+    "velocity": "measured.velocity",
+}
+ORDERS = (
+    ("position", "measured.order_position"),
+    ("attitude", "measured.order_attitude"),
+    ("velocity", "measured.order_velocity"),
+)
+"""Orders that are fitted, with their titles."""
+_NEAR = 1 + 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +69,6 @@ class ScenarioView:
     about: tuple[str, ...]
     """How long it takes and what it was held against, a sentence each."""
     verdict: str
-    plots: tuple[Markup, ...]
-    """For wide screens and for narrow ones; empty where there is nothing to draw."""
     settings: Grid
     notes: tuple[str, ...]
     """Of runs that say nothing, or of another model."""
@@ -115,7 +126,7 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
     scenarios = () if scene is None else scene.scenarios
     return MeasuredView(
         card=_card(words, model, scene),
-        scenarios=tuple(_scenario(words, n, one) for n, one in enumerate(scenarios, 1)),
+        scenarios=tuple(_scenario(words, one) for one in scenarios),
         where="" if scene is None else where(words, scene.machine),
         command=again("bench", name, "--record"),
         file="" if scene is None else place.href(urls.file_path(bench_path(name))),
@@ -138,7 +149,7 @@ def _card(
         return (
             (words("measured.possible"), missing),
             (words("measured.touched"), missing),
-            (words("measured.mjcf"), size(text)),
+            (words("measured.mjcf_file"), size(text)),
             (words("measured.native"), speed),
             (words("measured.browser"), missing),
         )
@@ -158,17 +169,12 @@ def _card(
 # --- scenarios
 
 
-def _scenario(words: Strings, number: int, report: ScenarioReport) -> ScenarioView:
-    drawn = [
-        plot_svg(report, name=f"_plot-{number}-{kind}", narrow=kind == "narrow")
-        for kind in ("wide", "narrow")
-    ]
+def _scenario(words: Strings, report: ScenarioReport) -> ScenarioView:
     return ScenarioView(
         name=report.name,
         title=report.title or report.name,
         about=tuple(_about(words, report)),
         verdict=sentence(report.verdict.text),
-        plots=tuple(Markup(svg) for svg in drawn if svg),
         settings=_settings(words, report),
         notes=tuple(_notes(words, report)),
         orders=_orders(words, report.orders),
@@ -199,23 +205,22 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
 
 def _settings(words: Strings, report: ScenarioReport) -> Grid:
     rows, usual = report.rows, usual_setting(report.rows)
-    least = FLOORS * report.floor
 
-    def error(name: str) -> list[str]:
+    def error(quantity: Quantity) -> tuple[str, list[str]]:
         found: list[str] = []
         for row in rows:
-            pair: tuple[float, float] | None = getattr(row, name)
-            under = pair is not None and least > 0 and pair[0] <= least * (1 + 1e-9)
-            found.append(Markup("&lt; ") + power(least, 2) if under else power(pair and pair[0]))
-        return found
+            value = quantity.of(row)
+            under = value is not None and quantity.least > 0 and value <= quantity.least * _NEAR
+            found.append(Markup("&lt; ") + power(quantity.least, 2) if under else power(value))
+        key = _QUANTITIES.get(quantity.name)
+        return quantity.label if key is None else words(key), found
 
-    title = report.figure or words("measured.figure")
     remarks = words("measured.remark")
     columns: list[tuple[str, list[str]]] = [
         (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
         (words("measured.cost"), ["" if r.cost is None else f"{r.cost:.3g}" for r in rows]),
         (words("measured.realtime"), [factor(row.realtime) for row in rows]),
-        *((title if n == "figure" else words(f"measured.{n}"), error(n)) for n in _ERRORS),
+        *(error(quantity) for quantity in quantities(report)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
@@ -262,10 +267,10 @@ def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
     if not shown:
         return None
     columns = [(words("measured.integrator"), [one.integrator for one in shown])]
-    for name in _ERRORS[1:]:
+    for name, key in ORDERS:
         found: list[float | None] = [getattr(one, name) for one in shown]
         cells = ["" if value is None else f"{value:.2f}" for value in found]
-        columns.append((words(f"measured.order_{name}"), cells))
+        columns.append((words(key), cells))
     return grid(words("measured.orders"), columns)
 
 
@@ -311,7 +316,7 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
 def _finding(words: Strings, one: Finding) -> FindingView:
     label = escape(one.label)
     if one.difference:
-        label += Markup(" ({})").format(power(one.difference, 2))
+        label += Markup(" ({})").format(whole(power(one.difference, 2)))
     return FindingView(
         kind=one.kind,
         message=sentence(one.message),

@@ -11,14 +11,37 @@ from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, Figu
 from coursebuild.measured.points import KNOWN, seconds_text, status_text
 from coursebuild.measured.records import STABILITY_PATH
 from coursebuild.render import urls
-from coursebuild.render.figures import Grid, again, exact, grid, percent, power, said, sentence
+from coursebuild.render.figures import (
+    Grid,
+    Part,
+    again,
+    exact,
+    grid,
+    percent,
+    power,
+    said,
+    sentence,
+)
 from coursebuild.render.library import Library
-from coursebuild.render.measured import largest
+from coursebuild.render.measured import ORDERS, largest
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
 from coursebuild.values import dataclass
 
-_QUANTITIES = ("position", "attitude", "velocity")
+_QUANTITIES = (
+    ("position", "measured.position"),
+    ("attitude", "measured.attitude"),
+    ("velocity", "measured.velocity"),
+)
+_BOUNDARY = (
+    "measured.largest",
+    "measured.theory",
+    "measured.difference",
+    "measured.beyond",
+    "measured.growth",
+    "measured.remark",
+)
+_FIGURE = ("numerics.measured", "numerics.exact", "measured.difference")
 _Rows = list[tuple[tuple[str, ...], str]]
 """Cells, and the integrator that they are of."""
 
@@ -120,8 +143,7 @@ def _grid(
 
 def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
     rows = [(_boundary(words, line), line.integrator) for line in report.boundaries]
-    names = ("largest", "theory", "difference", "beyond", "growth", "remark")
-    titles = [words(f"measured.{name}") for name in names]
+    titles = [words(key) for key in _BOUNDARY]
     label = words("numerics.boundaries", title=report.title)
     return _grid(words, label, titles, rows, left=words("measured.remark"))
 
@@ -148,24 +170,30 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
     """Quantities that are known."""
     if not report.figures:
         return None
-    rows: _Rows = [(_figure(words, line), line.integrator) for line in report.figures]
-    names, cells = _merged(rows)
-    keys = ("quantity", "measured", "exact", "difference", "source")
-    titles = [words(f"numerics.{key}") for key in keys]
-    columns = [(title, [row[n] for row in cells]) for n, title in enumerate(titles)]
-    integrator = words("measured.integrator")
-    columns.insert(1, (integrator, names))
+    names: list[str] = []
+    cells: list[tuple[str, ...]] = []
+    parts: list[Part] = []
+    for name in dict.fromkeys(line.name for line in report.figures):
+        lines = [line for line in report.figures if line.name == name]
+        some, rows = _merged([(_figure(words, line), line.integrator) for line in lines])
+        names += some
+        cells += rows
+        unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
+        title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
+        parts.append(Part(title, "; ".join(sources), len(rows)))
+    columns = [(words("measured.integrator"), names)]
+    for n, key in enumerate(_FIGURE):
+        columns.append((words(key), [row[n] for row in cells]))
     label = words("numerics.figures", title=report.title)
-    return grid(label, columns, words=(integrator, titles[-1]))
+    return grid(label, columns, parts=tuple(parts))
 
 
 def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
     measured = words("numerics.infinite") if line.measured is None else exact(line.measured)
-    difference = ""
+    difference: str = ""
     if line.exact is not None and line.measured is not None:
         difference = power(line.measured - line.exact, 2)
-    name = f"{line.name} ({line.unit})" if line.unit else line.name
-    return name, measured, exact(line.exact), difference, line.source
+    return measured, exact(line.exact), difference
 
 
 def _orders(words: Strings, report: CaseReport) -> Grid | None:
@@ -174,7 +202,7 @@ def _orders(words: Strings, report: CaseReport) -> Grid | None:
     for one in shown:
         values = (one.position, one.attitude, one.velocity)
         rows.append((tuple("" if v is None else f"{v:.3f}" for v in values), one.integrator))
-    titles = [words(f"measured.order_{name}") for name in _QUANTITIES]
+    titles = [words(key) for _, key in ORDERS]
     return _grid(words, words("numerics.orders", title=report.title), titles, rows)
 
 
@@ -184,15 +212,14 @@ def _errors(words: Strings, report: CaseReport) -> list[Grid]:
     lines = {(one.timestep, one.integrator): one for one in report.errors}
     steps = sorted({one.timestep for one in report.errors}, reverse=True)
     names = sorted({one.integrator for one in report.errors}, key=_rank)
-    for quantity in _QUANTITIES:
+    for quantity, key in _QUANTITIES:
         if all(getattr(one, quantity) is None for one in report.errors):
             continue
         columns = [(words("measured.timestep"), [seconds_text(step) for step in steps])]
         for name in names:
             cells = [_error(lines.get((step, name)), quantity) for step in steps]
             columns.append((name, cells))
-        unit = words(f"measured.{quantity}")
-        label = words("numerics.errors", quantity=unit, title=report.title)
+        label = words("numerics.errors", quantity=words(key), title=report.title)
         found.append(grid(label, columns))
     return found
 

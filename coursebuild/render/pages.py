@@ -15,7 +15,7 @@ from coursebuild.render.lesson import LessonHead, LessonLink, drawn, edit_addres
 from coursebuild.render.library import Library, ModelUse
 from coursebuild.render.measured import measured_view
 from coursebuild.render.numerics import numerics_sheet
-from coursebuild.render.sheet import Highlighted, Sheet
+from coursebuild.render.sheet import Highlighted, Plotted, Sheet
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
 from coursebuild.values import dataclass
@@ -126,6 +126,7 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
     title = library.words("model.title", name=model.name)
+    scene = library.reports.scenes.get(model.name)
     values = {
         "home": place.href(urls.HOME),
         "name": model.name,
@@ -135,6 +136,7 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
         "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
         "code": Highlighted("xml", model.source.text.rstrip()),
         "measured": measured_view(library, place, model),
+        "plots": Plotted(() if scene is None else scene.scenarios),
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
+from coursebuild.render import formulas, styles
 from coursebuild.render.characters import visible
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import LIVE_LAB
 from coursebuild.render.links import Reference, page_references
-from coursebuild.render.shared import PageFacts, page_facts, settled
+from coursebuild.render.shared import PageFacts, page_facts
 from coursebuild.values import dataclass, replace
 
 
@@ -24,7 +25,7 @@ class PageRecord:
     live: bool
     """Whether labs run on it."""
     text: str
-    """The characters of its text, sorted; `mathematics` those of its formulas."""
+    """Characters of its text, as `PageFacts` has them, sorted; so are the others."""
     mathematics: str
     declarations: tuple[str, ...]
     """Styles that were written in its elements, sorted."""
@@ -43,10 +44,12 @@ class PageRecord:
 
 def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
     """The record of a page that was just drawn, and its body as it will be published."""
-    draft, declarations = settled(draft)
-    facts = page_facts(draft, declarations)
-    body = visible(draft.body)
-    ids, references = page_references(draft.path, body, base_url)
+    html = formulas.glue(str(draft.body))
+    plain = styles.is_plain(html)
+    html, declarations = styles.hoist(html, plain=plain)
+    facts = page_facts(replace(draft, body=Markup(html)), declarations)
+    body = visible(html)
+    ids, references = page_references(draft.path, body, base_url, plain=plain)
     found = PageRecord(
         draft=replace(draft, body=Markup()),
         live=LIVE_LAB in body,

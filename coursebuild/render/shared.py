@@ -29,9 +29,9 @@ class PageFacts:
     """What the shared files must know of a page."""
 
     text: frozenset[str]
-    """Characters of its text."""
+    """Characters of its text, but those that every font has."""
     mathematics: frozenset[str]
-    """Characters of its formulas."""
+    """Characters of its formulas, but those of ASCII; a blank where there is a formula."""
     declarations: frozenset[str]
     """Styles that were written in its elements."""
 
@@ -43,29 +43,28 @@ def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
 
 
 _FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
-_TAGS = re.compile(r"<[^>]*>")
-_REFERENCE = re.compile(r"&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)")
-"""What may be a character reference, as in `html.unescape`."""
-_ASCII = "".join(map(chr, range(128)))
-_OTHERS = re.compile(r"[^\x00-\x7f]")
+_SIGN = re.compile(
+    r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
+    r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
+)
+"""What is not ASCII, or may be a character reference, as in `html.unescape`; tags are passed over.
+A match goes on to the next of these, or to the end: no place is looked at twice.
+"""
 
 
 def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
     """The facts of a settled page."""
     parts = _FORMULA.split(draft.body)
-    text = {*draft.title, *_characters("".join(parts[::2]))}
-    mathematics = _characters("\n".join(parts[1::2])) - {"\n"}
-    return PageFacts(frozenset(text), frozenset(mathematics), declarations)
+    text = _characters("".join(parts[::2])).union(draft.title)
+    mathematics = {c for c in _characters("\n".join(parts[1::2])) if not c.isascii()}
+    if len(parts) > 1:
+        mathematics.add(" ")
+    return PageFacts(frozenset(text - fonts.BASE), frozenset(mathematics), declarations)
 
 
 def _characters(html: str) -> set[str]:
-    """The characters of the text of a piece of HTML."""
-    text = _TAGS.sub("", html)
-    references = set(_REFERENCE.findall(text))
-    if references:
-        text = _REFERENCE.sub("", text)
-    found = {character for character in _ASCII if character in text}
-    return found.union(_OTHERS.findall(text), *map(unescape, references))
+    """The characters of the text of a piece of HTML, but most of those of ASCII."""
+    return set[str]().union(*map(unescape, set(_SIGN.findall(html))))
 
 
 def common_characters(library: Library) -> frozenset[str]:

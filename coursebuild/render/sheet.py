@@ -18,6 +18,7 @@ from typing import Literal
 
 from markupsafe import Markup
 
+from coursebuild.measured.bench import ScenarioReport
 from coursebuild.model import Comparison, Target
 from coursebuild.results import Outcome
 from coursebuild.values import dataclass, field
@@ -111,6 +112,13 @@ class Highlighted:
 
 
 @dataclass(frozen=True, slots=True)
+class Plotted:
+    """Work–precision plots, drawn when the page is: two of each, for wide and narrow screens."""
+
+    reports: tuple[ScenarioReport, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Sheet:
     """A page that is to be drawn."""
 
@@ -122,7 +130,7 @@ class Sheet:
     description: str
     template: str
     values: Mapping[str, object]
-    """For the template; `Highlighted` among them are drawn first."""
+    """For the template; `Highlighted` and `Plotted` among them are drawn first."""
     json_ld: Markup = Markup()
     og_type: str = "website"
     indexed: bool = True

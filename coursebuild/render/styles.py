@@ -42,9 +42,17 @@ _OTHERS = re.compile(
 _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
-def hoist(html: str) -> tuple[str, frozenset[str]]:
-    """The page with classes in place of `style` attributes, and what they stand for."""
-    if _PLAIN.fullmatch(html):
+def is_plain(html: str) -> bool:
+    """Whether all tags are written as we and Temml write them; what `hoist` gives is so as well."""
+    return _PLAIN.fullmatch(html) is not None
+
+
+def hoist(html: str, *, plain: bool | None = None) -> tuple[str, frozenset[str]]:
+    """The page with classes in place of `style` attributes, and what they stand for.
+
+    `plain`: what `is_plain` says, where that is known.
+    """
+    if is_plain(html) if plain is None else plain:
         return _hoist_plain(html)
     found: set[str] = set()
     parts: list[str] = []

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
+_SLOT = "\ue000"
+"""Stands for a value; no template has it."""
+
 Mark: TypeAlias = Callable[[str, str], tuple[Markup, ...]]
 """Gives the lines of code in a language, their tokens marked."""
 
@@ -39,15 +42,26 @@ class Tools:
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
     mark: Mark = mark_now
     """How code is marked: whoever calls may keep what was marked before."""
+    around: dict[str, tuple[str, str]] = field(default_factory=dict, repr=False, compare=False)
+    """What templates write around their only value, as far as it is known."""
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template, without its last line end; it sees `t`, the interface's words."""
         text = self.templates().get_template(template).render(t=self.words, **values)
         return Markup(text.rstrip("\n"))
 
+    def enclose(self, template: str, name: str, html: Markup) -> Markup:
+        """The same for a template that writes one value, once and as it is, whatever it may be."""
+        if template not in self.around:
+            whole = str(self.render(template, **{name: Markup(_SLOT)}))
+            before, _, after = whole.partition(_SLOT)
+            self.around[template] = (before, after)
+        before, after = self.around[template]
+        return Markup(f"{before}{html}{after}")
+
     def highlight(self, language: str, code: str) -> Markup:
         """Code with its tokens marked."""
-        return Markup("\n").join(self.mark(language, code))
+        return Markup("\n".join(self.mark(language, code)))
 
     def mathml(self, tex: str, display: bool) -> Markup:
         """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""

@@ -11,7 +11,7 @@ Entry point: `bench_text(scenes, style)`.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from coursebuild.measured.bench import (
     Machine,
@@ -23,23 +23,20 @@ from coursebuild.measured.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.measured.points import (
-    quantities,
     seconds_text,
-    setting_text,
     solving_parts,
     status_text,
-    telling,
     usual_setting,
 )
+from coursebuild.report.bench_columns import BETTER, FRONT, OWN, VISIBLE, columns
 from coursebuild.report.table import Column, table
 from coursebuild.report.text import Style, visible
 
 _BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
 _INDENT = "  "
 _NARROWEST = 40
-OWN, FRONT = ">", "*"
 _LEGEND = f"{OWN} the scene's own   {FRONT} on the Pareto front"
-_BETTER = "   → a better one"
+_BETTER = f"   {BETTER} a better one"
 _SEEN = "visible: an error of 1 is just seen in a picture"
 
 
@@ -130,116 +127,18 @@ def _rows(report: ScenarioReport, style: Style) -> list[str]:
     rows = report.rows
     if not rows:
         return [f"{2 * _INDENT}no setting was measured"]
-    columns = _columns(report)
-    lines = table(columns, max(style.width, 60) - 4)
+    lines = table(columns(report), max(style.width, 60) - 4)
     painted = [style.paint(lines[0], _FAINT)]
     for row, line in zip(rows, lines[1:], strict=True):
         code = _BOLD if row.own else _RED if row.status in ("diverged", "reset") else ""
         code = code or (_YELLOW if row.status != "ok" else _GREEN if row.front else "")
         painted.append(style.paint(line, code) if code else line)
-    legend = _LEGEND + (_BETTER if any("→" in line for line in lines) else "")
-    below = [legend, _SEEN] if "visible" in lines[0] else [legend]
+    legend = _LEGEND + (_BETTER if any(BETTER in line for line in lines) else "")
+    below = [legend, _SEEN] if VISIBLE in lines[0] else [legend]
     return [
         f"{2 * _INDENT}{line}".rstrip()
         for line in (*painted, *(style.paint(text, _FAINT) for text in below))
     ]
-
-
-def _columns(report: ScenarioReport) -> list[Column]:
-    rows = report.rows
-    number = range(len(rows))
-    least = {one.name: one.least for one in quantities(report)}
-
-    def cells(show: Callable[[WorkPrecisionRow], str]) -> tuple[str, ...]:
-        return tuple(show(row) for row in rows)
-
-    def error(name: str, which: int) -> tuple[str, ...]:
-        def show(row: WorkPrecisionRow) -> str:
-            pair: tuple[float, float] | None = getattr(row, name)
-            return "" if pair is None else _error(pair[which], least[name])
-
-        return cells(show)
-
-    usual = usual_setting(rows)
-    names = ("figure", "position", "attitude", "velocity")
-    told = telling(report)
-    first = "" if told is None else told.name
-
-    def rank(name: str) -> int:
-        """Errors that are nowhere above the floor say little."""
-        values = [getattr(row, name) for row in rows]
-        above = any(pair is not None and pair[0] > least[name] * (1 + 1e-9) for pair in values)
-        return 0 if name == first else 2 if above else 7
-
-    return [
-        Column("", cells(_marks), 0, left=True),
-        Column("#", tuple(f"{n + 1}" for n in number), 0),
-        Column("integrator", cells(lambda r: r.setting.integrator), 0, left=True),
-        Column("timestep", cells(lambda r: seconds_text(r.setting.timestep, 4)), 0),
-        Column("with", cells(lambda r: _with(r, usual)), 0, left=True),
-        Column("visible", cells(lambda r: _number(r.seen)), 0 if first == "seen" else 2),
-        *(Column(name, error(name, 0), rank(name)) for name in names),
-        *(Column(f"{name} at end", error(name, 1), 9) for name in names),
-        Column("energy", cells(lambda r: _drift(r.energy_drift)), 3),
-        Column("momentum", cells(lambda r: _number(r.momentum_drift)), 5),
-        Column("mean energy", cells(lambda r: _drift(r.mean_energy)), 5),
-        Column("depth", cells(lambda r: _number(r.penetration or None)), 5),
-        Column("slip", cells(lambda r: _number(r.slip)), 5),
-        Column("model error", cells(lambda r: _number(r.model_error)), 5),
-        Column("cost", cells(lambda r: "" if r.cost is None else f"{r.cost:.3g}"), 0),
-        Column("× real time", cells(lambda r: _speed(r.realtime)), 4),
-        Column("spread", cells(lambda r: "" if r.spread is None else f"{r.spread:.2f}"), 8),
-        Column("growth", cells(lambda r: "" if r.growth is None else f"{r.growth:.6f}"), 7),
-        Column("status", cells(lambda r: status_text(r.status)), 0, left=True),
-        Column("refsafe", cells(lambda r: "yes" if r.refsafe else ""), 5),
-        Column("", tuple(_better(report, row, long=False) for row in rows), 1),
-        Column(
-            "dominated by", tuple(_better(report, row, long=True) for row in rows), 2, left=True
-        ),
-    ]
-
-
-def _marks(row: WorkPrecisionRow) -> str:
-    return (OWN if row.own else " ") + (FRONT if row.front else " ")
-
-
-def _with(row: WorkPrecisionRow, usual: Setting | None) -> str:
-    """Solver, iterations and cone where they are not those of the scene, in few words."""
-    parts = solving_parts(row.setting, usual)
-    return ", ".join(part.removesuffix(" iterations").removesuffix(" cone") for part in parts)
-
-
-def _better(report: ScenarioReport, row: WorkPrecisionRow, *, long: bool) -> str:
-    at = row.dominated_by
-    if at is None or not 0 <= at < len(report.rows):
-        return ""
-    if not long:
-        return f"→{at + 1}"
-    better = report.rows[at]
-    named = f"{better.setting.integrator} at {seconds_text(better.setting.timestep, 4)}"
-    return ", ".join(part for part in (named, _with(better, row.setting)) if part)
-
-
-def _error(value: float, least: float) -> str:
-    """An error in three digits; those at the floor are only known to be under it."""
-    under = least > 0 and value <= least * (1 + 1e-9)
-    return f"<{least:.1e}" if under else f"{value:.2e}"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.2g}"
-
-
-def _drift(value: float | None) -> str:
-    """A relative change in per cent, with its sign."""
-    if value is None:
-        return ""
-    percent = 100 * value
-    return f"{percent:+.3f} %" if 1e-3 <= abs(percent) < 1e4 else f"{percent:+.1e} %"
-
-
-def _speed(value: float | None) -> str:
-    return "" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 # --- what stands below
@@ -286,17 +185,30 @@ def _largest(row: StableRow) -> str:
 def _lost(report: ScenarioReport, style: Style) -> list[str]:
     """Why runs were lost, those with the same reasons together."""
     usual = usual_setting(report.rows)
-    together: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    together: dict[tuple[str, tuple[str, ...]], list[WorkPrecisionRow]] = {}
     for row in report.rows:
         if row.status != "ok":
-            told = (status_text(row.status), row.reasons)
-            together.setdefault(told, []).append(setting_text(row.setting, usual))
-    lines: list[str] = []
-    for (status, reasons), settings in together.items():
-        what = f"{'; '.join(settings)}: {'; '.join((status, *reasons))}"
-        lines += [style.paint(line, _YELLOW) for line in _wrapped(what, style, 2 * _INDENT)]
-    softened = [setting_text(row.setting, usual) for row in report.rows if row.refsafe]
+            together.setdefault((status_text(row.status), row.reasons), []).append(row)
+    told = [
+        f"{_named(rows, usual)}: {'; '.join((status, *reasons))}"
+        for (status, reasons), rows in together.items()
+    ]
+    softened = [row for row in report.rows if row.refsafe]
     if softened:
-        what = f"refsafe softens constraints, which makes another model: {'; '.join(softened)}"
-        lines += [style.paint(line, _YELLOW) for line in _wrapped(what, style, 2 * _INDENT)]
-    return ["", *lines] if lines else []
+        what = "refsafe softens constraints, which makes another model"
+        told.append(f"{what}: {_named(softened, usual)}")
+    lines = [line for text in told for line in _wrapped(text, style, 2 * _INDENT)]
+    return ["", *(style.paint(line, _YELLOW) for line in lines)] if lines else []
+
+
+def _named(rows: Sequence[WorkPrecisionRow], usual: Setting | None) -> str:
+    """Settings in words, those of an integrator together."""
+    together: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        parts = ", ".join(solving_parts(row.setting, usual))
+        steps = together.setdefault((row.setting.integrator, parts), [])
+        steps.append(seconds_text(row.setting.timestep, 4))
+    return "; ".join(
+        f"{name} at {', '.join(steps)}{parts and f' with {parts}'}"
+        for (name, parts), steps in together.items()
+    )

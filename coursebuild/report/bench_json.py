@@ -3,8 +3,9 @@
 Entry point: `bench_json(scenes, …)`.
 
 `rows` has everything that was measured of each setting, with all that is needed to read it, so that
-it can be loaded as a table. `scenarios` has what is said of all rows together, `checked` what left
-the band of a recorded report, `diagnostics` and `failures` what is wrong.
+it can be loaded as a table. `scenarios` has what is said of all rows together, `scenes` what the
+models are made of, `checked` what left the band of a recorded report, `diagnostics` and `failures`
+what is wrong.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ def bench_json(
         "scenarios": [
             _scenario(scene, scenario) for scene in scenes for scenario in scene.scenarios
         ],
+        "scenes": [_scene(scene) for scene in scenes],
         "diagnostics": [_diagnostic(one) for one in diagnostics],
         "failures": [dataclasses.asdict(one) for one in failures],
         "checked": [dataclasses.asdict(one) for one in checked],
@@ -141,7 +143,6 @@ def _scenario(scene: SceneReport, scenario: ScenarioReport) -> dict[str, Any]:
         "scene": scene.model,
         "scenario": scenario.name,
         "title": scenario.title,
-        "digest": scene.digest,
         "reference_source": scenario.source,
         "second_reference": scenario.second,
         "agreement": _finite(scenario.agreement),
@@ -165,6 +166,15 @@ def _scenario(scene: SceneReport, scenario: ScenarioReport) -> dict[str, Any]:
             "noticeable": verdict.noticeable,
             "text": verdict.text,
         },
+    }
+
+
+def _scene(scene: SceneReport) -> dict[str, Any]:
+    return {
+        "scene": scene.model,
+        "digest": scene.digest,
+        "quick": scene.quick,
+        "card": None if scene.card is None else dataclasses.asdict(scene.card),
     }
 
 

@@ -14,7 +14,7 @@ import textwrap
 from collections.abc import Sequence
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.measured.diet import CHANGES, IDENTICAL, DietReport, Finding, Saving, TextEdit
+from coursebuild.measured.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
 from coursebuild.measured.records import Failure
 from coursebuild.report.checked import failure_text
 from coursebuild.report.text import Style, diagnostic_text, visible
@@ -120,16 +120,13 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         lines += _wrapped(f"without all of them: {_saving(report.slim)}", style, "  ")
     if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(open_ones):
         lines += _wrapped(f"after --fix: {_saving(report.fixed)}", style, "  ")
-    needed = [one.kind for one in report.tried if one.label == CHANGES and not one.reason]
-    if needed:
-        lines += _faint(f"tried and needed: {_listed(list(dict.fromkeys(needed)))}", style)
-    idle = [one.kind for one in report.tried if one.label != CHANGES and not one.reason]
-    if idle:
-        told = f"makes no difference, and saves no time: {_listed(list(dict.fromkeys(idle)))}"
-        lines += _faint(told, style)
+    by_reason: dict[str, list[str]] = {}
     for one in report.tried:
-        if one.reason:
-            lines += _faint(f"not tried: {one.kind} {_listed(one.places)}: {one.reason}", style)
+        by_reason.setdefault(one.reason, []).append(one.kind)
+    for reason, kinds in by_reason.items():
+        shown = _listed(list(dict.fromkeys(kinds)))
+        told = f"not found, because {reason}" if reason else "tried and needed"
+        lines += _faint(f"{told}: {shown}", style)
     return lines
 
 

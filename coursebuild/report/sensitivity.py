@@ -16,7 +16,7 @@ _WHY = {
     Standing.NO_MUJOCO: "it does not use MuJoCo",
     Standing.NOT_MOVED: "no simulation of it has an initial state to move",
     Standing.UNRECORDED: "nothing that it prints is recorded and compared",
-    Standing.DRIFTED: "it does not print what is recorded",
+    Standing.DRIFTED: "it does not print what is recorded, or does not run to its end",
     Standing.FAILED: "it does not run to its end when its initial states are moved",
 }
 

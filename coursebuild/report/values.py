@@ -5,9 +5,13 @@ Entry point: `Report`; `summary_line(report)` is its last line as text.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.measured.sensitivity import Sensitivity
 from coursebuild.values import dataclass, replace
+
+if TYPE_CHECKING:
+    from coursebuild.measured.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,15 @@ Entry points: `sensitivity` (a script), `noise` (the warnings).
    unit. A number that is printed alike by all runs holds in all its digits.
 3. States at the end of runs of a pair, which began in opposite directions, tell how fast they part.
 4. A warning is given where the verification would take a difference for drift: what a tolerance or
-   `digits` allows for is no mistake.
+   `digits` allows for is no mistake. Nor is a number that came no further than its initial states
+   were moved: more than about twelve of its digits cannot be judged, unless it has more than the
+   fifteen that any floating-point number holds.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 
@@ -32,11 +35,15 @@ from coursebuild.results import Change, Outcome, ScriptRun
 from coursebuild.scripts.compare import compare
 from coursebuild.scripts.difftext import shortened
 from coursebuild.scripts.lines import same_number
-from coursebuild.scripts.numbers import Number, difference, scan, unit
+from coursebuild.scripts.numbers import Number, difference, round_like, scan, unit
 from coursebuild.scripts.printed import printed_lines
 from coursebuild.source import Span
+from coursebuild.values import replace
 
 _NAMED = 20
+_AS_MOVED = 11
+"""Digits that hold of a number that is moved ten times as far as the initial states, or less."""
+_HELD = sys.float_info.dig
 _WIDTH = 40
 
 
@@ -161,9 +168,8 @@ def _judged(
     trusted = min(digits, _trusted(number, spread))
     ordered = sorted((each for each in (number, *numbers) if each.finite), key=_value)
     ends = (ordered[0].text, ordered[-1].text) if all_finite else (number.text, "no number")
-    return Doubt(
-        span, number.text, digits, trusted, *ends, rounded(number, trusted), compared=compared
-    )
+    instead = "" if number.integer else rounded(number, trusted)  # a count is not rounded
+    return Doubt(span, number.text, digits, trusted, *ends, instead, compared=compared)
 
 
 def _value(number: Number) -> Decimal:
@@ -202,10 +208,16 @@ def rounded(number: Number, digits: int) -> str:
     """
     if digits < 1 or not number.finite:
         return ""
-    if any(c in "eE" for c in number.text):
-        return f"{number.value:.{digits - 1}e}"
     decimals = digits - 1 - number.value.adjusted()
-    return f"{number.value:.{decimals}f}" if decimals >= 0 else f"{number.value:.{digits - 1}e}"
+    mantissa, mark, power = number.text.lower().partition("e")
+    if mark:
+        decimals = digits - 1
+    elif decimals < 0:
+        decimals, power = digits - 1, "+00"
+    sign = mantissa[0] if mantissa[0] in "+-\u2212" else ""
+    like = f"{sign}0.{'0' * decimals}" if decimals else f"{sign}0"
+    like += f"{'E' if 'E' in number.text else 'e'}{power}" if power else ""
+    return round_like(replace(number, text=like), number.value) or ""
 
 
 # --- states
@@ -250,7 +262,7 @@ def _growth(
 
 def noise(found: Sensitivity) -> Iterator[Diagnostic]:
     """A warning where the verification compares what moved states change."""
-    doubts = [doubt for doubt in found.doubts if doubt.compared]
+    doubts = [doubt for doubt in found.doubts if doubt.compared and _is_noise(doubt)]
     flips = [flip for flip in found.flips if flip.compared]
     told = sorted(
         [(doubt.span, _doubt(doubt)) for doubt in doubts]
@@ -280,6 +292,10 @@ def noise(found: Sensitivity) -> Iterator[Diagnostic]:
     )
 
 
+def _is_noise(doubt: Doubt) -> bool:
+    return doubt.trusted < _AS_MOVED or doubt.digits > _HELD
+
+
 def parting(found: Sensitivity) -> str:
     """How fast the states of a script part, in words."""
     size = found.amplification
@@ -293,7 +309,8 @@ def _doubt(doubt: Doubt) -> str:
     if not doubt.trusted:
         return f"no digit holds: {between}"
     hold = "1 digit holds" if doubt.trusted == 1 else f"{doubt.trusted} digits hold"
-    return f"{hold}, print {doubt.instead}: {between}"
+    instead = f", print {doubt.instead}" if doubt.instead else ""
+    return f"{hold}{instead}: {between}"
 
 
 def _flip(flip: Flip) -> str:

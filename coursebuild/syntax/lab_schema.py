@@ -6,7 +6,7 @@ fields hang together (`min` below `max`, an `expect` that names a control) is ch
 `lab_checks`.
 """
 
-from __future__ import annotations
+# Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
 
 from typing import Annotated, ClassVar, Literal, TypeAlias
 

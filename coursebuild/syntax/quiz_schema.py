@@ -5,7 +5,7 @@ made from it; what no declaration of types can say (an answer that is one of the
 in `quiz`.
 """
 
-from __future__ import annotations
+# Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
 
 from typing import Annotated, TypeAlias
 

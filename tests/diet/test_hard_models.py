@@ -98,7 +98,10 @@ def test_an_include_that_is_not_to_be_changed() -> None:
 @pytest.mark.parametrize(
     ("files", "words"),
     [
-        ({PATH: '<mujoco><include file="none.xml"/></mujoco>'}, "none.xml, which was not found"),
+        (
+            {PATH: '<mujoco><include file="none.xml"/></mujoco>'},
+            "none.xml, which is not in the course",
+        ),
         ({PATH: "<mujocoinclude/>"}, "its root is <mujocoinclude>"),
         ({PATH: "<robot/>"}, "its root is <robot>"),
         ({"models/b.xml": ""}, "there is no file models/a.xml"),

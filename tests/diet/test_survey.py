@@ -119,7 +119,7 @@ SITES = """<body name="arm" pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size
       <site name="held"/><site name="read"/><site/><site name="idle"/><site name="sensed"/>
     </body>
     <site name="end"/>"""
-TENDON = """<tendon><spatial><site site="held"/><site site="end"/></spatial></tendon>
+TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/></spatial></tendon>
   <sensor>
     <framepos objtype="site" objname="sensed"/>
   </sensor>"""
@@ -217,6 +217,24 @@ def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> N
     assert finding.counts and not finding.fixable
     assert finding.unfixed.startswith("scenarios give commands by number")
     assert fixed(model, survey) == scene(rest=rest)
+
+
+def test_tendons_along_which_nothing_acts() -> None:
+    rest = """<tendon>
+    <fixed name="pull"><joint joint="pivot" coef="1"/></fixed>
+    <fixed name="soft" stiffness="3"><joint joint="pivot" coef="1"/></fixed>
+    <fixed name="bound" limited="true" range="0 1"><joint joint="pivot" coef="1"/></fixed>
+    <fixed name="measured"><joint joint="pivot" coef="1"/></fixed>
+    <fixed name="lazy"><joint joint="pivot" coef="1"/></fixed>
+    <fixed><joint joint="pivot" coef="2"/></fixed>
+  </tendon>
+  <actuator><motor name="m" tendon="pull"/></actuator>"""
+    model, survey = tried(scene(rest=rest), lesson='data.ctrl[0]; data.tendon("measured")')
+    assert names(found(survey)["tendon-idle"]) == ["lazy", "mujoco/tendon/fixed[6]"]
+    left = fixed(model, survey)
+    assert left.count("<fixed") == 4 and "lazy" not in left
+    _, survey = tried(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
+    assert survey.findings == ()
 
 
 def test_wind_in_a_vacuum() -> None:
@@ -340,6 +358,24 @@ def test_what_somebody_looks_at_is_not_far(extra: str, lesson: str) -> None:
     assert finding is None or not {"probe"} & set(names(finding))
 
 
+def piece(name: str, x: float, z: float = 0.1) -> str:
+    return (
+        f'<body name="{name}" pos="{x} 0 {z}"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
+    )
+
+
+def test_what_an_arm_cannot_reach_and_what_leans_on_what_it_can() -> None:
+    """The arm reaches 0.75 m; boxes on one that it reaches stay, though they are out of reach."""
+    arm = """<geom type="plane" size="9 9 1"/>
+    <body name="arm" pos="0 0 .2"><joint axis="0 1 0"/><geom size=".05" pos="-.7 0 0"/></body>"""
+    stack = piece("near", 0.85) + "".join(piece(f"up{i}", 0.85, 0.3 + 0.2 * i) for i in range(3))
+    beside = piece("beside", 1.049) + piece("away", 1.6)
+    _, survey = tried(scene(arm + stack + beside), quick=True)
+    assert names(found(survey)["far-body"]) == ["away"]
+    _, survey = tried(scene(arm + piece("free", 1.05) + piece("away", 1.6)))
+    assert set(names(found(survey)["far-body"])) == {"free", "away"}
+
+
 def test_where_all_bodies_are_alike_none_is_far() -> None:
     world = "".join(f'<body pos="{i}00 0 1"><freejoint/><geom size=".1"/></body>' for i in range(3))
     assert "far-body" not in found(tried(scene(world))[1])
@@ -453,3 +489,4 @@ def test_settings_are_told_only_for_the_time_that_they_save() -> None:
     assert survey.findings == ()
     kinds = {one.kind for one in survey.tried}
     assert {"solver", "cone", "tolerance", "island", "sleep", "condim"} <= kinds
+    assert {one.reason for one in survey.tried} == {"it saves no time"}

@@ -242,7 +242,10 @@ def test_every_rule_on_the_page_exists() -> None:
     assert sorted(rules - RULES.keys()) == []
 
 
-COMMANDS = ["build", "check", "update", "extract", "serve", "explain", "stability", "schema"]
+COMMANDS = [
+    *("build", "check", "update", "extract", "serve", "explain"),
+    *("bench", "stability", "diet", "schema"),
+]
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])

@@ -208,6 +208,14 @@ def test_copies_are_looked_at_as_well(run: Run) -> None:
     assert [one.sign for one in found(run(text))] == [Sign.STATE]
 
 
+def test_data_of_a_model_that_was_compiled_again_is_looked_at_as_well(run: Run) -> None:
+    text = HEAD + "spec = mujoco.MjSpec.from_string(XML)\nmodel = spec.compile()\n"
+    text += "model, data = spec.recompile(model, mujoco.MjData(model))\n"
+    assert [one.sign for one in found(run(text + STEP + "data.qpos[0] = float('inf')\n"))] == [
+        Sign.STATE
+    ]
+
+
 def test_a_state_that_was_never_stepped_is_the_scripts_own(run: Run) -> None:
     assert found(run(HEAD + "data.qvel[0] = float('nan')\n")) == ()
 

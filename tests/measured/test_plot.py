@@ -128,6 +128,37 @@ def test_what_is_not_resolved_is_a_band() -> None:
     assert not [t for t in texts(drawn(replace(report, floor=1e-16))) if "not resolved" in t]
 
 
+def seen(*errors: float) -> ScenarioReport:
+    return scenario([row("RK4", 0.01 / (n + 1), seen=error) for n, error in enumerate(errors)])
+
+
+def test_from_where_on_an_error_is_visible() -> None:
+    for errors in ((30.0, 0.02), (5.0, 2.0), (0.5, 0.2)):
+        assert "just visible" in texts(drawn(seen(*errors)))
+    for errors in ((1e5, 1e3), (1e-6, 1e-9)):
+        shown = texts(drawn(seen(*errors)))
+        assert "just visible" not in shown
+        assert "error: what is seen (1: just visible)" in shown
+
+
+def test_the_key_says_what_there_is_and_nothing_else() -> None:
+    shown = texts(drawn(swing()))
+    assert shown[-5:] == [
+        *("on the Pareto front", "another is better", "the scene’s own setting"),
+        *("run lost", "unstable"),
+    ]
+    far = (StableRow("Euler", 1e-9, True, (1e-10, 1.0)),)
+    assert texts(drawn(scenario([row(front=True)], stable=far)))[-1] == "on the Pareto front"
+
+
+def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
+    for report in (swing(), scenario([lost(own=True), row("RK4", 0.01)])):
+        root = drawn(report)
+        first, *_ = root.iter("circle")
+        assert first.attrib["r"] == "8.5"
+        assert [text for text in texts(root) if text.startswith("own: Euler at ")]
+
+
 def test_described_for_who_cannot_see_it() -> None:
     root = drawn(swing())
     assert root.attrib["role"] == "img"

@@ -45,7 +45,7 @@ def test_the_node_for_builds_is_the_declared_one(root: Path, pyproject: dict) ->
 
 
 def test_fonts_are_cut_when_bundling_with_what_cuts_them_later(root: Path, pyproject: dict) -> None:
-    needed = runpy.run_path(str(root / "site" / "bundle.py"))["FONT_REQUIREMENTS"]
+    needed = runpy.run_path(str(root / "site" / "bundle.py"))["AHEAD_REQUIREMENTS"]
     assert {*needed} <= {*pyproject["project"]["dependencies"]}
 
 

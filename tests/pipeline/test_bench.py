@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,7 @@ from coursebuild.measured.records import decode_bench, encode_bench
 from coursebuild.pipeline.bench import Benched, bench, check, record
 from coursebuild.pipeline.measuring import Loaded
 from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import Scene, find_scenes
 from coursebuild.values import replace
 
@@ -239,6 +242,31 @@ def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
         thread.join()
     assert most == 1
     assert sum(len(fake.asked) for fake in fakes) == 1
+
+
+class Terminal(io.StringIO):
+    """A terminal that keeps what was written to it."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_is_told_what_is_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    terminal = Terminal()
+    progress = Progress(terminal)
+    with progress.stage("measuring", 2):
+        progress.started("box")
+        progress.doing("box", "swing: RK4 at 0.002 s")
+        until = time.monotonic() + 10
+        while "box (swing: RK4 at 0.002 s) 0 s" not in terminal.getvalue():
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        progress.finished("box", "measured", 1.0)
+        progress.known()
+        while "measuring 2/2  \r" not in terminal.getvalue():
+            assert time.monotonic() < until
+            time.sleep(0.01)
 
 
 # --- recorded

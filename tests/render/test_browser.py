@@ -7,6 +7,7 @@ import http.server
 import json
 import shutil
 import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,6 +15,10 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from reportkit import reports
 
 from coursebuild.render import SiteOptions
 
@@ -119,6 +124,7 @@ PAGES = (
     "lessons/1.2-later.html",
     "levels/1.html",
     "models/box.html",
+    "numerics/index.html",
     "about.html",
 )
 LESSON_PAGE = PAGES[1]
@@ -128,7 +134,7 @@ LESSON_PAGE = PAGES[1]
 def root(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site on disk, below the path of its base address."""
     folder = tmp_path_factory.mktemp("served")
-    for path, data in make(LESSON).site(SiteOptions()).items():
+    for path, data in make(LESSON).site(SiteOptions(reports=reports())).items():
         target = folder / "course" / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(data)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from coursebuild.render import BrokenLink, check_links
 from coursebuild.render.links import _quickly_read, _read, all_lead_somewhere, page_references
+from coursebuild.render.styles import is_plain
 from coursebuild.results import OutputFile
 
 
@@ -132,3 +133,31 @@ def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str])
     references = pages["lessons/a.html"][1]
     broken = [b for b in check_links(files) if b.page == "lessons/a.html"]
     assert all_lead_somewhere(references, {f.path for f in files}, ids) == (not broken)
+
+
+PLAIN_TAGS = [
+    '<a href="#here">',
+    '<p id="here">',
+    '<a name="n" id="i" href="?x">',
+    ' id="no" href="no" ',
+    '<b title=" id=" id="b">',
+    '<img src="x.png" srcset="y.png 2x, z.png" alt="&quot;">',
+    '<video poster="p.png" src="v&amp;w" />',
+    '<object data="d" name="no">',
+    '<a data="no" href=" href=">',
+    "</a>",
+    '<math display="block"><mi id="m">x</mi></math>',
+]
+
+
+@given(st.lists(st.sampled_from(PLAIN_TAGS), max_size=8))
+def test_a_plain_page_is_read_as_any_other(parts: list[str]) -> None:
+    html = "".join(parts)
+    if is_plain(html):
+        known, found = _quickly_read(html, plain=True), _quickly_read(html)
+        assert known is not None
+        assert known == found
+
+
+def test_such_pages_are_plain() -> None:
+    assert all(is_plain(tag) for tag in PLAIN_TAGS if not tag.endswith('" />'))

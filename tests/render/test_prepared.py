@@ -1,4 +1,4 @@
-"""Fonts that come cut already are what cutting gives now."""
+"""What comes with the tool made ahead is what making it now gives."""
 
 from __future__ import annotations
 
@@ -12,9 +12,15 @@ import pytest
 from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
 
-from coursebuild.effects.prepared import FOLDER, prepared_cut, prepared_source
-from coursebuild.effects.resources import assets_dir
+from coursebuild.effects.prepared import (
+    FOLDER,
+    prepared_cut,
+    prepared_source,
+    prepared_template,
+)
+from coursebuild.effects.resources import assets_dir, template_texts
 from coursebuild.render import Assets
+from coursebuild.render.assets import template_environment
 from coursebuild.render.fonts import (
     BASE,
     MATH,
@@ -39,7 +45,7 @@ def test_they_are_up_to_date() -> None:
     listing = json.loads((folder / "fonts.json").read_bytes())
     assert listing["made_from"] == making["made_from"](assets_dir())
     files = {*listing["cuts"].values(), *(found["file"] for found in listing["smaller"].values())}
-    assert {path.name for path in folder.iterdir()} == {*files, "fonts.json"}
+    assert {path.name for path in folder.iterdir()} == {*files, "fonts.json", "templates.json"}
 
 
 def test_making_them_again_gives_the_same(assets: Any) -> None:
@@ -134,3 +140,50 @@ def test_what_the_list_notes_of_the_fonts_is_what_they_say(assets: Any) -> None:
         assert characters_in(face.characters) == covered(data)
         assert face.measure == measured(data)
         assert (face.measure is not None) == (face.subset == "latin")
+
+
+class Kept:
+    """What compiling templates asks for, without a store."""
+
+    def __init__(self) -> None:
+        self.codes: dict[str, bytes] = {}
+
+    def load(self, name: str) -> bytes | None:
+        return self.codes.get(name)
+
+    def generated(self, name: str) -> str | None:
+        return prepared_template(name)
+
+    def keep(self, name: str, data: bytes) -> None:
+        self.codes[name] = data
+
+
+def test_templates_are_up_to_date() -> None:
+    """If not, run `python site/bundle.py`."""
+    made = runpy.run_path(str(ROOT / "site" / "prepare_templates.py"))["prepared"]()
+    assert (assets_dir() / FOLDER / "templates.json").read_bytes() == made
+
+
+def test_jinja_compiles_no_template_that_came_with_the_tool(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept, texts = Kept(), template_texts()
+    names = [path for path, _ in texts if path.endswith(".html")]
+
+    def compiled(*_: object) -> None:
+        raise AssertionError("it was compiled")
+
+    for _ in range(2):  # the second time from what was kept
+        environment = template_environment.__wrapped__(texts, kept)
+        monkeypatch.setattr(environment, "compile", compiled)
+        for name in names:
+            environment.get_template(name)
+        assert len(kept.codes) == len(names)
+
+
+def test_a_template_that_was_changed_is_compiled() -> None:
+    kept = Kept()
+    texts = (("notfound.html", "now {{ what }}"),)
+    environment = template_environment.__wrapped__(texts, kept)
+    assert environment.get_template("notfound.html").render(what="else") == "now else"
+    assert len(kept.codes) == 1

@@ -43,7 +43,7 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
 def test_every_word_that_is_asked_for_is_there_and_every_one_there_is_used(assets: Assets) -> None:
     """Keys that are put together at run time are named here by their beginning."""
     made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
-    made += ("lab.live.",)
+    made += ("lab.live.", "measured.reference_", "numerics.case_")
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))
     text += "".join(p.read_text() for p in sorted((ROOT / "coursebuild" / "render").glob("*.py")))
     words = strings_for(assets.templates, "en")

@@ -6,12 +6,13 @@ import json
 import re
 from pathlib import Path
 
+import pytest
 from benchkit import awkward, lost, row, scenario, scene, setting, swing
 from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.measured.bench import WorkPrecisionRow
+from coursebuild.measured.bench import SceneCard, WorkPrecisionRow
 from coursebuild.measured.departures import Checked, Departure
 from coursebuild.measured.points import seconds_text, setting_text
 from coursebuild.measured.records import Failure
@@ -96,6 +97,15 @@ def test_huge_and_tiny_numbers() -> None:
     assert "1e-09 s" in text and "1e+09 s" in text
 
 
+@pytest.mark.parametrize(
+    ("seen", "shown"),
+    [(0.0012345, "0.0012"), (3.21, "3.2"), (99.4, "99"), (180.2, "180"), (1e5, "1e+05")],
+)
+def test_numbers_that_people_read(seen: float, shown: str) -> None:
+    text = bench_text([scene(scenario([row(seen=seen)]))], Style(width=80))
+    assert re.search(rf" {re.escape(shown)}  1.00e-03 ", text)
+
+
 def test_words() -> None:
     newton = setting(solver="Newton", iterations=100, cone="elliptic")
     assert setting_text(newton) == "Euler at 2 ms, Newton, 100 iterations, elliptic cone"
@@ -149,7 +159,9 @@ KINDS: dict[str, tuple[type, ...]] = {
 
 def rows_of(text: str) -> list[dict[str, object]]:
     found = json.loads(text, parse_constant=lambda name: (_ for _ in ()).throw(ValueError(name)))
-    assert list(found) == ["rows", "scenarios", "diagnostics", "failures", "checked", "remarks"]
+    assert list(found) == [
+        *("rows", "scenarios", "scenes", "diagnostics", "failures", "checked", "remarks")
+    ]
     for one in found["rows"]:
         assert tuple(one) == COLUMNS
         for name, value in one.items():
@@ -178,7 +190,7 @@ def test_json_is_a_table_with_every_column() -> None:
 
 def test_json_says_what_holds_for_a_whole_scenario() -> None:
     (found,) = json.loads(bench_json([scene()]))["scenarios"]
-    assert found["scene"] == "arm" and found["digest"] == "0" * 64
+    assert found["scene"] == "arm" and found["reference_source"] == swing().source
     assert found["verdict"]["better"] == 13 and found["verdict"]["noticeable"] is True
     assert found["stable"][1] == {
         "integrator": "implicit",
@@ -186,6 +198,13 @@ def test_json_says_what_holds_for_a_whole_scenario() -> None:
         "monotone": True,
         "searched": [0.001, 0.1],
     }
+
+
+def test_json_says_what_a_model_is_made_of() -> None:
+    card = SceneCard(1, 2, 6, 1, 1, 213, 5143, None)
+    first, second = json.loads(bench_json([scene(), scene(card=card)]))["scenes"]
+    assert first == {"scene": "arm", "digest": "0" * 64, "quick": False, "card": None}
+    assert second["card"]["freedom"] == 6 and second["card"]["browser"] is None
 
 
 def test_json_says_what_is_wrong() -> None:

@@ -48,6 +48,9 @@ class Candidate:
     """Why it holds whatever happens; empty where only runs can tell."""
     is_setting: bool = False
     """Whether nothing is taken out: only the time that it saves speaks for it."""
+    split: bool = True
+    """Whether to look for those of its items without which every bit is the same, where that is
+    not so of all together."""
     timed: bool = True
     """Whether it may change the time of a step."""
     blocked: str = ""

@@ -190,14 +190,15 @@ def watch(model: Any, case: Case) -> Seen:
     """Run the whole model once."""
     quiet(model)
     data = begin(model, case)
-    end = float(data.time) + case.steps * float(model.opt.timestep)
-    mujoco.mj_forward(model, data)
+    start, made = float(data.time), 0
+    mujoco.mj_kinematics(model, data)
     low, high = data.xipos.copy(), data.xipos.copy()
     touching: set[tuple[int, int]] = set()
     seen, constrained, iterations = Peaks(), False, 0
     for step in range(case.steps):
         _command(case, step, data, None, None)
         advance(model, data)
+        made += 1
         np.minimum(low, data.xipos, out=low)
         np.maximum(high, data.xipos, out=high)
         if data.nefc:
@@ -208,5 +209,6 @@ def watch(model: Any, case: Case) -> Seen:
         seen = peaks(data, seen)
         if not seen.finite:
             break
+    end = start + made * float(model.opt.timestep)
     judgement = judge(observe(model, data, end, seen=seen))
     return Seen(case, judgement, frozenset(touching), constrained, low, high, iterations)

@@ -93,12 +93,21 @@ def _places(numbers: Sequence[int]) -> Places:
     return np.array(numbers, dtype=np.int64)
 
 
-def fits(mapping: Mapping, model: Any) -> bool:
-    """Whether a changed model has just what should be left."""
+def fits(mapping: Mapping, whole: Any, model: Any) -> bool:
+    """Whether a changed model has just what should be left of the whole one, in keyframes too."""
     sizes = (model.nq, model.nv, model.na, model.nu, model.nbody, model.nmocap, model.ngeom)
     left = (mapping.qpos, mapping.dof, mapping.act, mapping.ctrl, mapping.body, mapping.mocap)
     wanted = tuple(len(one) for one in (*left, mapping.geom))
-    return sizes == wanted and model.nsensordata == len(mapping.sensor)
+    if sizes != wanted or model.nsensordata != len(mapping.sensor):
+        return False
+    if model.nkey != whole.nkey:
+        return True
+    return (
+        np.array_equal(model.key_qpos, whole.key_qpos[:, mapping.qpos])
+        and np.array_equal(model.key_qvel, whole.key_qvel[:, mapping.dof])
+        and np.array_equal(model.key_act, whole.key_act[:, mapping.act])
+        and np.array_equal(model.key_ctrl, whole.key_ctrl[:, mapping.ctrl])
+    )
 
 
 def transfer(model: Any, data: Any, mapping: Mapping, other: Any, into: Any) -> None:

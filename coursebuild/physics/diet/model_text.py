@@ -42,11 +42,13 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
     "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
     "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
+    "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
 }
 """Kinds of things that elements become: MuJoCo's number for them, and where it counts them."""
 _BODY_PARTS = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
 _BODY_PARTS |= {"site": "site"}
 _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
+_SECTIONS = frozenset(("sensor", "actuator", "tendon"))
 _TAG = "diet_"
 
 
@@ -62,13 +64,13 @@ class Thing:
 class ModelText:
     """A model and its files."""
 
-    def __init__(self, documents: Sequence[Document], compile: Compile) -> None:
+    def __init__(self, documents: Sequence[Document], compile: Compile, *, check: bool) -> None:
         self.documents = tuple(documents)
         self.main = documents[0]
         self.elements: tuple[Element, ...] = tuple(self.main.root.walk())
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
-        self.model: Any = self._checked()
+        self.model: Any = self._checked() if check else self.compiled()
         self._things: dict[int, Thing] = self._named()
 
     def compiled(self, edits: Iterable[Edit] = ()) -> Any:
@@ -155,13 +157,14 @@ class ModelText:
         return _assigned(wanted, names)
 
 
-def open_model(path: str, read: Read, compile: Compile) -> ModelText:
+def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
     """Read a model and what it includes.
 
     Args:
         path: the model's file, POSIX, from the course's root.
         read: gives the bytes of such a file.
         compile: gives the `mjModel` of a text that would stand there.
+        check: whether its files are those that MuJoCo would include, so that this can be checked.
 
     Raises:
         MarkupError: one of the files is no XML.
@@ -176,7 +179,7 @@ def open_model(path: str, read: Read, compile: Compile) -> ModelText:
         raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
     documents = [main]
     _follow(main, str(PurePosixPath(path).parent), read, documents, 0)
-    return ModelText(documents, compile)
+    return ModelText(documents, compile, check=check)
 
 
 def _follow(
@@ -195,7 +198,7 @@ def _follow(
             if data is not None:
                 break
         else:
-            raise ModelTextError(f"it includes {file}, which was not found")
+            raise ModelTextError(f"it includes {file}, which is not in the course")
         if depth >= _DEEPEST:
             raise ModelTextError("its includes are nested too deeply")
         inner = parse_markup(candidate, data)
@@ -250,11 +253,7 @@ def thing_kind(element: Element) -> str | None:
     above = element.above
     if above is None:
         return None
-    if (
-        above.tag in ("sensor", "actuator")
-        and above.above is not None
-        and above.above.parent is None
-    ):
+    if above.tag in _SECTIONS and above.above is not None and above.above.parent is None:
         return above.tag
     kind = _BODY_PARTS.get(element.tag)
     return kind if kind is not None and above.tag in _HOLDERS else None

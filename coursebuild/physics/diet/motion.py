@@ -22,9 +22,55 @@ _AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_AFFINE)
 
 
 def idle(look: Look) -> Iterator[Candidate]:
-    """Actuators that nobody commands, and fluid that nothing feels."""
+    """Actuators that nobody commands, tendons without a force, fluid that nothing feels."""
     yield from _actuators(look)
+    yield from _tendons(look)
     yield from _fluid(look)
+
+
+def _tendons(look: Look) -> Iterator[Candidate]:
+    """Tendons along which nothing acts, and whose length nobody asks for."""
+    if look.readers.whole("tendon"):
+        return
+    used = {
+        attribute.value
+        for one in look.scene.elements
+        for attribute in one.attributes
+        if attribute.name in _TENDON
+    }
+    items: list[Item] = []
+    for element in look.scene.elements:
+        thing, name = look.scene.ids(element), element.get("name") or ""
+        if thing is None or thing.kind != "tendon" or name in used or look.readers.named(name):
+            continue
+        if all(_slack(look.model, number) for number in thing.ids):
+            items.append(named_item(element))
+    if items:
+        what = "the tendon {}, and nobody reads its length"
+        if len(items) > 1:
+            what = "the tendons {}, and nobody reads their lengths"
+        proof = "it has no stiffness, damping, friction, inertia or limit, and nothing refers to it"
+        yield Candidate("tendon-idle", f"nothing acts along {what}", tuple(items), proof)
+
+
+_TENDON = frozenset(("tendon", "tendon1", "tendon2", "objname", "refname"))
+"""Attributes that may name a tendon."""
+
+
+def _slack(model: Any, number: int) -> bool:
+    """Whether a tendon exerts no force of its own."""
+    return not any(
+        np.any(values[number])
+        for values in (
+            model.tendon_stiffness,
+            model.tendon_stiffnesspoly,
+            model.tendon_damping,
+            model.tendon_dampingpoly,
+            model.tendon_frictionloss,
+            model.tendon_armature,
+            model.tendon_limited,
+        )
+    )
 
 
 def _actuators(look: Look) -> Iterator[Candidate]:
@@ -51,7 +97,8 @@ def _actuators(look: Look) -> Iterator[Candidate]:
         message = said.replace("{}", " {}" if len(free) == 1 else "s {}")
         yield Candidate("actuator-idle", message, tuple(free), proof, blocked=blocked)
     if held:
-        message = said.replace("{}", " {}" if len(held) == 1 else "s {}") + " and no force came"
+        message = said.replace("{}", " {}" if len(held) == 1 else "s {}")
+        message += ", and no force came of " + ("it" if len(held) == 1 else "them")
         yield Candidate("actuator-idle", message, tuple(held), blocked=blocked)
 
 

@@ -1,6 +1,6 @@
 """Where geoms can get, whatever happens: a bound, not an observation.
 
-Entry points: `possible_pairs(model)`, `separate(model, pairs)`, `Reach`.
+Entry points: `possible_pairs(model)`, `each_pair(model)`, `separate(model, pairs)`, `Reach`.
 
 1. MuJoCo looks for contact between geoms whose masks allow it, but not within a body, nor between
    bodies that are welded to each other or do not move, between parent and child, or where an
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import mujoco
@@ -38,13 +38,17 @@ Vector = NDArray[np.float64]
 
 def possible_pairs(model: Any) -> frozenset[Pair]:
     """Pairs of geoms between which MuJoCo would look for contact, were they near each other."""
+    return frozenset(each_pair(model))
+
+
+def each_pair(model: Any) -> Iterator[Pair]:
+    """The same one after the other, as there may be many; some twice."""
     flags = int(model.opt.disableflags)
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     if flags & int(off):
-        return frozenset()
-    found = {
-        _ordered(int(a), int(b)) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
-    }
+        return
+    for first, second in zip(model.pair_geom1, model.pair_geom2, strict=True):
+        yield _ordered(int(first), int(second))
     parents = not flags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
     excluded = {int(one) for one in model.exclude_signature}
     weld = model.body_weldid
@@ -66,8 +70,7 @@ def possible_pairs(model: Any) -> frozenset[Pair]:
             low, high = sorted((int(body[a]), int(body[b])))
             if (low << 16) + high in excluded or (high << 16) + low in excluded:
                 continue
-            found.add((a, b))
-    return frozenset(found)
+            yield a, b
 
 
 def _ordered(a: int, b: int) -> Pair:

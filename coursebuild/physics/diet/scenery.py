@@ -7,9 +7,11 @@ Entry point: `scenery(look)`.
    else about mechanisms rather than single free bodies; else about those that have a name. Where
    all are alike, nothing is known to be beside the point.
 2. What they can touch, by contact in a run, belongs to them, and so on.
-3. A thing is far when it stays farther from them than twice the size of the region that they sweep,
-   and ten times as far as it moves itself. A geom that is fixed to the world is far by a bound, if
-   there is one for all that moves; bodies that move are far in these runs only.
+3. A body that moves is far when it stays clear of all that they can reach, by ten times the way
+   that it goes itself; where there is no bound on that, by twice the size of the region that they
+   sweep. This holds in these runs only.
+4. A geom that is fixed to the world is seen, so it is far only by twice that size. That it cannot
+   be reached is a bound, if there is one for all that moves.
 """
 
 from __future__ import annotations
@@ -31,6 +33,8 @@ Vector = NDArray[np.float64]
 
 REGIONS = 2.0
 """Sizes of the region that what matters sweeps."""
+CLEAR = 0.1
+"""Of the radius of all that what matters can reach: how far out of it a body is at least."""
 MOVES = 10.0
 """Ways that a body goes itself."""
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
@@ -229,33 +233,52 @@ class References:
 
 
 def _bodies(look: Look, trees: _Trees, focus: frozenset[int], region: _Box) -> Iterator[Candidate]:
+    far = _out_of_reach(trees, focus, region)
     items: list[Item] = []
-    nearest, farthest = np.inf, 0.0
-    done: set[int] = set()
+    roots: set[int] = set()
     for element in look.scene.elements:
         thing = look.scene.ids(element)
-        if thing is None or thing.kind != "body" or id(element) in done:
-            continue
-        roots = set(thing.ids)
-        if not roots <= trees.roots or roots & focus:
-            continue
-        distance = region.distance(trees.region(roots))
-        way = max(trees.way(root) for root in roots)
-        if distance < max(REGIONS * region.size, MOVES * way):
-            continue
-        done |= {id(below) for below in element.walk()}
-        nearest, farthest = min(nearest, distance), max(farthest, way)
-        items.append(named_item(element, *trees.references.of([element]).loose))
+        if thing is not None and thing.kind == "body" and far.issuperset(thing.ids):
+            roots |= set(thing.ids)
+            items.append(named_item(element, *trees.references.of([element]).loose))
     if items:
-        what = "the body {} stays" if len(items) == 1 else "the bodies {} stay"
-        message = f"{what} at least {nearest:.3g} m away from what the scene is about"
-        message += (
-            f", and move {farthest:.2g} m" if len(items) > 1 else f", and moves {farthest:.2g} m"
-        )
-        yield Candidate("far-body", message, tuple(items), _FAR, blocked=_numbered(look))
+        nearest = min(region.distance(trees.region([root])) for root in roots)
+        farthest = max(trees.way(root) for root in roots)
+        one = len(items) == 1
+        message = f"the {'body' if one else 'bodies'} {{}} {'stays' if one else 'stay'} at least "
+        message += f"{nearest:.3g} m away from what the scene is about, out of its reach, and "
+        message += f"{'moves' if one else 'move'} {farthest:.2g} m"
+        blocked = _numbered(look)
+        yield Candidate("far-body", message, tuple(items), _FAR, split=False, blocked=blocked)
 
 
 _FAR = "nothing that could touch it comes near in these runs"
+
+
+def _out_of_reach(trees: _Trees, focus: frozenset[int], region: _Box) -> frozenset[int]:
+    """Trees that what the scene is about can never get to, and that do not come to it in a run.
+
+    What touches one that may be reached has a part in it.
+    """
+    model = trees.model
+    ball = moving_ball(model, [g for g in range(model.ngeom) if trees.of_geom[g] in focus])
+    far: set[int] = set()
+    for root in trees.roots - focus:
+        own = trees.region([root])
+        if ball is None:
+            away, least = region.distance(own), REGIONS * region.size
+        else:
+            away, least = own.distance(_Box(ball[0], ball[0])) - ball[1], CLEAR * ball[1]
+        if away > max(least, MOVES * trees.way(root)):
+            far.add(root)
+    size = -1
+    while size != len(far):
+        size = len(far)
+        for a, b in trees.touching:
+            pair = {trees.of_geom[a], trees.of_geom[b]} - {-1}
+            if not pair <= far:
+                far -= pair
+    return frozenset(far)
 
 
 def _numbered(look: Look) -> str:

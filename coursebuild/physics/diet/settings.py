@@ -15,7 +15,7 @@ import mujoco
 
 from coursebuild.physics.diet.candidates import Candidate, Item, Look
 from coursebuild.physics.diet.edits import set_attributes
-from coursebuild.physics.diet.reach import possible_pairs
+from coursebuild.physics.diet.reach import each_pair
 
 _SOLVERS = {0: "PGS", 1: "CG", 2: "Newton"}
 _TOLERANCE = 1e-6
@@ -30,7 +30,7 @@ def settings(look: Look) -> Iterator[Candidate]:
     for other in ("Newton", "CG"):
         if other != solver:
             yield _option("solver", f"the solver {other} does", "solver", other)
-    if possible_pairs(model):
+    if next(each_pair(model), None) is not None:
         elliptic = int(model.opt.cone) == int(mujoco.mjtCone.mjCONE_ELLIPTIC)
         other = "pyramidal" if elliptic else "elliptic"
         yield _option("cone", f"{other} friction cones do", "cone", other)

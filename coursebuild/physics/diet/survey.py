@@ -13,27 +13,25 @@ Entry point: `survey`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from coursebuild.measured.diet import CHANGES, EQUAL, IDENTICAL, UNTOUCHED, Place, Saving, TextEdit
 from coursebuild.measured.diet import Finding as Finding
 from coursebuild.measured.diet import Tried as Tried
-from coursebuild.physics.diet.candidates import Candidate, Item, Look, change
+from coursebuild.physics.diet.candidates import Candidate, Item, Look
 from coursebuild.physics.diet.cases import Case
 from coursebuild.physics.diet.collisions import collisions
-from coursebuild.physics.diet.compare import Comparison, Seen, compare, watch
+from coursebuild.physics.diet.compare import Comparison, Seen, watch
 from coursebuild.physics.diet.edits import Edit
-from coursebuild.physics.diet.mapping import Mapping as Left
-from coursebuild.physics.diet.mapping import fits, mapping_without
 from coursebuild.physics.diet.markup import place_of
 from coursebuild.physics.diet.meshes import meshes
-from coursebuild.physics.diet.model_text import ModelText, saved
+from coursebuild.physics.diet.model_text import ModelText
 from coursebuild.physics.diet.motion import idle
 from coursebuild.physics.diet.readers import Readers
 from coursebuild.physics.diet.scenery import scenery
 from coursebuild.physics.diet.settings import settings
-from coursebuild.physics.diet.timing import Clock, Ratio, time_ratio
+from coursebuild.physics.diet.timing import Clock, Ratio
+from coursebuild.physics.diet.trials import NotTriedError, Trial, Trials
 from coursebuild.physics.diet.unused import unused
 from coursebuild.values import dataclass
 
@@ -76,20 +74,6 @@ class Survey:
     """All that `--fix` changes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Trial:
-    """A changed model, and how it did."""
-
-    edits: tuple[Edit, ...]
-    model: Any
-    left: Left
-    result: Comparison
-
-
-class _NotTriedError(Exception):
-    """A change that makes no model, or one that cannot be compared."""
-
-
 def survey(order: Order) -> Survey:
     """Try everything on a model."""
     return _Surveyor(order).all()
@@ -101,11 +85,13 @@ class _Surveyor:
         self.scene = order.scene
         self.seen = tuple(watch(order.scene.model, case) for case in order.cases)
         self.cases = [one.case for one in self.seen if one.judgement.ok]
+        self.trials = Trials(order.scene, self.cases, order.clock, quick=order.quick)
         self.findings: list[Finding] = []
         self.tried: list[Tried] = []
         self.used: set[str] = set()
         self.fixes: list[Item] = []
         self.faults: list[Item] = []
+        self.fixed_items: list[Item] = []
 
     def all(self) -> Survey:
         """Every candidate, then all of what was found."""
@@ -115,7 +101,7 @@ class _Surveyor:
             self.order.tell(candidate.kind)
             self._judge(candidate)
         fixed, edits = self._together(self.fixes)
-        slim, difference = self._slim()
+        slim, difference = self._slim(fixed)
         stale = [one for one in self.order.keeps if one not in self.used]
         found, tried = tuple(self.findings), tuple(self.tried)
         return Survey(self.seen, found, tried, fixed, slim, difference, tuple(stale), edits)
@@ -153,77 +139,97 @@ class _Surveyor:
         for item in candidate.items:
             by_reason.setdefault(self._reason(candidate.kind, item.name), []).append(item)
         for reason, items in by_reason.items():
-            for part, trial in self._parts(candidate, items):
-                if self._report(candidate, part, trial, reason or ""):
-                    self.used |= {f"{candidate.kind} {item.name}" for item in part}
-                    self.used.add(candidate.kind)
+            if candidate.is_setting:
+                told = self._setting(candidate, items, reason or "")
+                parts = [items] if told else []
+            else:
+                parts = [
+                    part
+                    for part, trial in self._parts(candidate, items)
+                    if self._report(candidate, part, trial, self._timed(candidate, trial), reason)
+                ]
+            for part in parts:
+                self.used |= {candidate.kind, *(f"{candidate.kind} {item.name}" for item in part)}
+
+    def _setting(self, candidate: Candidate, items: Sequence[Item], reason: str) -> bool:
+        """Try a setting that saves time; whether it could be tried."""
+        try:
+            edits, model, left = self.trials.changed(items)
+            ratio = self.trials.ratio(model, left)
+            if ratio is None or not (ratio.certain and ratio.value >= LEAST):
+                self._note(candidate, items, None, "it saves no time")
+                return True
+            trial = Trial(edits, model, left, self.trials.compared(model, left))
+        except NotTriedError as error:
+            self._note(candidate, items, None, str(error))
+            return False
+        return self._report(candidate, items, trial, ratio, reason) or bool(reason)
 
     def _parts(
         self, candidate: Candidate, items: Sequence[Item]
-    ) -> Iterator[tuple[list[Item], _Trial]]:
+    ) -> Iterator[tuple[list[Item], Trial]]:
         """Items that go together, and how it went without them; what cannot be tried is noted."""
         waiting = [list(items)]
-        same: list[Item] = []
-        apart: list[tuple[list[Item], _Trial]] = []
+        same: list[tuple[list[Item], Trial]] = []
+        near: list[tuple[list[Item], Trial]] = []
         while waiting:
             part = waiting.pop()
             try:
-                trial = self._try(part)
-            except _NotTriedError as error:
+                trial = self.trials.run(part)
+            except NotTriedError as error:
                 if len(part) == 1:
                     self._note(candidate, part, None, str(error))
                     continue
             else:
                 if trial.result.identical:
-                    same += part
+                    same.append((part, trial))
                     continue
-                if len(part) == 1 or candidate.is_setting:
-                    apart.append((part, trial))
+                if trial.result.equal and (len(part) == 1 or not candidate.split):
+                    near.append((part, trial))
                     continue
-                if trial.result.equal and not candidate.proof:
-                    apart.append((part, trial))
+                if len(part) == 1:
+                    yield part, trial
                     continue
             half = len(part) // 2
             waiting += [part[half:], part[:half]]
-        if same:
-            try:
-                whole = self._try(same)
-            except _NotTriedError:
-                for item in same:
-                    yield [item], self._try([item])
-            else:
-                yield same, whole
-        yield from _grouped(apart, self._try)
+        yield from self._joined(same, identical=True)
+        yield from self._joined(near, identical=False)
 
-    def _try(self, items: Iterable[Item]) -> _Trial:
-        """The model without these, in all scenarios."""
-        scene = self.scene
-        edits, gone = change(scene, items)
-        left = mapping_without(scene.model, gone)
-        try:
-            model = scene.compiled(edits)
-            if not fits(left, model):
-                raise _NotTriedError("what is left cannot be told from what is gone")
-            result = compare(scene.model, model, left, self.cases)
-        except ValueError as error:
-            raise _NotTriedError(" ".join(str(error).split())) from None
-        return _Trial(edits, model, left, result)
+    def _joined(
+        self, parts: Sequence[tuple[list[Item], Trial]], *, identical: bool
+    ) -> Iterator[tuple[list[Item], Trial]]:
+        """Parts that are alike, as one where that is like them."""
+        if len(parts) > 1:
+            items = [item for part, _ in parts for item in part]
+            try:
+                trial = self.trials.run(items)
+            except NotTriedError:
+                yield from parts
+                return
+            if trial.result.identical if identical else trial.result.equal:
+                yield items, trial
+                return
+        yield from parts
+
+    def _timed(self, candidate: Candidate, trial: Trial) -> Ratio | None:
+        if not candidate.timed or not (trial.result.identical or trial.result.equal):
+            return None
+        return self.trials.ratio(trial.model, trial.left)
 
     def _report(
-        self, candidate: Candidate, items: Sequence[Item], trial: _Trial, reason: str
+        self,
+        candidate: Candidate,
+        items: Sequence[Item],
+        trial: Trial,
+        ratio: Ratio | None,
+        reason: str | None,
     ) -> bool:
         """Note what was found; whether there was anything."""
         label = _label(candidate, trial.result)
         if label == CHANGES:
             self._note(candidate, items, trial.result.difference, "")
             return False
-        ratio = self._time(trial) if candidate.timed else None
-        if candidate.is_setting and not (
-            ratio is not None and ratio.certain and ratio.value >= LEAST
-        ):
-            self._note(candidate, items, trial.result.difference, "", label)
-            return bool(reason)
-        unfixed = self._unfixed(candidate, trial, label, reason)
+        unfixed = self._unfixed(candidate, trial, label, reason or "")
         finding = Finding(
             kind=candidate.kind,
             message=_said(candidate, [item.name for item in items]),
@@ -233,11 +239,11 @@ class _Surveyor:
             scenarios=tuple(case.name for case in self.cases),
             proof=candidate.proof,
             setting=candidate.is_setting,
-            saving=self._saving(trial, ratio),
+            saving=self.trials.saving(trial, ratio),
             edits=self._texts(trial.edits),
             fixable=not unfixed,
             unfixed=unfixed,
-            kept=reason,
+            kept=reason or "",
         )
         self.findings.append(finding)
         if not unfixed:
@@ -246,7 +252,7 @@ class _Surveyor:
             self.faults += items
         return True
 
-    def _unfixed(self, candidate: Candidate, trial: _Trial, label: str, reason: str) -> str:
+    def _unfixed(self, candidate: Candidate, trial: Trial, label: str, reason: str) -> str:
         if reason:
             return "it is kept"
         if candidate.is_setting:
@@ -264,28 +270,11 @@ class _Surveyor:
         items: Sequence[Item],
         difference: float | None,
         why: str,
-        label: str = CHANGES,
     ) -> None:
         finite = difference if difference is not None and math.isfinite(difference) else None
         names = tuple(item.name for item in items)
         message = _said(candidate, names)
-        self.tried.append(Tried(candidate.kind, message, names, label, finite, why))
-
-    def _time(self, trial: _Trial) -> Ratio | None:
-        order = self.order
-        model = self.scene.model
-        return time_ratio(
-            model, trial.model, trial.left, self.cases, order.clock, quick=order.quick
-        )
-
-    def _saving(self, trial: _Trial, ratio: Ratio | None) -> Saving:
-        files = self.scene.files(trial.edits)
-        before = {one.path: len(one.data) for one in self.scene.documents}
-        text = sum(before[path] - len(data) for path, data in files.items())
-        memory = len(saved(self.scene.model)) - len(saved(trial.model))
-        if ratio is None:
-            return Saving(None, None, False, memory, text)
-        return Saving(ratio.value, ratio.spread, ratio.certain, memory, text)
+        self.tried.append(Tried(candidate.kind, message, names, finite, why))
 
     def _place(self, item: Item) -> Place:
         element = item.element
@@ -309,25 +298,30 @@ class _Surveyor:
         left = list(items)
         while left:
             try:
-                trial = self._try(left)
-            except _NotTriedError:
+                trial = self.trials.run(left)
+            except NotTriedError:
                 trial = None
             if trial is not None and trial.result.identical:
-                return self._saving(trial, self._time(trial)), trial.edits
+                self.fixed_items = left
+                return self.trials.saving(
+                    trial, self.trials.ratio(trial.model, trial.left)
+                ), trial.edits
             left.pop()
         return None, ()
 
-    def _slim(self) -> tuple[Saving | None, float | None]:
-        """What everything found saves."""
+    def _slim(self, fixed: Saving | None) -> tuple[Saving | None, float | None]:
+        """What everything found saves; `fixed` is what all that is to be fixed does."""
         if not self.faults:
             return None, None
+        if fixed is not None and {id(i) for i in self.faults} == {id(i) for i in self.fixed_items}:
+            return fixed, 0.0
         try:
-            trial = self._try(self.faults)
-        except _NotTriedError:
+            trial = self.trials.run(self.faults)
+        except NotTriedError:
             return None, None
         difference = trial.result.difference
         finite = difference if math.isfinite(difference) else None
-        return self._saving(trial, self._time(trial)), finite
+        return self.trials.saving(trial, self.trials.ratio(trial.model, trial.left)), finite
 
 
 def _said(candidate: Candidate, names: Sequence[str]) -> str:
@@ -343,21 +337,3 @@ def _label(candidate: Candidate, result: Comparison) -> str:
         certain = candidate.proof or candidate.is_setting
         return IDENTICAL if certain else UNTOUCHED
     return EQUAL if result.equal else CHANGES
-
-
-def _grouped(
-    apart: Sequence[tuple[list[Item], _Trial]], retry: Callable[[Iterable[Item]], _Trial]
-) -> Iterator[tuple[list[Item], _Trial]]:
-    """Parts that were equal within tolerance in one, if they are so together."""
-    equal = [part for part in apart if part[1].result.equal]
-    yield from (part for part in apart if not part[1].result.equal)
-    if len(equal) > 1:
-        items = [item for part, _ in equal for item in part]
-        try:
-            trial = retry(items)
-        except _NotTriedError:
-            trial = None
-        if trial is not None and trial.result.equal:
-            yield items, trial
-            return
-    yield from equal

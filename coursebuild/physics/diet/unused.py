@@ -45,7 +45,10 @@ def _some(kind: str, message: str, items: list[Item], proof: str, what: str) -> 
     if items:
         named = (what if len(items) == 1 else _PLURALS.get(what, f"{what}s")) + " {}"
         timed = what in ("site", "sensor")
-        yield Candidate(kind, message.replace("{}", named), tuple(items), proof, timed=timed)
+        message = message.replace("{}", named)
+        if any(len(item.gone) > 1 for item in items):
+            message += ", but for what is in vain itself"
+        yield Candidate(kind, message, tuple(items), proof, timed=timed)
 
 
 _PLURALS = {"class": "classes", "mesh": "meshes"}

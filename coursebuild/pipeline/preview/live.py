@@ -23,6 +23,7 @@ from typing import TypeAlias
 from coursebuild.checks import Places, check_document, places
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.read import read_sources
+from coursebuild.measured.shown import Reports
 from coursebuild.model import Course, Document, Lesson
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
@@ -38,6 +39,7 @@ from coursebuild.pipeline.preview.differences import (
 from coursebuild.pipeline.preview.memo import Parsing, PerDocument
 from coursebuild.pipeline.preview.pages import Drawn, Pages, draw, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
+from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.frame import Names
@@ -323,19 +325,26 @@ class LiveCourse:
                     self.documents.declarations,
                 )
                 known = places(loaded.course) if loaded.course is not None else None
+                reports = self._reports(loaded.course)
                 self._forget(loaded.course)
                 with self.changed:
                     if edits == self.edits:
-                        return self._adopt(loaded, known)
+                        return self._adopt(loaded, known, reports)
 
-    def _adopt(self, loaded: Loaded, known: Places | None) -> bool:
+    def _reports(self, course: Course | None) -> Parsed[Reports]:
+        """What was recorded and may be shown; of a course that cannot be read, what was before."""
+        return Parsed(self.parts.reports) if course is None else shown_reports(self.root, course)
+
+    def _adopt(self, loaded: Loaded, known: Places | None, reports: Parsed[Reports]) -> bool:
         static: dict[str, tuple[Diagnostic, ...]] = {}
-        for diagnostic in loaded.diagnostics:
+        for diagnostic in (*loaded.diagnostics, *reports.diagnostics):
             path = diagnostic.span.path
             static[path] = (*static.get(path, ()), diagnostic)
         told_before = {path: told for path, told in self._found.items() if told}
         old, new = self.course, loaded.course
-        moved = new is not None and (old is None or not same_course(old, new))
+        measured = reports.value != self.parts.reports
+        self.parts.reports = reports.value
+        moved = new is not None and (old is None or measured or not same_course(old, new))
         if not moved and static == told_before:
             return False
         for path, told in static.items():
@@ -347,7 +356,7 @@ class LiveCourse:
             stale = None
             self._ids = {owner.path: owner.id for owner in owners(new)}
             self._sites = site_paths(new)
-            if old is not None and same_frame(old, new):
+            if old is not None and not measured and same_frame(old, new):
                 pairs = zip(old.documents, new.documents, strict=True)
                 changed = [(one, two) for one, two in pairs if one is not two]
                 stale = self._stale(changed, new, library)

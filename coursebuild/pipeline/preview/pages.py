@@ -53,8 +53,9 @@ class Drawn:
     declarations: frozenset[str]
 
 
-def painters(course: Course, whole: Callable[[Document], Document]) -> dict[str, Painter]:
+def painters(library: Library, whole: Callable[[Document], Document]) -> dict[str, Painter]:
     """How each page is drawn, by its site path, in the order of a build."""
+    course = library.course
     found: dict[str, Painter] = {urls.HOME: pages.home_draft}
     for level in course.levels:
         found[urls.level_path(level)] = functools.partial(_level, level.id)
@@ -62,6 +63,8 @@ def painters(course: Course, whole: Callable[[Document], Document]) -> dict[str,
         found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id, whole)
     for model in course.models:
         found[urls.model_page_path(model.name)] = functools.partial(_model, model)
+    if library.reports.cases:
+        found[urls.NUMERICS] = pages.numerics_draft
     for page in course.pages:
         if page.document is not None:
             found[urls.page_path(page)] = functools.partial(_page, page.id, whole)
@@ -141,7 +144,7 @@ class Pages:
         """Take what the course is now; `stale` are the pages to draw anew, `None` means all."""
         self._library = library
         if stale is None:
-            self._painters = painters(library.course, self._whole)
+            self._painters = painters(library, self._whole)
             self._stale = set(self._painters)
             for gone in (self._drawn.keys() | self._facts.keys()) - self._painters.keys():
                 self._drawn.pop(gone, None)

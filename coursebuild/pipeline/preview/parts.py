@@ -13,6 +13,7 @@ from coursebuild.checks import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.effects.versions import engine_version, python_version
+from coursebuild.measured.shown import Reports
 from coursebuild.model import (
     Course,
     Document,
@@ -79,6 +80,7 @@ class Parts:
         """By path; one counts as long as the script is what was run."""
         self.models: tuple[tuple[str, CompileResult], ...] = ()
         self.labs: tuple[LabResult, ...] = ()
+        self.reports = Reports()
         self._assets = assets
         self._engine = MathEngine()
         self._formulas: dict[Formula, str | MathError] = {}
@@ -114,6 +116,7 @@ class Parts:
             labs=self._labs(course),
             formulas=self._formulas,
             verdicts={place(v.recording): v for v in self.verdicts(course, runs)},
+            reports=self.reports,
         )
 
     def verdicts(self, course: Course, runs: Mapping[str, ScriptRun]) -> tuple[Verdict, ...]:

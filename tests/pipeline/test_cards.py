@@ -1,0 +1,66 @@
+"""What a model is made of, and how fast the browser's engine runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects.machine import machine
+from coursebuild.measured.bench import SceneReport
+from coursebuild.pipeline.cards import with_card
+from coursebuild.pipeline.scenes import find_scenes
+
+BALL = """\
+<mujoco>
+  <include file="parts/floor.xml"/>
+  <worldbody>
+    <body name="ball" pos="0 0 1"><freejoint/><geom size="0.1"/></body>
+  </worldbody>
+  <keyframe><key name="low" qpos="0 0 0.11 1 0 0 0"/></keyframe>
+</mujoco>
+"""
+FLOOR = '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>\n'
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for path, text in (
+        ("content/course.toml", ""),
+        ("models/ball.xml", BALL),
+        ("models/parts/floor.xml", FLOOR),
+    ):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+    return tmp_path
+
+
+def carded(root: Path) -> SceneReport:
+    (scene,) = find_scenes(root, ("ball",)).scenes
+    return with_card(root, scene, SceneReport("ball", scene.digest, False, machine(), ()))
+
+
+def test_a_card(root: Path) -> None:
+    card = carded(root).card
+    assert card is not None
+    assert (card.bodies, card.geoms, card.freedom) == (1, 2, 6)
+    assert (card.possible, card.touched) == (1, 1)
+    assert card.mjcf == len(BALL) + len(FLOOR)
+    assert card.mjb > 2000
+    assert card.browser is not None and card.browser > 0
+
+
+def test_what_touches_depends_on_the_scenarios(root: Path) -> None:
+    text = '[[scenario]]\nname = "high"\nduration = 0.2\n'
+    (root / "models/ball.toml").write_text(text)
+    card = carded(root).card
+    assert card is not None and (card.possible, card.touched) == (1, 0)
+
+
+def test_a_model_that_the_browser_cannot_run_says_so(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("coursebuild.pipeline.cards._WALL", 0.0)
+    card = carded(root).card
+    assert card is not None and card.browser is None
+    assert card.geoms == 2

@@ -1,0 +1,321 @@
+"""`coursebuild diet`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coursebuild.cli import main
+from coursebuild.effects.errors import FileChangedError
+from coursebuild.measured.records import RecordError, decode_diet
+from coursebuild.pipeline import diet_model
+
+ROOT = Path(__file__).parents[2]
+MODEL = """<mujoco>
+  <worldbody>
+    <body name="bob" pos="0 0 1"><joint axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
+  </worldbody>
+  <sensor>
+    <clock name="time"/> <!-- for the plot -->
+  </sensor>
+</mujoco>
+"""
+CLEAN = MODEL.replace('    <clock name="time"/> <!-- for the plot -->\n', "").replace(
+    "  <sensor>\n  </sensor>\n", ""
+)
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    (tmp_path / "content").mkdir()
+    (tmp_path / "content" / "course.toml").write_text("")
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "swing.xml").write_text(MODEL)
+    return tmp_path
+
+
+def run(course: Path, *arguments: str) -> int:
+    return main(["-C", str(course), "diet", "--quick", *arguments])
+
+
+def values(course: Path, capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
+    capsys.readouterr()
+    status = run(course, *arguments, "--format", "json", "-q")
+    out, err = capsys.readouterr()
+    assert err == ""
+    return status, json.loads(out)
+
+
+def test_a_finding_as_text_and_as_json(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course) == 1
+    out, err = capsys.readouterr()
+    assert "  sensor-unread: nobody reads the sensor time\n    bit-identical; " in out
+    assert '    models/swing.xml:6:5\n    - <clock name="time"/>\n' in out
+    assert "1 finding not explained, 1 of them for `coursebuild diet swing --fix`" in out
+    assert "integrator and timestep are judged against a reference" in out
+    assert "swing: looked at after" in err
+    status, value = values(course, capsys)
+    assert status == 1
+    (model,) = value["models"]
+    assert model["model"] == "swing" and model["quick"] and not model["ok"]
+    assert [one["status"] for one in model["scenarios"]] == ["ok"]
+    (finding,) = model["findings"]
+    assert finding["label"] == "bit-identical" and finding["fixable"]
+    assert finding["places"] == [
+        {
+            "name": "time",
+            "element": 'mujoco/sensor/clock[@name="time"]',
+            "path": "models/swing.xml",
+            "line": 6,
+            "column": 5,
+        }
+    ]
+    (edit,) = finding["edits"]
+    assert MODEL[edit["start"] : edit["end"]] == edit["old"] and edit["new"] == ""
+
+
+def test_what_was_found_is_kept(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course) == run(course) == 1
+    assert capsys.readouterr().err.count("looked at after") == 1
+    assert run(course, "--no-cache") == 1
+    assert capsys.readouterr().err.count("looked at after") == 1
+    (course / "models" / "swing.toml").write_text('[[keep]]\nfinding="sensor-unread"\nreason="r"\n')
+    assert run(course) == 0
+    assert capsys.readouterr().err.count("looked at after") == 1
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_fix_changes_only_what_is_in_vain_and_then_nothing(
+    course: Path, capsys: pytest.CaptureFixture[str], newline: str
+) -> None:
+    file = course / "models" / "swing.xml"
+    before = MODEL.replace("\n", newline).encode()
+    file.write_bytes(before)
+    file.chmod(0o640)
+    assert run(course, "--fix") == 0
+    assert "changed models/swing.xml: sensor-unread" in capsys.readouterr().out
+    wanted = MODEL.replace('<clock name="time"/> ', "").replace("\n", newline).encode()
+    assert file.read_bytes() == wanted and file.stat().st_mode & 0o777 == 0o640
+    status = file.stat()
+    assert run(course, "--fix") == 0
+    assert "changed" not in capsys.readouterr().out
+    assert file.stat().st_mtime_ns == status.st_mtime_ns and file.read_bytes() == wanted
+
+
+def test_fix_goes_on_until_nothing_is_left(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The class is of no use when the far body is gone."""
+    file = course / "models" / "swing.xml"
+    file.write_text(
+        CLEAN.replace(
+            "  </worldbody>",
+            '    <body name="far" pos="99 0 1"><freejoint/><geom class="c" size=".1"/></body>\n'
+            "  </worldbody>\n"
+            '  <default><default class="c"><geom rgba="1 0 0 1"/></default></default>',
+        )
+    )
+    assert run(course, "--fix") == 0
+    assert "changed models/swing.xml: far-body, unused-default" in capsys.readouterr().out
+    assert file.read_text() == CLEAN
+
+
+def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    beside = course / "models" / "swing.toml"
+    beside.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
+    assert run(course) == 0
+    out = capsys.readouterr().out
+    assert "    kept: shown in class\n" in out and "nothing in it is in vain" in out
+    assert run(course, "--fix") == 0
+    assert (course / "models" / "swing.xml").read_text() == MODEL
+    beside.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
+    capsys.readouterr()
+    assert run(course) == 1
+    assert "`sensor-unread tim` keeps nothing any more: take the entry out" in " ".join(
+        capsys.readouterr().out.split()
+    )
+    status, value = values(course, capsys)
+    assert status == 1 and value["models"][0]["stale"] == [
+        {"finding": "sensor-unread tim", "path": "models/swing.toml", "line": 2, "column": 11}
+    ]
+
+
+def test_what_a_lesson_reads_is_no_finding(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lessons = course / "content" / "lessons"
+    lessons.mkdir()
+    lesson = lessons / "1.1-a.md"
+    lesson.write_text('A lesson on another model: `data.sensor("time")`.\n')
+    assert run(course) == 1
+    lesson.write_text('```python\nmodel_path("swing"); data.sensor("time")\n```\n')
+    assert run(course) == 0
+    _, value = values(course, capsys)
+    assert value["models"][0]["readers"] == ["content/lessons/1.1-a.md"]
+    # A lab's own code may read for the lesson.
+    lesson.write_text("A lab of `swing`.\n")
+    assert run(course) == 1
+    (course / "content" / "labs").mkdir()
+    (course / "content" / "labs" / "twin.js").write_text("data.sensordata[0]")
+    assert run(course) == 0
+
+
+def test_what_is_measured_is_read_and_what_nobody_begins_with_is_not(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = '  <keyframe><key name="go" qpos="1"/><key name="rest"/></keyframe>\n</mujoco>'
+    (course / "models" / "swing.xml").write_text(MODEL.replace("</mujoco>", keys))
+    beside = course / "models" / "swing.toml"
+    beside.write_text('[[scenario]]\nname = "a"\nkeyframe = "go"\nmeasure = "sensor:time"\n')
+    status, value = values(course, capsys)
+    (finding,) = value["models"][0]["findings"]
+    assert status == 1 and finding["kind"] == "unused-keyframe"
+    assert [place["name"] for place in finding["places"]] == ["rest"]
+    beside.write_text('[[scenario]]\nname = "a"\nkeyframe = 1\nconserved = ["energy"]\n')
+    status, value = values(course, capsys)
+    kinds = {one["kind"]: one for one in value["models"][0]["findings"]}
+    assert set(kinds) == {"unused-keyframe", "sensor-unread"}
+    assert [place["name"] for place in kinds["unused-keyframe"]["places"]] == ["go"]
+
+
+SHARED = "<mujocoinclude>\n  <option/>\n  <sensor>\n    <clock/>\n  </sensor>\n</mujocoinclude>\n"
+
+
+def test_a_file_of_two_models_is_not_changed(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    models = course / "models"
+    (models / "part.xml").write_text(SHARED)
+    text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
+    (models / "swing.xml").write_text(text)
+    assert run(course, "swing", "--fix") == 0
+    assert "<clock/>" not in (models / "part.xml").read_text()
+    (models / "part.xml").write_text(SHARED)
+    (models / "other.xml").write_text(text)
+    capsys.readouterr()
+    assert run(course, "swing", "--fix") == 1
+    out = " ".join(capsys.readouterr().out.split())
+    assert "not for --fix: models/other.xml uses models/part.xml too" in out
+    assert (models / "part.xml").read_text() == SHARED
+
+
+def test_an_included_file_that_no_other_model_has_is_changed(course: Path) -> None:
+    models = course / "models"
+    (models / "part.xml").write_text(SHARED)
+    text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
+    (models / "swing.xml").write_text(text)
+    assert run(course, "--fix") == 0
+    assert (models / "swing.xml").read_text() == text
+    assert (models / "part.xml").read_text() == "<mujocoinclude>\n  <option/>\n</mujocoinclude>\n"
+
+
+def test_a_file_that_somebody_changes_meanwhile_stays_theirs(
+    course: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All files are written, or none: what was written before is put back."""
+    models = course / "models"
+    (models / "part.xml").write_text(SHARED)
+    text = MODEL.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
+    (models / "swing.xml").write_text(text)
+    write = diet_model.write_atomic
+
+    def slow(root: Path, path: str, data: bytes, **given: Any) -> None:
+        if path == "models/swing.xml":
+            assert (models / "part.xml").read_text() != SHARED
+            (models / "swing.xml").write_text(text + "<!-- mine -->")
+        write(root, path, data, **given)
+
+    monkeypatch.setattr(diet_model, "write_atomic", slow)
+    assert run(course, "--fix") == 1
+    out = capsys.readouterr().out
+    assert "error: models/swing.xml was changed in the meantime" in out
+    assert "help: nothing was written; run the command again" in out
+    assert (models / "swing.xml").read_text() == text + "<!-- mine -->"
+    assert (models / "part.xml").read_text() == SHARED
+    assert issubclass(FileChangedError, Exception)
+
+
+def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = course / "content" / "reports" / "swing.diet.json"
+    assert main(["-C", str(course), "diet", "--record"]) == 1
+    assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
+    data = path.read_bytes()
+    report = decode_diet(data)
+    assert report.model == "swing" and [one.kind for one in report.findings] == ["sensor-unread"]
+    assert main(["-C", str(course), "diet", "--record"]) == 1
+    assert "content/reports/swing.diet.json is as it was" in capsys.readouterr().out
+    assert path.read_bytes() == data
+    with pytest.raises(RecordError):
+        decode_diet(data.replace(b'"label"', b'"lable"'))
+    with pytest.raises(RecordError):
+        decode_diet(b"{}")
+
+
+def test_quiet_tells_only_what_is_wrong(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (course / "models" / "clean.xml").write_text(CLEAN)
+    assert run(course, "-q") == 1
+    out, err = capsys.readouterr()
+    assert out.startswith("swing  quick") and "clean" not in out and err == ""
+    assert run(course, "-q", "clean") == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course, "--record") == 2
+    said = "--record takes no --quick: what is recorded is measured in full"
+    assert said in capsys.readouterr().err
+    assert run(course, "swign") == 2
+    assert "no model is called `swign`; did you mean `swing`?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        run(course, "--record", "--fix")
+
+
+def test_a_course_without_models(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(course / "models")
+    assert run(course) == 0
+    assert capsys.readouterr().out == "there is no model to look at\n"
+
+
+def test_a_broken_model_keeps_no_other_from_being_looked_at(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    models = course / "models"
+    (models / "broken.xml").write_text("<mujoco><worldbody><gem/></worldbody></mujoco>")
+    # MuJoCo's own parser takes a bare ampersand.
+    (models / "loose.xml").write_text('<mujoco model="a & b"/>')
+    (models / "swing.toml").write_text('[[scenario]]\nname = "a"\nqpos = [1, 2]\n')
+    (models / "good.xml").write_text(CLEAN)
+    status, value = values(course, capsys)
+    assert status == 1 and [one["model"] for one in value["models"]] == ["good"]
+    said = {one["path"]: one["message"] for one in value["diagnostics"]}
+    assert set(said) == {"models/broken.xml", "models/loose.xml", "models/swing.toml"}
+    assert said["models/loose.xml"] == (
+        "models/loose.xml:1:19 is no XML: not well-formed (invalid token)"
+    )
+    assert said["models/swing.toml"] == "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
+
+
+def test_a_scenario_that_diverges_is_told(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = MODEL.replace("<mujoco>", '<mujoco>\n  <option timestep="0.1"/>')
+    text = text.replace("<joint", '<joint stiffness="1e7"')
+    key = '  <keyframe><key name="go" qpos="1"/></keyframe>\n</mujoco>'
+    (course / "models" / "swing.xml").write_text(text.replace("</mujoco>", key))
+    assert main(["-C", str(course), "diet"]) == 1
+    out = " ".join(capsys.readouterr().out.split())
+    assert (
+        "in no scenario scenario go: diverged: the state is not finite; MuJoCo warned of bad" in out
+    )
+    assert "nothing is claimed from it" in out and "sensor-unread" not in out
+
+
+def test_the_models_of_this_course_pass_their_own_diet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("content", "models"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    status = run(tmp_path)
+    assert status == 0, capsys.readouterr().out

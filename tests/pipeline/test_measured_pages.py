@@ -1,0 +1,237 @@
+"""Recorded reports on the pages of a built site: what fits is shown, and nothing else is drawn."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from coursekit import GOOD, Folder
+from servekit import serving
+
+from coursebuild.effects.versions import engine_version
+from coursebuild.measured.bench import SceneReport
+from coursebuild.measured.records import (
+    STABILITY_PATH,
+    bench_path,
+    diet_path,
+    encode_bench,
+    encode_diet,
+    encode_stability,
+)
+from coursebuild.pipeline.build import prepare
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.scenes import scene_digest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "render"))
+
+from reportkit import box, case, diet, finding
+
+BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
+PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'
+PAGE, NUMERICS = "models/box.html", "numerics/index.html"
+
+
+class Course:
+    """A course with a model that was measured."""
+
+    def __init__(self, folder: Folder) -> None:
+        self.folder = folder
+        folder.write("models/box.xml", BOX)
+        folder.write("models/arm/part.xml", PART)
+        folder.write("models/cup.xml", PART)
+
+    def digest(self) -> str:
+        """Of the model as it is."""
+        course = load(self.folder.root).course
+        assert course is not None
+        model = next(one for one in course.models if one.name == "box")
+        declared = next((one for one in course.declarations if one.model == "box"), None)
+        return scene_digest(self.folder.root, model, declared)
+
+    def bench(self, **other: Any) -> SceneReport:
+        here = replace(box().machine, engine=engine_version())
+        return replace(box(), **{"digest": self.digest(), "machine": here, **other})
+
+    def record(self) -> None:
+        """Put reports into the course."""
+        self.folder.write(bench_path("box"), encode_bench(self.bench()))
+        self.write_diet("nobody reads it")
+        self.write_cases("it swings")
+
+    def write_diet(self, message: str) -> None:
+        report = diet(finding(message=message))
+        here = replace(report.machine, engine=engine_version())
+        report = replace(report, digest=self.digest(), machine=here)
+        self.folder.write(diet_path("box"), encode_diet(report))
+
+    def write_cases(self, note: str) -> None:
+        cases = (case("spring", 5, engine=engine_version(), note=note),)
+        self.folder.write(STABILITY_PATH, encode_stability(cases))
+
+    def build(self, *arguments: str) -> str:
+        """What is wrong, which has to be nothing that keeps the site from being published."""
+        done = self.folder.main("build", "-q", *arguments)
+        assert done.status == 0, done.out
+        return done.out
+
+    def page(self, path: str = PAGE) -> str:
+        return self.folder.text(f"public/{path}")
+
+    def drawn(self) -> set[str]:
+        """The pages that a build draws now."""
+        options = Options(self.folder.root, jobs=1, quiet=True)
+        with prepare(options, Progress(quiet=True)) as prepared:
+            assert prepared.report.ok, prepared.report.diagnostics
+            for file in prepared.files:
+                if file.path.endswith(".html"):
+                    file.make()
+            return set(prepared.drawn)
+
+
+@pytest.fixture
+def course(make: Callable[..., Folder]) -> Course:
+    made = Course(make(GOOD))
+    made.record()
+    return made
+
+
+def test_what_was_recorded_is_shown(course: Course) -> None:
+    assert course.build() == ""
+    page = course.page()
+    assert 'class="work-precision"' in page and "Nobody reads it." in page
+    assert "It swings." in course.page(NUMERICS)
+    assert (course.folder.root / "public/files/reports/box.bench.json").is_file()
+    assert "not measured" in course.page("models/cup.html").lower()
+
+
+def test_a_report_draws_its_page_and_no_other(course: Course) -> None:
+    assert course.drawn() > {PAGE, NUMERICS}
+    assert course.drawn() == set()
+    course.write_diet("it is far away")
+    assert course.drawn() == {PAGE}
+    course.write_cases("it hangs")
+    assert course.drawn() == {NUMERICS}
+    slower = replace(course.bench(), card=None)
+    course.folder.write(bench_path("box"), encode_bench(slower))
+    assert course.drawn() == {PAGE}
+    (course.folder.root / STABILITY_PATH).unlink()
+    assert course.drawn() == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
+
+
+def test_an_incremental_build_gives_what_a_clean_one_gives(
+    course: Course, make: Callable[..., Folder]
+) -> None:
+    course.build()
+    course.write_cases("it hangs")
+    course.write_diet("it is far away")
+    course.build()
+    clean = Course(make(GOOD, name="clean"))
+    for path, data in course.folder.tree("content").items():
+        clean.folder.write(f"content/{path}", data)
+    clean.build()
+    assert clean.folder.tree("public") == course.folder.tree("public")
+
+
+def stale(course: Course) -> str:
+    told = course.build()
+    assert 'class="work-precision"' not in course.page()
+    assert "Not measured." in course.page()
+    return told
+
+
+@pytest.mark.parametrize("path", ["models/box.xml", "models/arm/part.xml"])
+def test_a_model_or_a_part_of_it_that_changed_leaves_its_reports_out(
+    course: Course, path: str
+) -> None:
+    course.build()
+    course.folder.write(
+        path, course.folder.text(path).replace("</mujoco>", "<!-- new --></mujoco>")
+    )
+    told = stale(course)
+    assert told.count("warning[report-stale]") == 2
+    assert "`box`, its files or its scenarios have changed since" in told
+    assert "help: make it again with `coursebuild bench box --record`" in told
+    assert "help: make it again with `coursebuild diet box --record`" in told
+    assert "It swings." in course.page(NUMERICS)
+    course.record()
+    assert course.build() == ""
+    assert 'class="work-precision"' in course.page()
+
+
+def test_scenarios_that_changed_leave_reports_out(course: Course) -> None:
+    course.folder.write("models/box.toml", '[[scenario]]\nname = "fall"\nduration = 1\n')
+    assert "scenarios have changed since" in stale(course)
+
+
+def test_another_version_of_mujoco_leaves_reports_out(course: Course) -> None:
+    machine = replace(course.bench().machine, engine="3.0.0")
+    course.folder.write(bench_path("box"), encode_bench(course.bench(machine=machine)))
+    told = stale(course)
+    installed = engine_version()
+    assert f"it is of MuJoCo 3.0.0, and {installed} is installed" in told
+    cases = (case("spring", 5, engine="3.0.0"),)
+    course.folder.write(STABILITY_PATH, encode_stability(cases))
+    assert stale(course).count("warning[report-stale]") == 2
+    assert not (course.folder.root / "public" / NUMERICS).exists()
+
+
+def test_damaged_reports_keep_nothing_from_being_published(course: Course) -> None:
+    for path in (bench_path("box"), STABILITY_PATH):
+        course.folder.write(path, course.folder.read(path)[:-40])
+    course.folder.write("content/reports/notes.json", "mine")
+    told = stale(course)
+    assert told.count("is damaged: ") == 2
+    assert "notes.json" not in told
+
+
+def test_a_check_tells_it_too_and_can_be_told_to_be_silent(course: Course) -> None:
+    course.folder.write("models/box.xml", BOX.replace("<mujoco>", "<mujoco >"))
+    assert course.folder.main("check", "-q").out.count("warning[report-stale]") == 2
+    text = course.folder.text("content/course.toml")
+    silence = '\n[[silence]]\nrule = "report-stale"\nreason = "measured at night"\n'
+    course.folder.write("content/course.toml", text + silence)
+    assert course.folder.main("check", "-q").out == ""
+
+
+def test_the_preview_follows_a_report(course: Course) -> None:
+    def shown(path: str, text: str) -> bool:
+        until = time.monotonic() + 30
+        while text not in preview.get(path)[2].decode():
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.05)
+        return True
+
+    with serving(course.folder) as preview:
+        assert shown(PAGE, "Nobody reads it.")
+        assert shown(NUMERICS, "It swings.")
+        course.write_diet("it is far away")
+        course.write_cases("it hangs")
+        assert shown(PAGE, "It is far away.")
+        assert shown(NUMERICS, "It hangs.")
+        course.folder.write("models/box.xml", BOX.replace("<mujoco>", "<mujoco >"))
+        assert shown(PAGE, "Not measured.")
+
+
+def test_a_model_with_an_unusual_name(course: Course) -> None:
+    name = "odd & old/it's a <cup> ü"
+    course.folder.write(f"models/{name}.xml", "<mujoco/>\n")
+    found = load(course.folder.root).course
+    assert found is not None
+    model = next(one for one in found.models if one.name == name)
+    digest = scene_digest(course.folder.root, model, None)
+    report = replace(course.bench(), model=name, digest=digest)
+    course.folder.write(bench_path(name), encode_bench(report))
+    assert course.build() == ""
+    page = course.page(f"models/{name}.html")
+    assert "coursebuild bench &#39;odd &amp; old/it&#39;&#34;&#39;" in page
+    assert "reports/odd%20&amp;%20old/" in page or "reports/odd%20%26%20old/" in page
+    course.folder.write(f"models/{name}.xml", "<mujoco></mujoco>\n")
+    assert f"`{name}`, its files or its scenarios have changed since" in course.build()

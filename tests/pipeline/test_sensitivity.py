@@ -1,0 +1,241 @@
+"""`check --sensitivity`, and what `update` says of digits that are noise."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from coursekit import Folder, block
+
+Make = Callable[..., Folder]
+
+DOUBLE = """
+import mujoco
+
+XML = '''
+<mujoco model="double">
+  <option timestep="0.004" integrator="RK4"/>
+  <default><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" contype="0"/></default>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <geom/>
+      <body pos="0 0 -1">
+        <joint axis="0 1 0"/>
+        <geom/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+'''
+model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+data.qpos[:] = 2.0, 0.5
+turns = 0
+while data.time < 30:
+    before = data.qpos[1]
+    mujoco.mj_step(model, data)
+    turns += abs(data.qpos[1]) // 3.14 > abs(before) // 3.14
+    if round(data.time / 0.004) in (250, 7500):
+        print(f"t {data.time:.1f} {data.qpos[0]:.6f} {data.qpos[1]:.4e}")
+print("turns:", turns)
+print("joints:", model.njnt)
+"""
+FALL = """
+import mujoco
+
+BALL = "<body pos='0 0 10'><freejoint/><geom size='.1'/></body>"
+model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>")
+data = mujoco.MjData(model)
+data.qvel[:3] = 3, 0, 4
+while data.time < 0.9999:
+    mujoco.mj_step(model, data)
+print(f"x {data.qpos[0]:.9f} m, z {data.qpos[2]:.4e} m, bodies {model.nbody}")
+"""
+LIMIT = """
+import mujoco
+
+BALL = "<body><joint type='slide' axis='1 0 0'/><geom size='.1'/></body>"
+model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>")
+data = mujoco.MjData(model)
+data.qpos[0] = 0.75
+mujoco.mj_forward(model, data)
+print("right" if data.qpos[0] == 0.75 else "left or right")
+"""
+PLAIN = "print('nothing moves', 1.5)\n"
+
+
+def recorded(make: Make, *scripts: str, how: str = "") -> Folder:
+    """A course whose recorded outputs are as the scripts print them."""
+    blocks = [block(f"{'abcd'[i]}.py", code, "?", how) for i, code in enumerate(scripts)]
+    folder = make("## One\n\n" + "".join(blocks))
+    folder.main("update", "--quiet")
+    return folder
+
+
+def measured(folder: Folder, *arguments: str) -> dict[str, Any]:
+    report = json.loads(folder.main("check", "--sensitivity", "--format", "json", *arguments).out)
+    assert report["summary"]["errors"] == 0, report["diagnostics"]
+    return {one["path"]: one for one in report["sensitivity"]} | {
+        "rules": [each["rule"] for each in report["diagnostics"]]
+    }
+
+
+def test_a_double_pendulum_is_chaotic_and_keeps_its_first_digits(make: Make) -> None:
+    folder = recorded(make, DOUBLE)
+    found = measured(folder)
+    script = found["examples/a.py"]
+    assert script["chaotic"]
+    assert script["amplification"] > 1e10
+    assert script["numbers"] == 8
+    lines = folder.text(folder.lesson()).splitlines()
+    first = next(i for i, line in enumerate(lines, 1) if line.startswith("t 1.0 "))
+    doubted = {(one["line"] - first, one["column"]): one["trusted"] for one in script["doubts"]}
+    rows = {line for line, _ in doubted}
+    assert 0 not in rows, "after a second all holds"
+    assert set(doubted.values()) <= {0, 1}
+    assert (1, 3) not in doubted, "the time is exact"
+    assert (1, 8) in doubted, "after thirty seconds nothing holds"
+    assert 3 not in rows, "the number of joints is exact"
+    assert found["rules"] == ["output-noise"]
+
+
+def test_a_projectile_holds_in_all_digits(make: Make) -> None:
+    found = measured(recorded(make, FALL))
+    script = found["examples/a.py"]
+    assert (script["status"], script["numbers"], script["doubts"]) == ("measured", 3, [])
+    assert not script["chaotic"]
+    assert found["rules"] == []
+
+
+def test_a_script_at_a_border_prints_other_words(make: Make) -> None:
+    found = measured(recorded(make, LIMIT))
+    [flip] = found["examples/a.py"]["flips"]
+    assert (flip["printed"], flip["other"]) == ("", "left or ")
+    assert found["rules"] == ["output-noise"]
+
+
+def test_a_script_without_mujoco_says_so_and_does_not_run_again(make: Make) -> None:
+    folder = recorded(make, PLAIN)
+    done = folder.main("check", "--sensitivity")
+    assert done.status == 0
+    assert "not asked examples/a.py  it does not use MuJoCo" in done.out
+    assert "moving initial states" not in done.err
+
+
+def test_what_is_allowed_for_is_told_and_not_warned_of(make: Make) -> None:
+    folder = recorded(make, DOUBLE, how="rtol=10 atol=100")
+    found = measured(folder)
+    doubts = found["examples/a.py"]["doubts"]
+    assert doubts
+    assert not any(doubt["compared"] for doubt in doubts)
+    assert found["rules"] == []
+    assert "(allowed for)" in folder.main("check", "--sensitivity").out
+
+
+def test_the_report_as_text(make: Make) -> None:
+    done = recorded(make, FALL, PLAIN).main("check", "--sensitivity")
+    said = done.out[done.out.index("digits that hold") :].splitlines()
+    assert said[0] == "digits that hold when initial states are moved by 1e-12 (relative):"
+    assert said[1].startswith("all       examples/a.py  3 numbers in full, states end ")
+    assert said[1].endswith(" times as far apart as they began")
+    assert said[2] == "not asked examples/b.py  it does not use MuJoCo"
+
+
+def test_runs_with_moved_states_are_remembered(make: Make) -> None:
+    folder = recorded(make, FALL)
+    folder.replace(folder.lesson(), "< 0.9999", "< 0.9998")
+    assert "moving initial states, 4 of 4" in folder.main("check", "--sensitivity").err
+    again = folder.main("check", "--sensitivity")
+    assert "moving initial states" not in again.err
+    assert "3 numbers in full" in again.out
+    fresh = folder.main("check", "--sensitivity", "--no-cache")
+    assert "moving initial states, 4 of 4" in fresh.err
+
+
+def test_what_is_known_of_the_run_itself_stays(make: Make) -> None:
+    folder = make("## One\n\n" + block("a.py", PLAIN, "nothing moves 1.5") + block("b.py", FALL))
+    folder.main("check")
+    before = folder.main("explain", "examples/b.py").out
+    folder.replace(folder.lesson(), "bodies {model.nbody}", "{model.nbody} bodies")
+    folder.main("update")
+    folder.main("check", "--sensitivity")
+    folder.replace(folder.lesson(), "{model.nbody} bodies", "bodies {model.nbody}")
+    assert folder.main("explain", "examples/b.py").out == before
+
+
+def test_an_output_that_drifted_is_not_asked(make: Make) -> None:
+    folder = recorded(make, FALL)
+    folder.replace(folder.lesson(), "bodies 2\n```", "bodies 3\n```")
+    report = json.loads(folder.main("check", "--sensitivity", "--format", "json").out)
+    assert [one["status"] for one in report["sensitivity"]] == ["drifted"]
+
+
+def test_only_the_lessons_that_are_named(make: Make) -> None:
+    folder = make(
+        "## One\n\n" + block("a.py", PLAIN, "nothing moves 1.5"),
+        "## Two\n\n" + block("b.py", LIMIT, "?"),
+    )
+    folder.main("update", "-q")
+    found = measured(folder, "1.1")
+    assert set(found) == {"examples/a.py", "rules"}
+    assert found["rules"] == []
+
+
+@pytest.mark.parametrize("form", ["junit", "sarif", "github"])
+def test_other_forms_have_the_warning(make: Make, form: str) -> None:
+    folder = recorded(make, LIMIT)
+    assert "output-noise" in folder.main("check", "--sensitivity", "--format", form).out
+
+
+def test_a_warning_may_be_silenced(make: Make) -> None:
+    folder = recorded(make, LIMIT)
+    silence = '\n[[silence]]\nrule = "output-noise"\nreason = "the lesson is about borders"\n'
+    folder.write("content/course.toml", folder.text("content/course.toml") + silence)
+    assert measured(folder)["rules"] == []
+
+
+def test_a_check_without_it_says_nothing_of_it(make: Make) -> None:
+    folder = recorded(make, LIMIT)
+    report = json.loads(folder.main("check", "--format", "json").out)
+    assert "sensitivity" not in report
+    assert report["diagnostics"] == []
+
+
+def test_not_together_with_another_version(make: Make) -> None:
+    done = make("## One\n").main("check", "--sensitivity", "--against", "3.13.0")
+    assert done.status == 2
+    assert "--sensitivity" in done.err
+
+
+# --- update
+
+
+def test_update_warns_of_noise_that_it_records(make: Make) -> None:
+    folder = make("## One\n\n" + block("a.py", DOUBLE, "?") + block("b.py", FALL, "?"))
+    done = folder.main("update")
+    assert done.status == 0
+    assert done.out.count("warning[output-noise]") == 1
+    assert "`examples/a.py` prints digits that are noise" in done.out
+    place = done.out[done.out.index("--> ") :].split()[1]
+    line = folder.text(folder.lesson()).splitlines()[int(place.split(":")[1]) - 1]
+    assert line.startswith("t 30.0 "), "the place is that in the lesson as it is now"
+
+
+def test_update_asks_only_where_it_writes(make: Make) -> None:
+    folder = recorded(make, LIMIT, FALL)
+    folder.replace(folder.lesson(), 'print(f"x ', 'print(f"x = ')
+    done = folder.main("update")
+    assert done.status == 0
+    assert "output-noise" not in done.out
+    assert "moving initial states, 1 of 4 (1)" in done.err
+    done = folder.main("update")
+    assert "moving initial states" not in done.err
+    assert "every recorded output is up to date" in done.out
+
+
+def test_a_dry_run_asks_nothing(make: Make) -> None:
+    folder = make("## One\n\n" + block("a.py", LIMIT, "?"))
+    assert "moving initial states" not in folder.main("update", "--dry-run").err

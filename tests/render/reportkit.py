@@ -1,0 +1,122 @@
+"""Reports that nobody measured, on the model `box` and two hard cases."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "measured"))
+
+from benchkit import MACHINE, awkward, scene, swing
+
+from coursebuild.measured.bench import SceneCard, SceneReport
+from coursebuild.measured.cases import (
+    BoundaryLine,
+    CaseReport,
+    ErrorLine,
+    FigureLine,
+    OrderLine,
+    ReferenceLine,
+)
+from coursebuild.measured.diet import (
+    DietReport,
+    DietScenario,
+    Finding,
+    Place,
+    Saving,
+)
+from coursebuild.measured.shown import Reports
+
+CARD = SceneCard(
+    bodies=3, geoms=5, freedom=6, possible=7, touched=2, mjcf=12_345, mjb=98_765_432, browser=151.0
+)
+
+
+def box(card: SceneCard | None = CARD) -> SceneReport:
+    return scene(swing(), replace(awkward(), name="awkward"), model="box", card=card)
+
+
+def finding(kind: str = "sensor-unread", **other: object) -> Finding:
+    fields: dict[str, object] = {
+        "kind": kind,
+        "message": "nobody reads <this> sensor",
+        "places": (Place("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
+        "label": "bit-identical",
+        "difference": 0.0,
+        "scenarios": ("swing",),
+        "proof": "its value goes nowhere",
+        "setting": False,
+        "saving": Saving(1.07, 0.01, True, 120, 40),
+        "edits": (),
+        "fixable": True,
+        "unfixed": "",
+        "kept": "",
+        **other,
+    }
+    return Finding(**fields)  # type: ignore[arg-type]
+
+
+def diet(*findings: Finding) -> DietReport:
+    return DietReport(
+        model="box",
+        digest="0" * 64,
+        quick=False,
+        machine=MACHINE,
+        readers=(),
+        scenarios=(DietScenario("swing", 500, "ok", ()),),
+        findings=findings,
+        tried=(),
+        fixed=None,
+        slim=None,
+        slim_difference=None,
+        stale=(),
+    )
+
+
+def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
+    fields: dict[str, object] = {
+        "name": name,
+        "title": f"A <{name}>",
+        "case": number,
+        "engine": "3.14.0",
+        "note": "it swings",
+        "reference": ReferenceLine("closed", "the oscillator", 1e-13, "Bulirsch–Stoer", 3.9e-13),
+        "boundaries": (
+            BoundaryLine(
+                "Euler", 0.2, 0.2001, "2/ω", -5e-4, True, (), "diverged", 1.5, (1e-3, 1.0)
+            ),
+            BoundaryLine(
+                "RK4", 0.28, None, "", None, False, (0.3, 0.31), "slow-growth", None, (1e-3, 1)
+            ),
+            BoundaryLine("implicit", None, None, "", None, True, (), "", None, (1e-3, 1.0)),
+            BoundaryLine("discrete", None, None, "", None, True, (), "", None, (1e-3, 1.0)),
+        ),
+        "figures": (
+            FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),
+            FigureLine("period", "s", "RK4", 6.283, 6.2831853, "2π√(m/k)"),
+            FigureLine("energy", "", "RK4", -4.1e-10, 0.0, ""),
+            FigureLine("energy", "", "Euler", None, None, ""),
+        ),
+        "orders": (OrderLine("Euler", 1.0, None, None), OrderLine("discrete", None, None, None)),
+        "errors": (
+            ErrorLine(
+                "Euler", 0.01, "ok", (), (1.5e-3, 1e-3), None, (2e-3, 1e-3), None, None, 0.0, False
+            ),
+            ErrorLine(
+                "Euler", 0.5, "diverged", ("1e9 rad/s",), None, None, None, None, None, 0.0, True
+            ),
+        ),
+        **other,
+    }
+    return CaseReport(**fields)  # type: ignore[arg-type]
+
+
+def reports() -> Reports:
+    """All of it."""
+    kept = finding("geom-far", kept="it is the horizon", proof="", label="equal within tolerance")
+    return Reports(
+        {"box": box()},
+        {"box": diet(finding(), kept)},
+        (case("spring", 5), case("other", 5, reference=None, note=""), case("top", 3, errors=())),
+    )

@@ -1,0 +1,155 @@
+"""The scene diet as text."""
+
+from __future__ import annotations
+
+import json
+
+from coursebuild.measured.bench import Machine
+from coursebuild.measured.diet import (
+    EQUAL,
+    IDENTICAL,
+    UNTOUCHED,
+    DietReport,
+    DietScenario,
+    Finding,
+    Place,
+    Saving,
+    StaleKeep,
+    TextEdit,
+    Tried,
+)
+from coursebuild.measured.records import Failure, decode_diet, encode_diet
+from coursebuild.report.diet import diet_report, diet_text, diet_values
+from coursebuild.report.text import Style
+from coursebuild.values import replace
+
+PLACE = Place("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
+EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
+SURE = Saving(2.2, 0.01, True, 1234, 30)
+FINDING = Finding(
+    kind="sensor-unread",
+    message="nobody reads the sensor gyro",
+    places=(PLACE,),
+    label=IDENTICAL,
+    difference=0.0,
+    scenarios=("go",),
+    proof="what a sensor says changes nothing that moves",
+    setting=False,
+    saving=SURE,
+    edits=(EDIT,),
+    fixable=True,
+    unfixed="",
+    kept="",
+)
+MACHINE = Machine("3.14.0", "3.11.7", "2.4.6", "Linux x86_64", "")
+REPORT = DietReport(
+    model="arm",
+    digest="d",
+    quick=False,
+    machine=MACHINE,
+    readers=(),
+    scenarios=(DietScenario("go", 100, "ok", ()),),
+    findings=(FINDING,),
+    tried=(),
+    fixed=SURE,
+    slim=SURE,
+    slim_difference=0.0,
+    stale=(),
+)
+
+
+def lines(report: DietReport, width: int = 100) -> list[str]:
+    return diet_text([report], Style(width=width)).splitlines()
+
+
+def test_a_finding() -> None:
+    assert lines(REPORT, 90) == [
+        "arm",
+        "  in go",
+        "",
+        "  sensor-unread: nobody reads the sensor gyro",
+        "    bit-identical; ×2.2 as fast, 1,234 bytes of memory fewer, 30 bytes of text fewer",
+        "    because what a sensor says changes nothing that moves",
+        "    models/arm.xml:9:1",
+        "    - <gyro",
+        '    - name="gyro"/>',
+        "",
+        "  1 finding not explained, 1 of them for `coursebuild diet arm --fix`",
+        "",
+        "integrator and timestep are judged against a reference, not against the model as it is:",
+        "  see `coursebuild bench`",
+    ]
+
+
+def test_what_is_told_of_savings() -> None:
+    none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
+    assert "    bit-identical; saves nothing that is measured" in lines(
+        replace(REPORT, findings=(none,))
+    )
+    more = replace(FINDING, label=EQUAL, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
+    text = "    equal within tolerance (3.0e-12); no time that can be told, 5 bytes of memory more"
+    assert text in lines(replace(REPORT, findings=(more,)))
+
+
+def test_what_is_kept_lost_or_kept_for_nothing() -> None:
+    report = replace(
+        REPORT,
+        findings=(replace(FINDING, kept="shown in class", fixable=False, unfixed="it is kept"),),
+        fixed=None,
+        slim=None,
+        scenarios=(DietScenario("go", 9, "reset", ("the clock says 0 s",)),),
+        stale=(StaleKeep("unused-site", "models/arm.toml", 3, 11),),
+    )
+    told = lines(report)
+    assert "  in no scenario" in told and "    kept: shown in class" in told
+    assert "  scenario go: reset: the clock says 0 s; nothing is claimed from it" in told
+    assert any("`unused-site` keeps nothing any more" in line for line in told)
+    assert not report.ok and "- <gyro" not in "\n".join(told)
+    good = replace(report, scenarios=REPORT.scenarios, stale=())
+    assert good.ok and "  nothing in it is in vain" in lines(good)
+
+
+def test_what_is_no_fault() -> None:
+    for finding in (
+        replace(FINDING, label=UNTOUCHED),
+        replace(FINDING, setting=True),
+        replace(FINDING, kept="a reason"),
+    ):
+        assert replace(REPORT, findings=(finding,)).ok
+    assert not replace(REPORT, findings=(replace(FINDING, label=EQUAL),)).ok
+
+
+def test_what_was_tried_and_many_changes() -> None:
+    tried = (
+        Tried("cone", "…", ("elliptic",), 1e-3, ""),
+        Tried("solver", "…", ("CG",), None, "it saves no time"),
+        Tried("sleep", "…", ("sleep",), None, "it saves no time"),
+    )
+    many = replace(FINDING, edits=(EDIT,) * 9, unfixed="models/b.xml uses models/arm.xml too")
+    told = lines(replace(REPORT, tried=tried, findings=(many,)))
+    assert "  tried and needed: cone" in told
+    assert "  not found, because it saves no time: solver, sleep" in told
+    assert "    … and 3 more changes" in told
+    assert "    not for --fix: models/b.xml uses models/arm.xml too" in told
+
+
+def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
+    odd = replace(FINDING, message="nobody reads \x1b[2J " + "word " * 40)
+    told = lines(replace(REPORT, findings=(odd,)), width=60)
+    assert not any("\x1b" in line for line in told)
+    assert all(len(line) <= 60 for line in told if "models/" not in line)
+
+
+def test_json_and_record_hold_everything() -> None:
+    value = json.loads(diet_values([REPORT], [], [Failure("no", "yes")], ["said"]))
+    assert value["models"][0]["findings"][0]["edits"][0]["old"] == EDIT.old
+    assert value["failures"] == [{"message": "no", "help": "yes"}] and value["remarks"] == ["said"]
+    assert value["models"][0]["ok"] is False
+    assert decode_diet(encode_diet(REPORT)) == REPORT
+    assert encode_diet(REPORT) == encode_diet(decode_diet(encode_diet(REPORT)))
+
+
+def test_nothing_at_all() -> None:
+    assert diet_report([], [], [], [], Style()) == "there is no model to look at\n"
+    failed = diet_report([], [], [Failure("models/a.xml was changed in the meantime")], [], Style())
+    assert failed == "error: models/a.xml was changed in the meantime\n"
