@@ -163,6 +163,31 @@ class Excerpt:
     text: str
     pieces: tuple[tuple[int, int], ...] = field(repr=False)
     """(offset in the text, offset in the source), growing; the first is at text offset 0."""
+    _read: Callable[[], Excerpt] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """Gives the excerpt with its text, where that is away."""
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it is read each time."""
+        return self._read is not None
+
+    @classmethod
+    def away(cls, source: Source, read: Callable[[], Excerpt]) -> Excerpt:
+        """An excerpt that is read each time it is asked for; it must be the same each time."""
+        excerpt = object.__new__(cls)
+        object.__setattr__(excerpt, "source", source)
+        object.__setattr__(excerpt, "_read", read)
+        return excerpt
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """What is away: its slot is empty."""
+            if name in ("text", "pieces"):
+                return getattr(self._read(), name)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @classmethod
     def of_lines(cls, source: Source, lines: Iterable[tuple[str, int]]) -> Excerpt:

@@ -55,9 +55,8 @@ class Waiting:
         """The spec that the other finders find."""
         if name != "mujoco":
             return None
-        sys.meta_path.remove(self)
         for finder in sys.meta_path:
-            spec = finder.find_spec(name, path, target)
+            spec = None if finder is self else finder.find_spec(name, path, target)
             if spec is not None:
                 if spec.loader is not None:
                     spec.loader = _Loader(spec.loader, self)  # type: ignore[assignment]
@@ -66,6 +65,8 @@ class Waiting:
 
     def wrap(self, mujoco: ModuleType) -> None:
         """Let it be watched."""
+        if self in sys.meta_path:
+            sys.meta_path.remove(self)
         mujoco_tracing.wrap(mujoco, sys.modules["re"])
         mujoco_watching.watch(mujoco)
         if self._perturbation:

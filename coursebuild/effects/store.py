@@ -168,18 +168,18 @@ class Store:
     # --- here
 
     def _load_here(self, name: str) -> bytes | None:
-        path = self.folder / name
+        path = f"{self.folder}/{name}"
         try:
-            entry = path.read_bytes()
+            entry, changed = _read(path)
         except OSError:
             return None
         data = unsealed(name, entry)
         if data is None:
             with contextlib.suppress(OSError):
-                path.unlink()
+                os.unlink(path)  # noqa: PTH108
             self.say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
             return None
-        _note_use(path)
+        _note_use(path, changed)
         return data
 
     def _write_here(self, name: str, entry: bytes) -> None:
@@ -237,10 +237,23 @@ def _write(path: Path, data: bytes) -> None:
         raise
 
 
-def _note_use(path: Path) -> None:
+def _read(path: str) -> tuple[bytes, float]:
+    """A file's bytes, and when it was changed; there are many, and most are small."""
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        status = os.fstat(fd)
+        data = os.read(fd, status.st_size + 1)
+        while len(data) != status.st_size and (more := os.read(fd, 1 << 20)):
+            data += more
+    finally:
+        os.close(fd)
+    return data, status.st_mtime
+
+
+def _note_use(path: str, changed: float) -> None:
     """What was used lately stays; its time of change says when that was."""
-    with contextlib.suppress(OSError):
-        if time.time() - path.stat().st_mtime > _USED:
+    if time.time() - changed > _USED:
+        with contextlib.suppress(OSError):
             os.utime(path)
 
 

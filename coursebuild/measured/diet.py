@@ -94,11 +94,14 @@ class Finding:
     """Why it does not; empty where it does."""
     kept: str
     """The reason for which it stays; empty where there is none."""
+    doubt: str = ""
+    """Who may need it all the same; empty where nobody does."""
 
     @property
     def counts(self) -> bool:
         """Whether it is a fault of the model: nothing explains it."""
-        return not self.kept and not self.setting and self.label in (IDENTICAL, EQUAL)
+        excused = self.kept or self.setting or self.doubt
+        return not excused and self.label in (IDENTICAL, EQUAL)
 
 
 @dataclass(frozen=True, slots=True)

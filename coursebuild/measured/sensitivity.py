@@ -24,7 +24,7 @@ class Standing(enum.Enum):
     """Whether anything could be said of a script."""
 
     MEASURED = "measured"
-    NO_MUJOCO = "no-mujoco"
+    NO_MUJOCO = "without-mujoco"
     """It does not import MuJoCo."""
     NOT_MOVED = "not-moved"
     """MuJoCo computes nothing in it from an initial state that could be moved."""

@@ -1,11 +1,14 @@
 """Walking a document: every block and every inline in order.
 
-Entry points: `document_blocks`, `document_inlines`, `walk_blocks`, `walk_inlines`.
+Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_blocks` and
+`walk_inlines`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
+from itertools import islice
 
 from coursebuild.model.blocks import (
     Block,
@@ -18,6 +21,7 @@ from coursebuild.model.blocks import (
     ListBlock,
     Paragraph,
     Recording,
+    Script,
     Table,
 )
 from coursebuild.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong
@@ -29,6 +33,8 @@ from coursebuild.model.interactive import (
     OrderQuestion,
     Quiz,
 )
+from coursebuild.source import Excerpt
+from coursebuild.values import replace
 
 _HOLDERS = (BlockQuote, Callout, ListBlock, Lab, Quiz, Recording)
 """Blocks that may have others in them."""
@@ -107,6 +113,23 @@ def document_blocks(document: Document) -> Iterator[Block]:
         for footnote in document.footnotes:
             known += walk_blocks(footnote.blocks)
     return iter(known)
+
+
+def document_scripts(document: Document) -> tuple[Script, ...]:
+    """The complete scripts of a document; where its blocks are away, so is the code of these."""
+    if not document.is_away:
+        return tuple(block for block in document_blocks(document) if isinstance(block, Script))
+    return tuple(
+        replace(block, code=Excerpt.away(document.source, partial(_code, document, number)))
+        for number, block in enumerate(document_blocks(document))
+        if isinstance(block, Script)
+    )
+
+
+def _code(document: Document, number: int) -> Excerpt:
+    block = next(islice(document_blocks(document), number, None))
+    assert isinstance(block, Script)
+    return block.code
 
 
 def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:

@@ -33,6 +33,10 @@ ROOM = 10.0
 many extents (or radians) beyond."""
 
 
+_SELDOM = 8
+"""Steps from one look at how large the state is to the next."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bounded:
     """A scenario, and the most that can be in it: a `Setup`."""
@@ -79,7 +83,7 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     data, twin = begun(open_end, own), begun(open_end, own)
     _nudge(own, twin)
     look = _Look(own)
-    seen = look(data, peaks(data, Peaks()))
+    seen = peaks(data, Peaks())
     times = scene.scenario.times
     every = whole_number(scene.scenario.sample, step, "the sampling interval", "the timestep")
     holds, gaps = held(open_end), np.full(len(times), np.nan)
@@ -87,9 +91,11 @@ def pilot(model: Any, scene: Scene) -> Pilot:
         if scene.scenario.controls:
             rows = scene.scenario.controls
             data.ctrl[:] = twin.ctrl[:] = rows[min(index // holds, len(rows) - 1)]
-        for _ in range(every):
+        for step_number in range(every):
             advance(own, data)
-            seen = look(data, seen)
+            look(data)
+            if step_number % _SELDOM == 0 or step_number == every - 1:
+                seen = peaks(data, seen)
         if not seen.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         if index == 0 or gaps[index - 1] < APART:
@@ -136,14 +142,13 @@ class _Look:
         self.contact = self.limit = self.constrained = False
         self.friction = False
 
-    def __call__(self, data: Any, seen: Peaks) -> Peaks:
-        """The most that was seen."""
+    def __call__(self, data: Any) -> None:
+        """See what acts."""
         if data.nefc:
             self.constrained = True
             self.limit = self.limit or data.nl > 0
             self.friction = self.friction or data.nf > 0
         self.contact = self.contact or data.ncon > 0
-        return peaks(data, seen)
 
     def jumps(self, model: Any) -> tuple[str, ...]:
         """What makes accelerations jump."""

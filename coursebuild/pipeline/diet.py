@@ -155,9 +155,12 @@ class _Run:
     def _one(self, scene: Scene, fix: bool) -> DietReport | None:
         look = DietModel(self.root, self.files, scene)
         key = self._key(look)
+        kept = self._kept(key, fix)
+        if kept is not None:
+            return kept
         with project_lock(self.root, self.progress.say, name=_LOCK):
-            kept = self._kept(key)
-            if kept is not None and not (fix and any(one.fixable for one in kept.findings)):
+            kept = self._kept(key, fix)  # somebody else may have looked while we waited
+            if kept is not None:
                 return kept
             self.progress.started(scene.name)
             began = time.monotonic()
@@ -167,7 +170,12 @@ class _Run:
                 self.diagnostics.append(error.diagnostic)
                 self.progress.finished(scene.name, "not looked at", time.monotonic() - began)
                 return None
-            if not look.changed:
+            if report is None:
+                self.progress.finished(scene.name, "not changed", time.monotonic() - began)
+                return None
+            report = replace(report, digest=look.digest())
+            # Somebody else may have changed the files while we waited.
+            if report.digest == scene.digest:
                 self.options.store.keep(_KIND, key, msgspec.json.encode(report), local=True)
             self.progress.finished(scene.name, "looked at", time.monotonic() - began)
             return report
@@ -177,8 +185,11 @@ class _Run:
         survey, text = look.survey(quick=self.quick, tell=tell)
         return look.report(survey, self.here, quick=self.quick), survey, text
 
-    def _fixed(self, look: DietModel) -> DietReport:
-        """Change, look again, and write when nothing is left to change."""
+    def _fixed(self, look: DietModel) -> DietReport | None:
+        """Change, look again, and write when nothing is left to change.
+
+        `None` where it could not be written; why is told.
+        """
         kinds: dict[str, list[str]] = {}
         for _ in range(_ROUNDS):
             report, survey, text = self._surveyed(look)
@@ -193,26 +204,31 @@ class _Run:
             look.write()
         except EffectError as error:
             self.failures.append(Failure(error.message, error.help))
-            return report
+            return None
         for path in sorted(look.changed):
             self.fixed.append(Fixed(path, tuple(dict.fromkeys(kinds.get(path, ())))))
-        return replace(report, digest=look.digest())
+        return report
 
     def _key(self, look: DietModel) -> str:
         parts = [look.scene.name, look.scene.digest, f"{self.quick}", self.code]
         here = self.here
         parts += [here.engine, here.python, here.numpy, here.system, here.cpu]
-        parts += [f"{key}\0{reason}" for key, reason in look.keeps.items()]
+        declared = look.scene.declared
+        for one in () if declared is None else declared.keep:
+            place = one.finding_span
+            parts.append(f"{one.finding}\0{one.reason}\0{place.line}:{place.column}")
         parts += [f"{path}\0{why}" for path, why in look.locked.items()]
-        parts += [f"{one.path}\0{one.text}" for one in look.readers.files]
+        parts += [f"{reader.path}\0{reader.text}" for reader in look.readers.files]
         text = "\0\0".join(parts)
         return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
-    def _kept(self, key: str) -> DietReport | None:
+    def _kept(self, key: str, fix: bool) -> DietReport | None:
+        """What was found before, if there is nothing in it to fix where that is wanted."""
         data = self.options.store.load(_KIND, key)
         if data is None:
             return None
         try:
-            return msgspec.json.decode(data, type=DietReport)
+            kept = msgspec.json.decode(data, type=DietReport)
         except msgspec.DecodeError:  # by another version of this code
             return None
+        return None if fix and any(one.fixable for one in kept.findings) else kept

@@ -17,7 +17,7 @@ from coursebuild.model import Document
 from coursebuild.pipeline.outlines import unpack
 from coursebuild.source import Source
 
-ROOM = 2 << 20
+ROOM = 4 << 20
 """Bytes of packed documents that stay; in memory they take about three times as much."""
 _LAST = 4
 """Further ones that are remembered."""

@@ -106,7 +106,8 @@ class _Reader:
         from coursebuild.measured.records import RecordError
 
         try:
-            return _decoded(decode, read_bytes(self._root, path))
+            found: _T = _decoded(decode, read_bytes(self._root, path))
+            return found
         except EffectError as error:
             self._told(path, error.message, error.help)
         except RecordError as error:

@@ -1,7 +1,7 @@
 """Measured figures as a page sets them: numbers in words of a book, and tables.
 
-Entry points: `Grid`, a table; `power`, `percent`, `factor`, `size`, numbers; `said`, `sentence`;
-`again`, the command that makes them again.
+Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, numbers; `said`,
+`sentence`; `again`, the command that makes them again.
 """
 
 from __future__ import annotations
@@ -85,6 +85,13 @@ def power(value: float | None, digits: int = 3) -> Markup:
         places = max(0, digits - 1 - exponent)
         return Markup(f"{value:.{places}f}".replace("-", _MINUS))
     return _raised(f"{value:.{digits - 1}e}")
+
+
+def bounded(value: float | None, least: float) -> Markup:
+    """An error, of which no more is known than that it is smaller where it is `least`."""
+    if value is not None and least > 0.0 and value <= least * (1 + 1e-9):
+        return Markup("&lt; ") + power(least, 2)
+    return power(value)
 
 
 def exact(value: float | None) -> Markup:

@@ -7,7 +7,7 @@ afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from markupsafe import Markup
@@ -28,6 +28,7 @@ from coursebuild.model import (
     document_blocks,
     document_inlines,
 )
+from coursebuild.model import document_scripts as document_scripts
 from coursebuild.render.assets import Assets, strings_for, templates_of
 from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.strings import Strings
@@ -186,11 +187,6 @@ def owners(course: Course) -> tuple[Owner, ...]:
     return (*course.lessons, *course.pages)
 
 
-def document_scripts(document: Document) -> tuple[Script, ...]:
-    """The complete scripts of a document."""
-    return tuple(block for block in document_blocks(document) if isinstance(block, Script))
-
-
 _MODEL_NAMED = re.compile(
     r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?P<file>[\w./-]+)\.xml\b"""
 )
@@ -226,43 +222,14 @@ def named_models(document: Document) -> NamedModels:
 
 def course_scripts(
     course: Course, scripts_of: Callable[[Document], tuple[Script, ...]] = document_scripts
-) -> Mapping[str, tuple[Script, Owner]]:
+) -> dict[str, tuple[Script, Owner]]:
     """The scripts of a course by path, in order; of two with one path, the first."""
-    places: dict[str, tuple[int, Owner]] = {}
-    away = False
+    found: dict[str, tuple[Script, Owner]] = {}
     for owner in owners(course):
         if owner.document is not None:
-            away = away or owner.document.is_away
-            for number, script in enumerate(scripts_of(owner.document)):
-                places.setdefault(script.path, (number, owner))
-    found = _Scripts(places, scripts_of)
-    return found if away else dict(found)
-
-
-class _Scripts(Mapping[str, tuple[Script, Owner]]):
-    """Scripts of documents that may be away, each fetched when it is asked for."""
-
-    def __init__(
-        self,
-        places: Mapping[str, tuple[int, Owner]],
-        scripts_of: Callable[[Document], tuple[Script, ...]],
-    ) -> None:
-        self._places = places
-        self._scripts_of = scripts_of
-
-    def __getitem__(self, path: str) -> tuple[Script, Owner]:
-        number, owner = self._places[path]
-        assert owner.document is not None
-        return self._scripts_of(owner.document)[number], owner
-
-    def __contains__(self, path: object) -> bool:
-        return path in self._places
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        return len(self._places)
+            for script in scripts_of(owner.document):
+                found.setdefault(script.path, (script, owner))
+    return found
 
 
 def place(recording: Recording) -> tuple[str, int]:

@@ -31,6 +31,7 @@ from coursebuild.render import urls
 from coursebuild.render.figures import (
     Grid,
     again,
+    bounded,
     factor,
     grid,
     percent,
@@ -57,7 +58,6 @@ ORDERS = (
     ("velocity", "measured.order_velocity"),
 )
 """Orders that are fitted, with their titles."""
-_NEAR = 1 + 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,11 +207,7 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     rows, usual = report.rows, usual_setting(report.rows)
 
     def error(quantity: Quantity) -> tuple[str, list[str]]:
-        found: list[str] = []
-        for row in rows:
-            value = quantity.of(row)
-            under = value is not None and quantity.least > 0 and value <= quantity.least * _NEAR
-            found.append(Markup("&lt; ") + power(quantity.least, 2) if under else power(value))
+        found: list[str] = [bounded(quantity.of(row), quantity.least) for row in rows]
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), found
 

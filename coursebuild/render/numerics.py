@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
-from coursebuild.measured.points import KNOWN, seconds_text, status_text
+from coursebuild.measured.points import FLOORS, KNOWN, seconds_text, status_text
 from coursebuild.measured.records import STABILITY_PATH
 from coursebuild.render import urls
 from coursebuild.render.figures import (
     Grid,
     Part,
     again,
+    bounded,
     exact,
     grid,
     percent,
@@ -209,6 +210,7 @@ def _orders(words: Strings, report: CaseReport) -> Grid | None:
 def _errors(words: Strings, report: CaseReport) -> list[Grid]:
     """Errors by timestep and integrator, a table for each quantity."""
     found = []
+    least = 0.0 if report.reference is None else FLOORS * report.reference.floor
     lines = {(one.timestep, one.integrator): one for one in report.errors}
     steps = sorted({one.timestep for one in report.errors}, reverse=True)
     names = sorted({one.integrator for one in report.errors}, key=_rank)
@@ -217,9 +219,9 @@ def _errors(words: Strings, report: CaseReport) -> list[Grid]:
             continue
         columns = [(words("measured.timestep"), [seconds_text(step) for step in steps])]
         for name in names:
-            cells = [_error(lines.get((step, name)), quantity) for step in steps]
+            cells = [_error(lines.get((step, name)), quantity, least) for step in steps]
             columns.append((name, cells))
-        label = words("numerics.errors", quantity=words(key), title=report.title)
+        label = words("numerics.errors", quantity=words(key))
         found.append(grid(label, columns))
     return found
 
@@ -228,15 +230,20 @@ def _rank(name: str) -> int:
     return KNOWN.index(name) if name in KNOWN else len(KNOWN)
 
 
-def _error(line: ErrorLine | None, quantity: str) -> str:
+def _error(line: ErrorLine | None, quantity: str, least: float) -> str:
     if line is None:
         return ""
+    if line.status != "ok":
+        return status_text(line.status)
     pair: tuple[float, float] | None = getattr(line, quantity)
-    return status_text(line.status) if line.status != "ok" else power(pair and pair[0])
+    return bounded(None if pair is None else pair[0], least)
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:
     notes = []
+    formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
+    if formulas:
+        notes.append(words("numerics.theory", sources="; ".join(formulas)))
     softened = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened:
         times = ", ".join(seconds_text(step) for step in softened)

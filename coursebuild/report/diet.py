@@ -114,6 +114,7 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         if fixable:
             said += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
         lines += _painted(said, style, "  ", _RED)
+        lines += _faint(_keep(report, open_ones), style)
     else:
         lines.append("  " + style.paint("nothing in it is in vain", _GREEN))
     if report.slim is not None and len(open_ones) > 1:
@@ -128,6 +129,18 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         told = f"not found, because {reason}" if reason else "tried and needed"
         lines += _faint(f"{told}: {shown}", style)
     return lines
+
+
+def _keep(report: DietReport, found: Sequence[Finding]) -> str:
+    """How to keep the first of the findings."""
+    if not found:
+        return ""
+    first = found[0]
+    name = first.places[0].name if len(first.places) == 1 else ""
+    key = f"{first.kind} {name}".strip()
+    quote = "'" if '"' in key else '"'
+    told = f"what is wanted has its reason in models/{report.model}.toml: [[keep]]"
+    return f"{told} finding = {quote}{key}{quote}, reason = …"
 
 
 def _finding(one: Finding, style: Style) -> list[str]:
@@ -145,7 +158,9 @@ def _finding(one: Finding, style: Style) -> list[str]:
         lines += _edit(edit, style)
     if len(one.edits) > _EDITS:
         lines.append(f"    … and {len(one.edits) - _EDITS} more changes")
-    if one.unfixed and one.counts:
+    if one.doubt:
+        lines += _wrapped(f"no fault, as {one.doubt}", style, "    ")
+    elif one.unfixed and one.counts:
         lines += _wrapped(f"not for --fix: {one.unfixed}", style, "    ")
     return lines
 

@@ -9,16 +9,14 @@ apart, or when one is a folder on the way to the other. The first in the order o
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
-from itertools import islice
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.model import Course, Document, Lesson, Page, Script, document_blocks
+from coursebuild.model import Course, Document, Lesson, Page, Script, document_scripts
 from coursebuild.results import ScriptJob
 from coursebuild.source import Span
-from coursebuild.values import dataclass, field
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,28 +30,24 @@ class Extraction:
     script: Script
     owner: str
     """The id of the lesson or page that it stands in."""
-    _find: Callable[[], Script] | None = field(default=None, init=False, repr=False, compare=False)
-    """Gives the script, where its document is away."""
 
     @classmethod
-    def of(cls, document: Document, number: int, script: Script, owner: str) -> Extraction:
-        """That of the block of this number; where the document is away, the script is too."""
-        if not document.is_away:
+    def of(cls, script: Script, owner: str) -> Extraction:
+        """That of a script; where its code is away, the text is too."""
+        if not script.code.is_away:
             return cls(script.path, _text(script), script, owner)
         extraction = object.__new__(cls)
         object.__setattr__(extraction, "path", script.path)
+        object.__setattr__(extraction, "script", script)
         object.__setattr__(extraction, "owner", owner)
-        object.__setattr__(extraction, "_find", partial(_block, document, number))
         return extraction
 
     if not TYPE_CHECKING:
 
-        def __getattr__(self, name: str) -> object:
-            """What is away: its slot is empty."""
-            if name == "script":
-                return self._find()
+        def __getattr__(self, name: str) -> str:
+            """The text that is away: its slot is empty."""
             if name == "text":
-                return _text(self._find())
+                return _text(self.script)
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
@@ -95,10 +89,8 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     found: list[Diagnostic] = []
     paths = _Paths()
     for owner, document in owners(course):
-        for number, block in enumerate(document_blocks(document)):
-            if not isinstance(block, Script):
-                continue
-            extraction = Extraction.of(document, number, block, owner)
+        for script in document_scripts(document):
+            extraction = Extraction.of(script, owner)
             clash = paths.clash(extraction)
             if clash is None:
                 paths.add(extraction)
@@ -110,12 +102,6 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
 
 def _text(script: Script) -> str:
     return script.code.text.rstrip("\n") + "\n"
-
-
-def _block(document: Document, number: int) -> Script:
-    block = next(islice(document_blocks(document), number, None))
-    assert isinstance(block, Script)
-    return block
 
 
 def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:

@@ -15,6 +15,13 @@ from coursebuild.physics.diet.readers import Reader, Readers
 from coursebuild.physics.diet.survey import Order, Survey, survey
 
 PATH = "models/a.xml"
+PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
+      <geom name="ball" size=".05" pos=".3 0 0"/></body>"""
+
+
+def scene(world: str = PENDULUM, *, head: str = "", rest: str = "") -> str:
+    """A model, laid out over lines."""
+    return f"<mujoco>\n  {head}\n  <worldbody>\n    {world}\n  </worldbody>\n  {rest}\n</mujoco>\n"
 
 
 def opened(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:

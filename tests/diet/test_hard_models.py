@@ -39,7 +39,7 @@ def whole(files: str | Mapping[str, str | bytes], *, lesson: str = "") -> tuple[
     first: Survey | None = None
     now = dict(before)
     for _ in range(6):
-        model, survey = tried(now, lesson=lesson)
+        model, survey = tried(now, lesson=lesson, quick=False)
         first = first or survey
         if not survey.edits:
             break
@@ -82,6 +82,20 @@ def test_includes_are_changed_where_they_stand() -> None:
     assert '<include file="parts/sensors.xml"/>' not in fixed(model, survey, "models/parts/arm.xml")
     main = fixed(model, survey)
     assert main.count("\r\n") == main.count("\n") == 4 and "idle" not in main
+    whole(files)
+
+
+def test_what_is_new_is_written_into_the_models_own_file() -> None:
+    far = '<geom size=".1" pos="9 0 0"/>'
+    swing = '<body><joint axis="0 1 0"/><geom size=".1" pos=".2 0 0"/></body>'
+    files = {
+        PATH: '<mujoco>\n  <include file="b.xml"/>\n'
+        f"  <worldbody>{far}{swing}</worldbody>\n</mujoco>",
+        "models/b.xml": '<x><option gravity="0 0 -5"><flag warmstart="enable"/></option></x>',
+    }
+    model, survey = tried(files, locked={"models/b.xml": "models/c.xml uses models/b.xml too"})
+    assert found(survey)["contact-off"].fixable
+    assert '<mujoco>\n  <option><flag contact="disable"/></option>\n' in fixed(model, survey)
     whole(files)
 
 
@@ -224,7 +238,7 @@ def test_muscles_filters_and_delays() -> None:
   {COMMON}
   <worldbody><body name="arm" pos="0 0 1"><joint name="j" axis="0 1 0" range="-1 1"/>
     <joint name="k" axis="1 0 0"/><geom size=".1" pos=".2 0 .1"/></body>
-    <body pos="90 0 1"><freejoint/><geom size=".1"/></body></worldbody>
+    <body pos="900 0 1"><freejoint/><geom size=".1"/></body></worldbody>
   <tendon><fixed name="t"><joint joint="j" coef=".1"/></fixed></tendon>
   <actuator>
     <muscle name="m" tendon="t" lengthrange="0.1 0.2"/>
@@ -233,7 +247,7 @@ def test_muscles_filters_and_delays() -> None:
     <damper name="d" joint="j" kv="2" ctrlrange="0 1"/>
     <motor name="idle" joint="j"/>
   </actuator>
-  <keyframe><key name="go" qpos=".1 .2 90 0 1 1 0 0 0" act="0 .5 .1" ctrl="0 1 .2 0 0"/></keyframe>
+  <keyframe><key name="go" qpos=".1 .2 900 0 1 1 0 0 0" act="0 .5 .1" ctrl="0 1 .2 0 0"/></keyframe>
 </mujoco>
 """
     _, left = whole(text)
@@ -305,11 +319,14 @@ def random_model(random: np.random.Generator) -> str:
 """
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(14))
 def test_random_models_move_as_before(seed: int) -> None:
     random = np.random.default_rng(seed)
     text = random_model(random)
     survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
-    assert "c1" not in left and "m1" not in left
+    if survey.seen[0].judgement.ok:
+        assert "c1" not in left and "m1" not in left
+    else:
+        assert left == text
     for finding in survey.findings:
         assert finding.label == IDENTICAL or not finding.fixable

@@ -158,7 +158,7 @@ def test_results_are_the_same_as_here(cluster: Cluster, root: Path) -> None:
     jobs = [
         *(job("hello"), job("args", "a b", "é"), job("data"), job("uses"), job("fails")),
         *(job("exits"), job("bytes"), job("kills"), job("mj"), job("hello", norun=True)),
-        *(job("absent"), job("mj", requires=("no_such_module_here",)), job("lost")),
+        *(job("absent"), job("mj", requires=("no_such_module_here",)), job("lost", perturbation=1)),
         job("long", timeout=0.5),
     ]
     events: list[RunEvent] = []

@@ -208,6 +208,20 @@ def test_copies_are_looked_at_as_well(run: Run) -> None:
     assert [one.sign for one in found(run(text))] == [Sign.STATE]
 
 
+@pytest.mark.parametrize(
+    "imported",
+    [
+        "import importlib\nmujoco = importlib.import_module('mu' + 'joco')\n",
+        "import importlib.util\nassert importlib.util.find_spec('mujoco')\nimport mujoco\n",
+        "__import__('mujoco')\nimport sys\nmujoco = sys.modules['mu' + 'joco']\n",
+    ],
+)
+def test_however_mujoco_is_imported(run: Run, imported: str) -> None:
+    text = HEAD.replace("import mujoco\n", imported, 1) + FAST + STEP
+    [one] = found(run(text))
+    assert one.sign is Sign.VELOCITIES
+
+
 def test_data_of_a_model_that_was_compiled_again_is_looked_at_as_well(run: Run) -> None:
     text = HEAD + "spec = mujoco.MjSpec.from_string(XML)\nmodel = spec.compile()\n"
     text += "model, data = spec.recompile(model, mujoco.MjData(model))\n"

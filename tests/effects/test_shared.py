@@ -191,7 +191,7 @@ def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None
     until = time.monotonic() + 5
     while threading.active_count() > before and time.monotonic() < until:
         time.sleep(0.01)
-    assert threading.active_count() == before
+    assert threading.active_count() <= before  # a thread of another test may have ended by now
     assert told == []
 
 

@@ -17,7 +17,7 @@ from reportkit import box, case, diet, finding, reports
 
 from coursebuild.measured.shown import Reports
 from coursebuild.render import SiteOptions
-from coursebuild.render.figures import exact, factor, percent, power, sentence, size
+from coursebuild.render.figures import bounded, exact, factor, percent, power, sentence, size
 
 Make = Callable[..., Any]
 
@@ -43,6 +43,9 @@ def test_numbers(value: float | None, text: str) -> None:
 
 
 def test_other_numbers() -> None:
+    assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
+    assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
+    assert bounded(0.002, 1e-3) == "0.00200"
     assert exact(8.532261589) == "8.532261589"
     assert exact(-4.117706176e-10) == "−4.117706176\u2009×\u200910<sup>−10</sup>"
     assert percent(-0.0604) == "−6.040\u2009%"
@@ -147,6 +150,8 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     assert "Euler 200 ms 200.1 ms −0.050 % diverged 1.500000000" in told
     assert "RK4 280 ms grew" in told and "stable again at 300 ms, 310 ms" in told
     assert "implicit, discrete all up to 1 s" in told
+    assert "Theory: 2/ω." in told
+    assert "Position (m or rad): largest error" in page
     assert "Period (s) 2π√(m/k) Euler, RK4 6.283 6.2831853 −1.9 × 10<sup>−4</sup>" in told
     assert "Energy RK4 −4.1 × 10<sup>−10</sup> 0 −4.1 × 10<sup>−10</sup> Euler not finite" in told
     assert "Euler at 500 ms: diverged; 1e9 rad/s." in told

@@ -75,6 +75,8 @@ def test_a_finding() -> None:
         '    - name="gyro"/>',
         "",
         "  1 finding not explained, 1 of them for `coursebuild diet arm --fix`",
+        '  what is wanted has its reason in models/arm.toml: [[keep]] finding = "sensor-unread',
+        '    gyro", reason = …',
         "",
         "integrator and timestep are judged against a reference, not against the model as it is:",
         "  see `coursebuild bench`",

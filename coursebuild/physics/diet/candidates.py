@@ -48,6 +48,8 @@ class Candidate:
     """Why it holds whatever happens; empty where only runs can tell."""
     is_setting: bool = False
     """Whether nothing is taken out: only the time that it saves speaks for it."""
+    by_runs: bool = False
+    """Whether runs are enough, in full length; the proof only says what they show."""
     split: bool = True
     """Whether to look for those of its items without which every bit is the same, where that is
     not so of all together."""
@@ -55,6 +57,8 @@ class Candidate:
     """Whether it may change the time of a step."""
     blocked: str = ""
     """Why it is left to the author even where no bit changes; empty where it is not."""
+    doubt: str = ""
+    """Who may need it, so that it is no fault; empty where nobody does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,6 +23,7 @@ from coursebuild.physics.detector import Judgement, Peaks, judge, observe, peaks
 from coursebuild.physics.diet.cases import Case, begin, command
 from coursebuild.physics.diet.mapping import Mapping, transfer
 from coursebuild.physics.engine import advance
+from coursebuild.physics.scene import thickness
 from coursebuild.values import dataclass
 
 TOLERANCE = 1e-8
@@ -195,6 +196,7 @@ def watch(model: Any, case: Case) -> Seen:
     low, high = data.xipos.copy(), data.xipos.copy()
     touching: set[tuple[int, int]] = set()
     seen, constrained, iterations = Peaks(), False, 0
+    thick = thickness(model)
     for step in range(case.steps):
         _command(case, step, data, None, None)
         advance(model, data)
@@ -206,7 +208,7 @@ def watch(model: Any, case: Case) -> Seen:
             iterations = max(iterations, int(data.solver_niter.max(initial=0)))
         if data.ncon:
             touching |= {(min(p), max(p)) for p in data.contact.geom[: data.ncon].tolist()}
-        seen = peaks(data, seen)
+        seen = peaks(data, seen, thick)
         if not seen.finite:
             break
     end = start + made * float(model.opt.timestep)

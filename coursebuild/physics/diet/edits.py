@@ -180,12 +180,14 @@ def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[
 def set_options(main: Document, options: Settings, flags: Settings) -> tuple[Edit, ...]:
     """Set attributes of `option` and of its `flag`, or take them out (`None`), all at once.
 
-    What is left without attributes goes; what is not there yet is written.
+    What is left without attributes goes; what is not there yet is written into the model's own
+    file.
     """
     holders = [one for one in main.root.spliced() if one.tag == "option"]
     flagged = [one for holder in holders for one in holder.spliced() if one.tag == "flag"]
-    edits, new, target = _settled(holders, options)
-    more, new_flags, flag_target = _settled(flagged, flags)
+    own = [one for one in holders if one.document is main]
+    edits, new, target = _settled(holders, options, main)
+    more, new_flags, flag_target = _settled(flagged, flags, main)
     spared = [one for one in (target, flag_target) if one is not None]
     gone = _emptied(holders, flagged, options, flags, spared)
     edits += more
@@ -195,16 +197,16 @@ def set_options(main: Document, options: Settings, flags: Settings) -> tuple[Edi
         text = "".join(f' {name}="{value}"' for name, value in new.items())
         inner = b">" + flag + b"</option>" if flag else b"/>"
         edits.append(_first_child(main.root, f"<option{text}".encode() + inner))
-    elif flag and not holders:
+    elif flag and not own:
         edits.append(_first_child(main.root, b"<option>" + flag + b"</option>"))
     elif flag:
-        edits.append(_first_child(holders[-1], flag))
-        gone = [one for one in gone if one is not holders[-1]]
+        edits.append(_first_child(own[-1], flag))
+        gone = [one for one in gone if one is not own[-1]]
     return (*edits, *remove(gone))
 
 
 def _settled(
-    elements: Sequence[Element], wanted: Settings
+    elements: Sequence[Element], wanted: Settings, main: Document
 ) -> tuple[list[Edit], dict[str, str], Element | None]:
     """Edits of attributes that are there, those to be written newly, and where."""
     edits: list[Edit] = []
@@ -217,10 +219,11 @@ def _settled(
             edits += set_attributes(having[-1], ((name, value),))
         else:
             new[name] = value
-    if not new or not elements:
+    own = [one for one in elements if one.document is main]
+    if not new or not own:
         return edits, new, None
-    edits += set_attributes(elements[-1], new.items())
-    return edits, {}, elements[-1]
+    edits += set_attributes(own[-1], new.items())
+    return edits, {}, own[-1]
 
 
 def _emptied(

@@ -244,6 +244,7 @@ class _Surveyor:
             fixable=not unfixed,
             unfixed=unfixed,
             kept=reason or "",
+            doubt=candidate.doubt,
         )
         self.findings.append(finding)
         if not unfixed:
@@ -262,7 +263,9 @@ class _Surveyor:
         for edit in trial.edits:
             if edit.path in self.order.locked:
                 return self.order.locked[edit.path]
-        return candidate.blocked
+        if candidate.by_runs and self.order.quick:
+            return "short runs say too little of it: leave out --quick"
+        return candidate.doubt or candidate.blocked
 
     def _note(
         self,
