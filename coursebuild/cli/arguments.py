@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable
 
 from coursebuild.cli.commands import (
+    bench_command,
     build_command,
     check_command,
     diet_command,
@@ -16,9 +17,9 @@ from coursebuild.cli.commands import (
     extract_command,
     schema_command,
     serve_command,
+    stability_command,
     update_command,
 )
-from coursebuild.cli.measuring import bench_command, stability_command
 
 
 def parser() -> argparse.ArgumentParser:

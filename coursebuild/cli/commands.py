@@ -11,14 +11,15 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from coursebuild.cli.output import CLEAN, WRONG, look, print_report, report_text, style_of, write
+from coursebuild.cli.output import CLEAN, look, print_report, report_text, style_of, write
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
 
-def _options(arguments: argparse.Namespace) -> Options:
+def options_of(arguments: argparse.Namespace) -> Options:
+    """What the arguments say to every command."""
     from coursebuild.pipeline.options import Options, find_course, open_executor, open_store
 
     jobs = getattr(arguments, "jobs", None) or available_cores()
@@ -61,7 +62,7 @@ def check_command(arguments: argparse.Namespace) -> int:
     # Machines are told how long it took.
     parts = arguments.shard or arguments.timings or arguments.write_timings
     if arguments.format != "text" or parts or arguments.sensitivity:
-        options = _options(arguments)
+        options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
     command = ("check", *arguments.lessons)
     return _unless_unchanged(arguments, command, ("examples",), work)
@@ -78,14 +79,14 @@ def _against(arguments: argparse.Namespace) -> int:
     forbid(bool(arguments.timings), "--timings")
     forbid(arguments.write_timings is not None, "--write-timings")
     forbid(arguments.sensitivity, "--sensitivity")
-    options = _options(arguments)
+    options = options_of(arguments)
     try:
         report = against(options, tuple(arguments.lessons), arguments.against)
     finally:
         options.store.close()
     if arguments.format == "json":
         return write(against_json(report), CLEAN)
-    return write(against_text(report, style_of(sys.stdout)), CLEAN)
+    return write(against_text(report, style_of(sys.stdout), quiet=options.quiet), CLEAN)
 
 
 def build_command(arguments: argparse.Namespace) -> int:
@@ -125,7 +126,7 @@ def _unless_unchanged(
         said = unchanged(os.path.realpath(root), command)
     if said is not None:
         return write(said, CLEAN)
-    options = _options(arguments)
+    options = options_of(arguments)
     watcher = Watcher(str(options.root), command)
     report = work(options)
     status = print_report(report, "text", options)
@@ -141,7 +142,7 @@ def update_command(arguments: argparse.Namespace) -> int:
     """Bring recorded outputs up to date."""
     from coursebuild.pipeline.update import update
 
-    options = _options(arguments)
+    options = options_of(arguments)
     return print_report(
         update(options, tuple(arguments.lessons), dry_run=arguments.dry_run), "text", options
     )
@@ -151,7 +152,7 @@ def extract_command(arguments: argparse.Namespace) -> int:
     """Write the scripts to `examples/`."""
     from coursebuild.pipeline.extract import extract
 
-    options = _options(arguments)
+    options = options_of(arguments)
     return print_report(extract(options, adopt=arguments.adopt), "text", options)
 
 
@@ -159,7 +160,7 @@ def serve_command(arguments: argparse.Namespace) -> int:
     """Preview."""
     from coursebuild.pipeline.serve import serve
 
-    options = _options(arguments)
+    options = options_of(arguments)
     try:
         serve(options, arguments.port)
     finally:
@@ -172,33 +173,31 @@ def explain_command(arguments: argparse.Namespace) -> int:
     from coursebuild.pipeline.explain import explain
     from coursebuild.report.explained import explained_json, explained_text
 
-    explanation = explain(_options(arguments), arguments.path)
+    explanation = explain(options_of(arguments), arguments.path)
     if arguments.format == "json":
         return write(explained_json(explanation), CLEAN)
     return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
 
 
+def bench_command(arguments: argparse.Namespace) -> int:
+    """Report speed against error of the course's models."""
+    from coursebuild.cli import measuring
+
+    return measuring.bench(arguments)
+
+
+def stability_command(arguments: argparse.Namespace) -> int:
+    """Measure MuJoCo on hard cases, beside theory."""
+    from coursebuild.cli import measuring
+
+    return measuring.stability(arguments)
+
+
 def diet_command(arguments: argparse.Namespace) -> int:
     """Say what models hold that their scenarios do not need."""
-    from coursebuild.pipeline import diet
-    from coursebuild.report.diet import diet_report, diet_values
+    from coursebuild.cli import measuring
 
-    options = _options(arguments)
-    work = diet.fix if arguments.fix else diet.record if arguments.record else diet.diet
-    try:
-        found = work(options, tuple(arguments.models), quick=arguments.quick)
-    finally:
-        options.store.close()
-    status = CLEAN if found.ok else WRONG
-    if arguments.format == "json":
-        parts = (found.reports, found.diagnostics, found.failures, found.remarks)
-        return write(diet_values(*parts), status)
-    if options.quiet:
-        if found.ok:
-            return status
-        found = found.wrong
-    parts = (found.reports, found.diagnostics, found.failures, found.remarks)
-    return write(diet_report(*parts, style_of(sys.stdout)), status)
+    return measuring.diet(arguments)
 
 
 def schema_command(arguments: argparse.Namespace) -> int:

@@ -87,6 +87,7 @@ class FindingView:
     scenarios: str
     proof: str
     kept: str
+    doubt: str
     places: tuple[str, ...]
 
 
@@ -321,6 +322,7 @@ def _finding(words: Strings, one: Finding) -> FindingView:
         scenarios=", ".join(one.scenarios),
         proof=one.proof,
         kept=one.kept,
+        doubt=one.doubt,
         places=tuple(f"{at.path}:{at.line}" for at in one.places),
     )
 

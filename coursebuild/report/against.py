@@ -116,15 +116,18 @@ def _failure_values(failure: Diagnostic) -> dict[str, object]:
     }
 
 
-def against_text(report: AgainstReport, style: Style) -> str:
-    """As text: what changed first, number by number, then the rest and the sums."""
-    parts = [
-        "\n".join(_script(s, report.other, style)) + "\n"
+def against_text(report: AgainstReport, style: Style, *, quiet: bool = False) -> str:
+    """As text: what changed first, number by number, then the rest and the sums.
+
+    `quiet`: without the scripts that do the same.
+    """
+    told = [s for s in report.scripts if s.changes or s.diffs or s.failure is not None]
+    parts = ["\n".join(_script(s, report.other, style)) + "\n" for s in told]
+    lines = [
+        f"{_verdict(s, style)} {visible(s.path)}{_because(s)}"
         for s in report.scripts
-        if s.changes or s.diffs or s.failure is not None
+        if s not in told and not (quiet and s.status == "same")
     ]
-    quiet = [s for s in report.scripts if not (s.changes or s.diffs or s.failure is not None)]
-    lines = [f"{_verdict(s, style)} {visible(s.path)}{_because(s)}" for s in quiet]
     lost = [model for model in report.models if model.error]
     lines += [
         f"{style.paint('fails     ', _RED)} {visible(m.path)}:{m.line}"

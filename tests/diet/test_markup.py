@@ -9,6 +9,7 @@ from coursebuild.physics.diet.edits import (
     applied,
     drop_attribute,
     drop_numbers,
+    joined,
     remove,
     set_attributes,
     set_options,
@@ -235,6 +236,16 @@ def test_options_and_flags(
     left: str,
 ) -> None:
     assert after(before, *set_options(document(before), options, flags)) == left
+
+
+def test_removals_that_follow_each_other_are_one() -> None:
+    edits = [
+        Edit("a", 4, 6, b""),
+        Edit("a", 0, 4, b""),
+        Edit("a", 6, 6, b"x"),
+        Edit("b", 6, 7, b""),
+    ]
+    assert joined(edits) == (Edit("a", 0, 6, b""), Edit("a", 6, 6, b"x"), Edit("b", 6, 7, b""))
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:

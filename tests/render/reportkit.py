@@ -115,8 +115,9 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
 def reports() -> Reports:
     """All of it."""
     kept = finding("geom-far", kept="it is the horizon", proof="", label="equal within tolerance")
+    doubted = finding("site-unused", doubt="examples/a.py names <it>")
     return Reports(
         {"box": box()},
-        {"box": diet(finding(), kept)},
+        {"box": diet(finding(), kept, doubted)},
         (case("spring", 5), case("other", 5, reference=None, note=""), case("top", 3, errors=())),
     )

@@ -119,6 +119,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     assert "bit-identical; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
     assert "Because its value goes nowhere. models/box.xml:3" in told
     assert "Kept: it is the horizon." in told
+    assert "It may be needed all the same: examples/a.py names &lt;it&gt;." in told
     assert "coursebuild diet box --record" in told
 
 

@@ -1,7 +1,7 @@
 """Changes of MJCF as replacements of bytes: everything else stays as its author wrote it.
 
 Entry points: `Edit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers`,
-`set_options` make them; `applied` makes the new bytes.
+`set_options` make them; `applied` makes the new bytes, `joined` fewer edits of many.
 
 1. An element that has lines of its own goes with these; one that shares its line goes with the
    blanks beside it. Comments stay, also those beside what goes.
@@ -55,6 +55,19 @@ def applied(data: bytes, edits: Iterable[Edit]) -> bytes:
         parts += [data[at : edit.start], edit.new]
         at = last = edit.end
     return b"".join((*parts, data[at:]))
+
+
+def joined(edits: Iterable[Edit]) -> tuple[Edit, ...]:
+    """The same changes in order, with removals that follow each other in one."""
+    found: list[Edit] = []
+    for edit in sorted(set(edits)):
+        last = found[-1] if found else None
+        removals = last is not None and not (last.new or edit.new)
+        if last is not None and removals and (last.path, last.end) == (edit.path, edit.start):
+            found[-1] = Edit(last.path, last.start, edit.end, b"")
+        else:
+            found.append(edit)
+    return tuple(found)
 
 
 def remove(elements: Collection[Element]) -> tuple[Edit, ...]:

@@ -22,7 +22,7 @@ from coursebuild.physics.diet.candidates import Candidate, Item, Look
 from coursebuild.physics.diet.cases import Case
 from coursebuild.physics.diet.collisions import collisions
 from coursebuild.physics.diet.compare import Comparison, Seen, watch
-from coursebuild.physics.diet.edits import Edit
+from coursebuild.physics.diet.edits import Edit, joined
 from coursebuild.physics.diet.markup import place_of
 from coursebuild.physics.diet.meshes import meshes
 from coursebuild.physics.diet.model_text import ModelText
@@ -288,7 +288,7 @@ class _Surveyor:
     def _texts(self, edits: Sequence[Edit]) -> tuple[TextEdit, ...]:
         by_path = {document.path: document for document in self.scene.documents}
         found = []
-        for edit in sorted(edits):
+        for edit in joined(edits):
             document = by_path[edit.path]
             old = document.data[edit.start : edit.end].decode("utf-8", "replace")
             line, column = document.position(edit.start)
