@@ -15,19 +15,35 @@ from coursebuild.checks.formulas import check_formulas as check_formulas
 from coursebuild.checks.formulas import course_formulas as course_formulas
 from coursebuild.checks.formulas import document_formulas as document_formulas
 from coursebuild.checks.formulas import formula_findings as formula_findings
-from coursebuild.checks.labs import check_labs, lab_findings
+from coursebuild.checks.labs import lab_findings
 from coursebuild.checks.links import Places as Places
 from coursebuild.checks.links import anchors as anchors
-from coursebuild.checks.links import check_links, document_links
+from coursebuild.checks.links import document_links, remembered_anchors
 from coursebuild.checks.links import places as places
-from coursebuild.checks.quizzes import check_quizzes, quiz_findings
+from coursebuild.checks.quizzes import quiz_findings
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Course, Document, document_blocks
+from coursebuild.model import Course, Document, Script, document_blocks
+from coursebuild.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
     """Links, mentions, quizzes and labs, checked against each other."""
-    return (*check_links(course), *check_quizzes(course), *check_labs(course))
+    scripts = {
+        block.path: block.norun
+        for document in course.documents
+        for block in document_blocks(document)
+        if isinstance(block, Script)
+    }
+    known = places(course, scripts)
+    anchors_of = remembered_anchors()
+    quizzes: dict[str, Span] = {}
+    found: list[Diagnostic] = []
+    for document in course.documents:
+        blocks = tuple(document_blocks(document))
+        found += document_links(course, document, known, anchors_of)
+        found += quiz_findings(blocks, scripts, quizzes)
+        found += lab_findings(blocks, course)
+    return tuple(found)
 
 
 def check_document(

@@ -1,7 +1,7 @@
 """Labs against the course: the kind exists, the model exists.
 
-Entry points: `check_labs(course)`; `lab_findings`, for some blocks. Names inside a model
-(keyframes, sites) are checked where the compiled model is known (`checks.compiled`).
+Entry point: `lab_findings`, for some blocks. Names inside a model (keyframes, sites) are checked
+where the compiled model is known (`checks.compiled`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import posixpath
 from collections.abc import Iterable
 
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.model import Block, Course, Lab, document_blocks
+from coursebuild.model import Block, Course, Lab
 
 
 def lab_kinds(course: Course) -> frozenset[str]:
@@ -28,18 +28,15 @@ def lab_kinds(course: Course) -> frozenset[str]:
     )
 
 
-def check_labs(course: Course) -> tuple[Diagnostic, ...]:
-    """Unknown kinds and models."""
-    blocks = (block for document in course.documents for block in document_blocks(document))
-    return lab_findings(blocks, course)
-
-
 def lab_findings(blocks: Iterable[Block], course: Course) -> tuple[Diagnostic, ...]:
-    """The same for the labs among some blocks."""
+    """Unknown kinds and models of the labs among some blocks."""
+    labs = [block for block in blocks if isinstance(block, Lab)]
+    if not labs:
+        return ()
     kinds = lab_kinds(course)
     models = {model.name for model in course.models}
     found: list[Diagnostic] = []
-    for lab in (block for block in blocks if isinstance(block, Lab)):
+    for lab in labs:
         if lab.kind not in kinds:
             found.append(
                 diagnose(

@@ -1,6 +1,6 @@
 """Links and mentions of the sources: every one leads somewhere.
 
-Entry points: `check_links(course)`; `document_links`, for one document.
+Entry points: `places(course)`; `document_links`, for one document.
 
 1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
    each document.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
@@ -60,11 +60,11 @@ class Places:
     files: frozenset[str]
 
 
-def places(course: Course) -> Places:
-    """What the course offers as targets."""
-    scripts = {
-        b.path for d in course.documents for b in document_blocks(d) if isinstance(b, Script)
-    }
+def places(course: Course, scripts: Iterable[str] | None = None) -> Places:
+    """What the course offers as targets; `scripts` are their paths, where they are known."""
+    if scripts is None:
+        blocks = (block for document in course.documents for block in document_blocks(document))
+        scripts = (block.path for block in blocks if isinstance(block, Script))
     return Places(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
@@ -94,9 +94,8 @@ def anchors(document: Document) -> frozenset[str]:
     return frozenset(found)
 
 
-def check_links(course: Course) -> tuple[Diagnostic, ...]:
-    """A diagnostic for each link, mention or image that leads nowhere."""
-    known = places(course)
+def remembered_anchors() -> AnchorsOf:
+    """`anchors`, by the path of the document."""
     known_anchors: dict[str, frozenset[str]] = {}
 
     def anchors_of(document: Document) -> frozenset[str]:
@@ -105,17 +104,16 @@ def check_links(course: Course) -> tuple[Diagnostic, ...]:
             known_anchors[path] = anchors(document)
         return known_anchors[path]
 
-    return tuple(
-        diagnostic
-        for document in course.documents
-        for diagnostic in document_links(course, document, known, anchors_of)
-    )
+    return anchors_of
 
 
 def document_links(
     course: Course, document: Document, known: Places, anchors_of: AnchorsOf = anchors
 ) -> Iterator[Diagnostic]:
-    """The same for one document, by what the course offers."""
+    """A diagnostic for each link, mention or image of a document that leads nowhere.
+
+    `known` is what the course offers.
+    """
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
             yield from _check_html(block.span, document, anchors_of)

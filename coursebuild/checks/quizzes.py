@@ -1,6 +1,6 @@
 """Quizzes across the course: ids are unique, `output` questions name a script of the course.
 
-Entry points: `check_quizzes(course)`; `quiz_findings`, for some blocks.
+Entry points: `quiz_findings`, for some blocks; `check_output_lines`.
 """
 
 from __future__ import annotations
@@ -8,25 +8,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Block, Course, OutputQuestion, Quiz, Script, document_blocks
+from coursebuild.model import Block, Course, OutputQuestion, Quiz, document_blocks
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.source import Span
 
 
-def check_quizzes(course: Course) -> tuple[Diagnostic, ...]:
-    """Repeated ids, and output questions about scripts that nothing runs."""
-    blocks = (block for document in course.documents for block in document_blocks(document))
-    scripts = {block.path: block.norun for block in blocks if isinstance(block, Script)}
-    blocks = (block for document in course.documents for block in document_blocks(document))
-    return quiz_findings(blocks, scripts)
+def quiz_findings(
+    blocks: Iterable[Block], scripts: Mapping[str, bool], seen: dict[str, Span] | None = None
+) -> tuple[Diagnostic, ...]:
+    """Repeated ids, and output questions about scripts that nothing runs.
 
-
-def quiz_findings(blocks: Iterable[Block], scripts: Mapping[str, bool]) -> tuple[Diagnostic, ...]:
-    """The same for the quizzes among some blocks.
-
-    `scripts` are those of the course by path, and whether they are not run.
+    `scripts` are those of the course by path, and whether they are not run. `seen` are ids of
+    other blocks, and where they stand; those of these blocks are added.
     """
-    seen: dict[str, Span] = {}
+    seen = {} if seen is None else seen
     found: list[Diagnostic] = []
     for quiz in (block for block in blocks if isinstance(block, Quiz)):
         first = seen.setdefault(quiz.id, quiz.id_span)

@@ -26,6 +26,7 @@ from coursebuild.model import MjcfModel
 from coursebuild.source import Source
 from coursebuild.values import dataclass
 
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _OUTSIDE = "is reached through a link that leads out of the project"
 
 
@@ -134,6 +135,8 @@ class _Reader:
         self.root = root
         self.diagnostics: list[Diagnostic] = []
         self.unreadable: list[str] = []
+        self.plain: set[str] = set()
+        """Files that were reached through no link."""
 
     def map(self) -> Source | None:
         """The course map; that it is missing is a mistake already here."""
@@ -159,9 +162,11 @@ class _Reader:
         elif not folder.is_dir():
             self._refuse(top, "is not a folder")
         else:
-            yield from self._walk(top, frozenset())
+            yield from self._walk(top, frozenset(), plain=not folder.is_symlink())
 
-    def _walk(self, folder: str, above: frozenset[tuple[int, int]]) -> Iterator[str]:
+    def _walk(
+        self, folder: str, above: frozenset[tuple[int, int]], *, plain: bool
+    ) -> Iterator[str]:
         try:
             status = (self.root / folder).stat()
             with os.scandir(self.root / folder) as entries:
@@ -179,9 +184,12 @@ class _Reader:
                 or (name.startswith("#") and name.endswith("#"))
             ):
                 continue
-            yield from self._entry(f"{folder}/{name}", is_link, above | {here})
+            plainly = plain and not is_link
+            yield from self._entry(f"{folder}/{name}", is_link, above | {here}, plain=plainly)
 
-    def _entry(self, path: str, is_link: bool, above: frozenset[tuple[int, int]]) -> Iterator[str]:
+    def _entry(
+        self, path: str, is_link: bool, above: frozenset[tuple[int, int]], *, plain: bool
+    ) -> Iterator[str]:
         if not _is_text(path):
             self._refuse(path, "has a name that is not UTF-8")
             return
@@ -199,8 +207,10 @@ class _Reader:
             self._refuse(path, f"cannot be read: {reason(error)}")
             return
         if stat.S_ISDIR(mode) and not path.endswith((".md", ".xml", ".toml")):
-            yield from self._walk(path, above)
+            yield from self._walk(path, above, plain=plain)
         elif stat.S_ISREG(mode):
+            if plain:
+                self.plain.add(path)
             yield path
         else:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
@@ -212,7 +222,7 @@ class _Reader:
             if path in self.unreadable:
                 continue
             try:
-                data = read_bytes(self.root, path)
+                data = self._plainly_read(path) or read_bytes(self.root, path)
             except OutsideProjectError:
                 self._refuse(path, _OUTSIDE)
             except EffectError as error:
@@ -220,6 +230,15 @@ class _Reader:
             else:
                 found.append(self._decode(path, data, aside))
         return tuple(found)
+
+    def _plainly_read(self, path: str) -> bytes | None:
+        """The bytes of a file of which it need not be found out where it lies."""
+        if path not in self.plain:
+            return None
+        try:
+            return _read_regular(f"{self.root}/{path}", _NO_LINK)
+        except OSError:  # told by who looks closer
+            return None
 
     def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source:
         try:
@@ -245,9 +264,9 @@ class _Reader:
         self.diagnostics.append(diagnose("file-unreadable", span, f"{shown} {why}"))
 
 
-def _read_regular(path: Path) -> bytes:
+def _read_regular(path: Path | str, flags: int = 0) -> bytes:
     """The bytes of a regular file; never waits, whatever stands at the path."""
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     with os.fdopen(fd, "rb") as file:
         if not stat.S_ISREG(os.fstat(fd).st_mode):
             raise OSError("it is not a regular file")

@@ -60,6 +60,14 @@ class RunFinished:
 
 RunEvent: TypeAlias = RunStarted | RunFinished
 
+
+class RunStoppedError(Exception):
+    """Whoever asked for scripts to be run wants them no more; what ran was ended."""
+
+
+_PATIENCE = 0.1
+"""Seconds after which it is asked again whether a run is still wanted."""
+
 _LOG = "MUJOCO_LOG.TXT"
 """What MuJoCo writes where it runs when it warns, in a process that a script has started."""
 
@@ -146,8 +154,15 @@ class ScriptServer:
         parallel: int,
         on_event: Callable[[RunEvent], None] | None = None,
         order: Sequence[int] | None = None,
+        unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
-        """As `run_scripts`; one run at a time."""
+        """As `run_scripts`; one run at a time.
+
+        `unwanted` is asked now and then, with the paths of the scripts that run, whether to stop.
+
+        Raises:
+            RunStoppedError: it said so.
+        """
         work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order, self._place)
         if not work.waiting:
             return work.results()
@@ -160,8 +175,10 @@ class ScriptServer:
                 for _ in range(min(max(parallel, 1), len(work.waiting))):
                     self._start(busy, selector, work)
                 while busy:
-                    for key, _ in selector.select():
+                    for key, _ in selector.select(None if unwanted is None else _PATIENCE):
                         self._hear(key.data, busy, selector, work)
+                    if unwanted is not None and unwanted(work.running(busy)):
+                        raise RunStoppedError
         finally:
             for worker in busy:
                 worker.dismiss()  # all of them, before waiting for any
@@ -291,6 +308,10 @@ class _Work:
             self._finish(index, _script_run(self.jobs[index].path, *report))
             self.next(worker)
         return True
+
+    def running(self, busy: Iterable[Worker]) -> frozenset[str]:
+        """The paths of what these supervisors run."""
+        return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
 
     def results(self) -> tuple[ScriptRun, ...]:
         return tuple(self.runs[i] for i in range(len(self.jobs)))

@@ -5,8 +5,8 @@ Entry points: `Watcher`, made before the work begins, whose `keep` leaves a stam
 
 1. A command depends on whole folders (the course's, the tool's), on single files that scripts read,
    on the listings of the folders that packages are installed in, and on what it leaves behind (the
-   extracted scripts, the site). A signature is one hash over the names, sizes, times and inodes of
-   them all.
+   extracted scripts, the site). A signature is a hash over the names, sizes, times and inodes of
+   them all; that of the course's folders alone is kept beside it.
 2. A stamp is left only where nothing changed while the command worked, and nothing so shortly
    before that the clock of the file system could not have told. In doubt there is none, and the
    next run looks closer.
@@ -28,7 +28,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 FOLDERS = ("content", "models", "mjcourse")
 """What a course's author writes, and the library that a course may have of its own."""
-_HEADER = "coursebuild stamp 1"
+_HEADER = "coursebuild stamp 2"
 _FINE = 50_000_000
 """ns: a file changed longer ago than this has a time that another change would not have."""
 _COARSE = 2_100_000_000
@@ -56,7 +56,15 @@ class Watcher:
         self.root = root
         self.command = tuple(command)
         self.began = time.time_ns()
-        self.before = _signature(_inputs(root), self.began)
+        self.before = self._look()
+
+    def _look(self) -> list[str]:
+        """The signatures of the inputs; none where nothing can be told."""
+        parts = (_course(self.root), _tool())
+        try:
+            return list(_signatures((part, self.began) for part in parts))
+        except (OSError, _UnclearError):
+            return []
 
     def keep(self, said: str, files: Iterable[str], made: Iterable[str]) -> bool:
         """Leave a stamp, where it is certain that all is as the command saw it.
@@ -70,17 +78,19 @@ class Watcher:
         Returns:
             Whether there is a stamp now.
         """
-        inputs = _inputs(self.root)
-        if self.before is None or self.before != _signature(inputs, self.began):
-            return False
+        course, tool = _course(self.root), _tool()
         further = sorted({_absolute(self.root, path) for path in files})
-        if _signature(further, self.began) is None:
+        left = sorted(_absolute(self.root, path) for path in made)
+        if any("\n" in path for path in (*course, *tool, *further, *left, *self.command)):
             return False
-        all_of_it = [*inputs, *further, *sorted(_absolute(self.root, path) for path in made)]
-        signature = _signature(all_of_it, None)
-        if signature is None or any("\n" in path for path in (*all_of_it, *self.command)):
+        dated = [(part, self.began) for part in (course, tool, further)]
+        try:
+            seen = list(_signatures([*dated, (left, None)]))
+        except (OSError, _UnclearError):
             return False
-        return _write(self.root, self.command, signature, all_of_it[len(inputs) :], said)
+        if seen[:2] != self.before:
+            return False
+        return _write(self.root, self.command, (seen[0], seen[-1]), (*further, *left), said)
 
 
 def unchanged(root: str, command: Sequence[str]) -> str | None:
@@ -93,40 +103,53 @@ def unchanged(root: str, command: Sequence[str]) -> str | None:
     if digest != hashlib.sha256(body).hexdigest().encode():
         return None
     head, _, said = body.decode("utf-8", "surrogateescape").partition("\n\n")
-    header, signature, *further = head.split("\n")
-    if header != _HEADER or _signature([*_inputs(root), *further], None) != signature:
+    header, *lines = head.split("\n")
+    if header != _HEADER:
         return None
-    return said
+    own, whole, *further = lines
+    found = _signatures((part, None) for part in (_course(root), _tool(), further))
+    try:
+        # Most often something is else in the course, where it is found soonest.
+        return said if next(found) == own and [*found][-1] == whole else None
+    except (OSError, _UnclearError):
+        return None
 
 
-def _inputs(root: str) -> list[str]:
-    """What every command depends on."""
+def _course(root: str) -> list[str]:
+    """What of a course every command depends on."""
+    return [os.path.join(root, name) for name in FOLDERS]
+
+
+def _tool() -> list[str]:
+    """What else every command depends on."""
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     tool = [package]
     beside = os.path.dirname(package)
     if os.path.isdir(os.path.join(beside, "site", "dist")):  # a source tree
         tool += [os.path.join(beside, name) for name in ("mjcourse", "templates", "site/dist")]
-    return [*(os.path.join(root, name) for name in FOLDERS), *tool]
+    return tool
 
 
-def _signature(paths: Sequence[str], began: int | None) -> str | None:
-    """A hash over the stat of files, and of folders with all that is in them.
+def _signatures(parts: Iterable[tuple[Sequence[str], int | None]]) -> Iterator[str]:
+    """After each part, a hash over the stat of all files so far, and of folders with their content.
 
-    `None` where there is none: a link to a folder, whose content is elsewhere; a file changed so
-    shortly before `began` (ns since 1970), or after it, that its time says nothing.
+    A part comes with a time, in ns since 1970, or none.
+
+    Raises:
+        _UnclearError: there is a link to a folder, whose content is elsewhere; a file was changed
+            so shortly before the time of its part, or after it, that its own says nothing.
+        OSError: something cannot be looked at.
     """
     digest = hashlib.sha256()
     for text in (sys.version, sys.executable, *(os.environ.get(v, "") for v in _VARIABLES)):
         digest.update(text.encode("utf-8", "surrogateescape") + b"\0")
-    try:
-        for folder in _package_folders():
-            digest.update(_listing(folder))
+    for folder in _package_folders():
+        digest.update(_listing(folder))
+    for paths, began in parts:
         for path in paths:
             for line in _lines(path, began):
                 digest.update(line.encode("utf-8", "surrogateescape"))
-    except (OSError, _UnclearError):
-        return None
-    return digest.hexdigest()
+        yield digest.hexdigest()
 
 
 def _package_folders() -> list[str]:
@@ -196,9 +219,9 @@ def _path(root: str, command: Sequence[str]) -> str:
 
 
 def _write(
-    root: str, command: Sequence[str], signature: str, further: Sequence[str], said: str
+    root: str, command: Sequence[str], signatures: Sequence[str], further: Sequence[str], said: str
 ) -> bool:
-    head = "\n".join((_HEADER, signature, *further))
+    head = "\n".join((_HEADER, *signatures, *further))
     body = f"{head}\n\n{said}".encode("utf-8", "surrogateescape")
     data = hashlib.sha256(body).hexdigest().encode() + b"\n" + body
     path = _path(root, command)

@@ -152,7 +152,7 @@ class _Work:
         options = self.options
         memory = Memory(options.root, options.store, fresh=fresh, place=place)
         with ScriptServer(place=place) as server:
-            runs = run(scripts, options, self.progress, stage, memory, server)
+            runs = run(scripts, options, self.progress, stage, memory, server.run)
         return standings(self.course, self.here, runs)
 
     def _models(self, place: Place) -> tuple[ModelLine, ...]:

@@ -73,10 +73,10 @@ def _moved(
         return found
     memory = Memory(options.root, options.store)
     with contextlib.ExitStack() as stack:
-        server = None if options.executor else stack.enter_context(ScriptServer())
+        run_all = None if options.executor else stack.enter_context(ScriptServer()).run
         for number in range(1, RUNS + 1):
             stage = f"moving initial states, {number} of {RUNS}"
-            for one in run(scripts, options, progress, stage, memory, server, perturbation=number):
+            for one in run(scripts, options, progress, stage, memory, run_all, perturbation=number):
                 found[one.path].append(one)
     return found
 

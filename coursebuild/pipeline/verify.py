@@ -14,8 +14,8 @@ Documents may be skeletons. Formulas are no part of this: see `pipeline.document
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, assert_never
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, TypeAlias, assert_never
 
 from coursebuild.checks import check_compiled, mjcf_texts
 from coursebuild.checks.quizzes import check_output_lines
@@ -50,7 +50,10 @@ from coursebuild.scripts.repeat import repeat_findings
 from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
-    from coursebuild.effects.runner import RunEvent, ScriptServer
+    from coursebuild.effects.runner import RunEvent
+
+RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
+"""Runs scripts, as `runner.run_scripts` does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,13 +226,14 @@ def run(
     progress: Progress,
     stage: str = "running scripts",
     memory: Memory | None = None,
-    server: ScriptServer | None = None,
+    run_all: RunAll | None = None,
     perturbation: int = 0,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
     What begins and ends is told. `memory` is what is remembered; another one than that of the
-    options where everything is to run. `server` is one that stays warm from run to run.
+    options where everything is to run. `run_all` is what runs them, where it
+    is not `run_scripts`.
     `perturbation`: with initial states moved, in the direction that has this number.
     """
     chosen = tuple(chosen)
@@ -242,7 +246,7 @@ def run(
     }
     done = memory.recall(tuple(inputs.values()))
     left = [job for job in todo if job.path not in done]
-    for finished in _run(left, inputs, options, progress, stage, memory, server):
+    for finished in _run(left, inputs, options, progress, stage, memory, run_all):
         done[finished.path] = finished
     return tuple(done[job.path] for job in todo)
 
@@ -254,7 +258,7 @@ def _run(
     progress: Progress,
     stage: str,
     memory: Memory,
-    server: ScriptServer | None,
+    run_all: RunAll | None,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
@@ -287,7 +291,7 @@ def _run(
 
             runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
         else:
-            run_all = run_scripts if server is None else server.run
+            run_all = run_all or run_scripts
             runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
     memory.close()
     return runs

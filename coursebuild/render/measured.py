@@ -217,7 +217,7 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
         (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
         (words("measured.cost"), ["" if r.cost is None else f"{r.cost:.3g}" for r in rows]),
         (words("measured.realtime"), [factor(row.realtime) for row in rows]),
-        *(error(quantity) for quantity in quantities(report)),
+        *(error(quantity) for quantity in quantities(report) if _is_known(quantity, report)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
@@ -228,6 +228,12 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     marked = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
     return grid(label, columns, words=(remarks,), marked=marked)
+
+
+def _is_known(quantity: Quantity, report: ScenarioReport) -> bool:
+    """Whether any error is more than what the reference does not resolve."""
+    errors = (quantity.of(row) for row in report.rows)
+    return any(one is not None and one > quantity.least * (1 + 1e-9) for one in errors)
 
 
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:

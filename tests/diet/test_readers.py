@@ -46,6 +46,9 @@ def test_who_does_not(text: str) -> None:
         ("shape", "model.geom_size[0] = 2"),
         ("material", "model.mat(i)"),
         ("tendon", "data.ten_length"),
+        ("number", "data.qpos[3:]"),
+        ("number", "qpos = initial"),
+        ("body-number", "data.xpos[2]"),
     ],
 )
 def test_what_reads_all_of_a_kind(what: str, text: str) -> None:
@@ -63,6 +66,7 @@ def test_what_reads_all_of_a_kind(what: str, text: str) -> None:
         ("site", 'data.site("tip")'),
         ("site", "opposite(x)"),
         ("material", "format(i)"),
+        ("number", 'data.joint("pivot").qpos[0] + data.body("arm").xpos'),
     ],
 )
 def test_what_does_not(what: str, text: str) -> None:

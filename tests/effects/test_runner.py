@@ -21,6 +21,8 @@ from coursebuild.effects.runner import (
     RunEvent,
     RunFinished,
     RunStarted,
+    RunStoppedError,
+    ScriptServer,
     clean_environment,
 )
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
@@ -491,6 +493,26 @@ class TestNothingStaysBehind:
         while folder.parent.exists() and time.monotonic() < until:
             time.sleep(0.01)
         assert folder.parent.name.startswith("coursebuild-") and not folder.parent.exists()
+
+    def test_whoever_asked_wants_them_no_more(self, root: Path) -> None:
+        (root / "examples/x.py").write_text(
+            "import os, time\nopen('examples/me', 'w').write(str(os.getpid()))\ntime.sleep(60)\n"
+        )
+        (root / "examples/y.py").write_text("print('y')\n")
+        asked: list[frozenset[str]] = []
+
+        def unwanted(running: frozenset[str]) -> bool:
+            asked.append(running)
+            return (root / "examples/me").exists() and running == {"examples/x.py"}
+
+        jobs = [job("examples/x.py"), job("examples/y.py")]
+        with ScriptServer(**way) as server:
+            with pytest.raises(RunStoppedError):
+                server.run(root, jobs, parallel=2, unwanted=unwanted)
+            assert frozenset({"examples/x.py"}) in asked
+            assert gone(wait_for(root / "examples/me"))
+            (after,) = server.run(root, jobs[1:], parallel=2, unwanted=lambda running: False)
+            assert after.stdout == "y\n"
 
     def test_whoever_listens_fails(self, root: Path) -> None:
         (root / "examples/x.py").write_text(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -212,7 +213,7 @@ def test_a_file_whose_time_says_nothing_leaves_no_stamp(
     os.utime(root / "models/m.xml", ns=(then, then))
     watcher = Watcher.__new__(Watcher)
     watcher.root, watcher.command, watcher.began = str(root), COMMAND, now
-    watcher.before = stamp._signature(stamp._inputs(str(root)), now)
+    watcher.before = watcher._look()
     assert watcher.keep("all is well\n", [], []) is kept
 
 
@@ -274,3 +275,12 @@ def test_looking_imports_next_to_nothing() -> None:
         "'coursebuild.effects.place', 'coursebuild.effects.stamp']",
         "[]",
     ]
+
+
+def test_a_stamp_of_another_format_is_none(root: Path) -> None:
+    assert keep(root)
+    (path,) = (root / ".coursebuild/unchanged").iterdir()
+    body = path.read_bytes().partition(b"\n")[2].replace(b"coursebuild stamp 2", b"other", 1)
+    for text in (body, b"coursebuild stamp 1\nabc\n\nsaid"):
+        path.write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text)
+        assert unchanged(str(root), COMMAND) is None

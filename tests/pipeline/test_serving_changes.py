@@ -215,6 +215,30 @@ def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
 
 
+def begins(folder: Folder, times: int) -> None:
+    """Wait until the script has begun so many times."""
+    until = time.monotonic() + 20
+    while not (folder.root / "begun").exists() or len(folder.read("begun")) < times:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+def test_a_script_that_was_changed_is_not_waited_for(make: Make) -> None:
+    slow = "import time\nopen('begun', 'a').write('x')\ntime.sleep(50)\nprint(1)"
+    folder = make("## First\n\n" + block("x.py", slow, "1"))
+    with serving(folder) as preview, preview.events() as events:
+        begins(folder, 1)
+        # It goes on while something else is saved.
+        folder.replace(folder.lesson(), "## First", "## Second")
+        events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
+        time.sleep(0.5)
+        assert folder.read("begun") == b"x"
+        folder.replace(folder.lesson(), "time.sleep(50)", "time.sleep(0)")
+        events.settled()
+        assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
+        assert folder.read("begun") == b"xx"
+
+
 def test_a_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
     page = "/lessons/1.1-one.html"

@@ -8,7 +8,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "measured"))
 
-from benchkit import MACHINE, awkward, scene, swing
+from benchkit import MACHINE, awkward, swing
+from benchkit import row as row
+from benchkit import scenario as scenario
+from benchkit import scene as scene
 
 from coursebuild.measured.bench import SceneCard, SceneReport
 from coursebuild.measured.cases import (

@@ -13,7 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from reportkit import box, case, diet, finding, reports
+from reportkit import box, case, diet, finding, reports, row, scenario, scene
 
 from coursebuild.measured.shown import Reports
 from coursebuild.render import SiteOptions
@@ -112,6 +112,14 @@ def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> Non
     assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in told
 
 
+def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) -> None:
+    flat = [row(velocity=(1e-11, 1e-11), position=(2e-3, 1e-3), own=True)]
+    found = Reports({"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")})
+    heads = re.findall(r"<th scope=\"col\"[^>]*>(.*?)</th>", pages(make, found)["models/box.html"])
+    assert "Position (m or rad)" in heads
+    assert "Velocity (m/s or rad/s)" not in heads
+
+
 def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     told = text(site["models/box.html"])
     assert "One thing in it is not needed by any scenario." in told
@@ -119,7 +127,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     assert "bit-identical; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
     assert "Because its value goes nowhere. models/box.xml:3" in told
     assert "Kept: it is the horizon." in told
-    assert "It may be needed all the same: examples/a.py names &lt;it&gt;." in told
+    assert "It is no fault, as examples/a.py names &lt;it&gt;." in told
     assert "coursebuild diet box --record" in told
 
 

@@ -104,6 +104,8 @@ _ALL: dict[str, tuple[str, ...]] = {
     ),
 }
 _WORD = r"(?<![\w]){}(?![\w])"
+_UNNAMED = r"(?<![\w])(?<!\)\.){}(?![\w])"
+"""A word that is not asked of one thing, as in `data.joint("pivot").qpos`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +124,9 @@ class Readers:
 
     def whole(self, what: str) -> str:
         """Who reads all of a kind, or may: the path of the first; empty where nobody does."""
+        word_shape = _UNNAMED if "number" in what else _WORD
         shapes = [
-            re.compile(word if word.endswith(r"\(") or "\\" in word else _WORD.format(word))
-            for word in _ALL[what]
+            re.compile(word if "\\" in word else word_shape.format(word)) for word in _ALL[what]
         ]
         for file in self.files:
             if any(shape.search(file.text) for shape in shapes):

@@ -11,22 +11,24 @@ as it ends any other command.
 3. The rest of the pages is drawn, and the fonts are cut to what all of them need.
 4. What is wrong is printed, where it is something else than before.
 
-A save in between begins this anew; what was found stays as far as it holds.
+A save in between begins this anew; what was found stays as far as it holds. A script that runs is
+ended only where it is another by now: the others go on.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
-from coursebuild.effects.runner import ScriptServer
+from coursebuild.effects.runner import RunStoppedError, ScriptServer
 from coursebuild.model import Course, Document
 from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.labs import Engines, labs_of, try_labs
@@ -239,7 +241,11 @@ class Behind:
         options = self._options
         memory = Memory(options.root, options.store, fresh=True) if again else None
         stage = "running scripts again" if again else "running scripts"
-        runs = run(batch, options, self._progress, stage, memory, self._server)
+        run_all = functools.partial(self._server.run, unwanted=self._unwanted(batch))
+        try:
+            runs = run(batch, options, self._progress, stage, memory, run_all)
+        except RunStoppedError:
+            raise _SupersededError from None
         taken: list[Ran] = []
         for ran, done in zip(batch, runs, strict=True):
             new = Ran(jobs([ran])[0], ran.text, done)
@@ -250,6 +256,22 @@ class Behind:
             elif old is None or not _same_run(old, new):
                 taken.append(new)
         self._live.take_runs(taken)
+
+    def _unwanted(self, batch: Sequence[Extraction]) -> Callable[[frozenset[str]], bool]:
+        """Whether a script that runs is another by now, so that nobody waits for its output."""
+        begun = {extraction.path: (extraction.text, jobs([extraction])) for extraction in batch}
+        edits = self._seen
+
+        def unwanted(running: frozenset[str]) -> bool:
+            nonlocal edits
+            with self._live.changed:
+                if self._live.edits == edits:
+                    return False
+                edits = self._live.edits
+                now = {e.path: (e.text, jobs([e])) for e in self._extractions()}
+            return any(begun[path] != now.get(path) for path in running)
+
+        return unwanted
 
     def _verdicts(self, course: Course, runnable: Sequence[Extraction]) -> None:
         """What running the scripts shows to be wrong."""
