@@ -81,6 +81,6 @@ def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[D
             if count < 1 or abs(count * step - length) > 1e-9 * length:
                 message = f"the model's timestep, {step:g} s, does not divide `{name}`"
                 message += f" ({length:g} s)"
-                help = f"a multiple near it is {max(count, 1) * step:g}"
+                help = f"a multiple near it is {max(count, 1) * step:.12g}"
                 yield diagnose(_RULE, scenario.place(name), message, help=help)
             return

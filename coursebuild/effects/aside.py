@@ -36,7 +36,7 @@ class Aside:
         self._size = 0
         self._lock = threading.Lock()
         self._process = os.getpid()
-        self._texts: OrderedDict[int, str] = OrderedDict()
+        self._texts: OrderedDict[tuple[int, int], str] = OrderedDict()
 
     def __del__(self) -> None:
         """A copy of the process has closed the file already, and may have another by its number."""
@@ -84,10 +84,11 @@ class Aside:
 
     def _text(self, kept: Kept) -> str:
         with self._lock:
-            found = self._texts.pop(kept.start, None)
+            place = kept.start, kept.size  # what is empty begins where the next one does
+            found = self._texts.pop(place, None)
             if found is None:
                 found = self._read(kept.start, kept.size).decode("utf-8", "surrogatepass")
-            self._texts[kept.start] = found
+            self._texts[place] = found
             if len(self._texts) > _LAST:
                 self._texts.popitem(last=False)
             return found

@@ -10,33 +10,33 @@ Entry point: `measure_scene(model, declared, quick=…, clock=…, said=…)`.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from coursebuild.measured.bench import (
     OrderRow,
     ScenarioReport,
     Setting,
+    StableRow,
     Verdict,
     WorkPrecisionRow,
 )
 from coursebuild.model.scenarios import Declarations
 from coursebuild.physics.costs import Cost, costs, subnormal
-from coursebuild.physics.engine import varied
+from coursebuild.physics.engine import refsafe_from, varied
 from coursebuild.physics.front import Placed, Point, front, verdict, words
 from coursebuild.physics.grid import apply, own_setting, settings
 from coursebuild.physics.knowing import Known
 from coursebuild.physics.limits import stable
-from coursebuild.physics.measure import (
-    Error,
-    Errors,
-    order,
-)
+from coursebuild.physics.measure import HIGHEST, LOWEST, Error, Errors, order
 from coursebuild.physics.pilot import Pilot, pilot
 from coursebuild.physics.problem import STANDARD, Integrator
+from coursebuild.physics.rotation import angle_between
 from coursebuild.physics.rows import Measured, figure_name, measured
 from coursebuild.physics.scene import Scene, scenes
 from coursebuild.physics.stability import attempted
@@ -120,10 +120,10 @@ def measure_scenario(
         agreement=known.agreement,
         lyapunov=first.lyapunov,
         smooth=first.smooth,
-        notes=_notes(model, scene, first, known),
+        notes=_notes(model, scene, first, known, largest),
         figure=figure_name(model, scene),
         rows=rows,
-        orders=_orders(found, known, own) if first.smooth else (),
+        orders=_orders(found, known, own, _extents(known)) if first.smooth else (),
         stable=largest,
         verdict=_verdict(chosen, points, placed, found, chosen.index(own), by_cone),
     )
@@ -132,7 +132,9 @@ def measure_scenario(
 # ------------------------------------------------------------------------------------------ words
 
 
-def _notes(model: Any, scene: Scene, first: Pilot, known: Known) -> tuple[str, ...]:
+def _notes(
+    model: Any, scene: Scene, first: Pilot, known: Known, largest: Sequence[StableRow]
+) -> tuple[str, ...]:
     """What to know when reading the figures."""
     notes = [known.note]
     if first.jumps:
@@ -142,6 +144,9 @@ def _notes(model: Any, scene: Scene, first: Pilot, known: Known) -> tuple[str, .
         notes.append(f"errors count until {known.horizon:.6g} s: the motion is not known beyond")
     if subnormal(model, scene, first):
         notes.append("the state holds subnormal numbers, with which processors are slow")
+    soft = refsafe_from(model) if first.constrained else math.inf
+    if any((one.searched[1] if one.largest is None else one.largest) > soft for one in largest):
+        notes.append(f"beyond {soft:.6g} s refsafe softens constraints: stable, but another model")
     return tuple(note for note in notes if note)
 
 
@@ -158,7 +163,14 @@ def _verdict(
     model_error = by_cone[mine.setting.cone].seen
     noticeable = True if model_error >= 1 and mine.judgement.ok else mine.noticeable
     seen = None if mine.seen is None or noticeable is None else mine.seen + model_error
-    return verdict(chosen, points, placed, own, seen, mine.judgement.reasons)
+    unseen = [
+        (point.cost, number)
+        for number, (point, row) in enumerate(zip(points, found, strict=True))
+        if point is not None and row.seen is not None
+        if row.seen + by_cone[row.setting.cone].seen < 1
+    ]
+    enough = min(unseen)[1] if unseen else None
+    return verdict(chosen, points, placed, own, seen, mine.judgement.reasons, enough)
 
 
 # ------------------------------------------------------------------------------------------- rows
@@ -216,7 +228,7 @@ def _row(
         attitude=_both(errors.attitude),
         velocity=_both(errors.velocity),
         figure=_both(row.figure),
-        seen=row.seen,
+        seen=None if row.seen is None else row.seen + by_cone[row.setting.cone].seen,
         energy_drift=row.energy_drift,
         momentum_drift=row.momentum_drift,
         mean_energy=None if mean is None or beyond is None else mean / beyond - 1,
@@ -250,7 +262,21 @@ def _growth(model: Any, scene: Scene, first: Pilot, row: Measured) -> float | No
     return growth if math.isfinite(growth) and growth > 1 else None
 
 
-def _orders(found: Sequence[Measured], known: Known, own: Setting) -> tuple[OrderRow, ...]:
+def _extents(known: Known) -> tuple[float, float, float]:
+    """How much positions, attitudes and velocities change: an error as large is no small one."""
+    motion = known.motion
+    turned = angle_between(motion.attitude[:1], motion.attitude)
+    return (
+        float(np.linalg.norm(np.ptp(motion.position, axis=0))),
+        float(turned.max(initial=0.0)),
+        float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
+    )
+
+
+def _orders(
+    found: Sequence[Measured], known: Known, own: Setting, extents: tuple[float, float, float]
+) -> tuple[OrderRow, ...]:
+    place, turn, speed = extents
     rows = []
     for integrator in STANDARD:
         mine = [
@@ -263,19 +289,31 @@ def _orders(found: Sequence[Measured], known: Known, own: Setting) -> tuple[Orde
         rows.append(
             OrderRow(
                 integrator.value,
-                _order(mine, "position", known.floor.position),
-                _order(mine, "attitude", known.floor.attitude),
-                _order(mine, "velocity", known.floor.velocity),
+                _order(mine, "position", known.floor.position, place),
+                _order(mine, "attitude", known.floor.attitude, turn),
+                _order(mine, "velocity", known.floor.velocity, speed),
             )
         )
     return tuple(rows)
 
 
-def _order(rows: Sequence[Measured], part: str, floor: float) -> float | None:
+def _order(rows: Sequence[Measured], part: str, floor: float, extent: float) -> float | None:
     pairs = [
         (row.setting.timestep, getattr(row.errors, part).largest)
         for row in rows
         if row.errors is not None and getattr(row.errors, part) is not None
     ]
+    pairs = sorted((step, error) for step, error in pairs if error < HIGHEST * min(1, extent))
     fit = order([step for step, _ in pairs], [error for _, error in pairs], floor)
-    return None if fit is None else fit.value
+    if fit is None:
+        return None
+    slopes = [
+        math.log(more / less) / math.log(longer / shorter)
+        for (shorter, less), (longer, more) in itertools.pairwise(pairs)
+        if less > LOWEST * floor
+    ]
+    return fit.value if max(slopes) - min(slopes) < _STRAIGHT else None
+
+
+_STRAIGHT = 0.75
+"""The difference of slopes on the way from which on errors follow no one power of the timestep."""

@@ -28,8 +28,10 @@ from coursebuild.physics.scene import Scene
 from coursebuild.physics.timing import MOST, QUICK_MOST, Clock, Job, Timing, timed
 from coursebuild.values import dataclass
 
-MOMENTS = 4
+MOMENTS = 6
 """Times of a scenario from which steps are timed."""
+FEWEST_STEPS, MOST_STEPS, _COORDINATES = 8, 64, 1000
+"""Steps from each of them: fewer where there are many degrees of freedom."""
 JOB = 1_000_000
 """ns that a job takes at least."""
 
@@ -134,9 +136,13 @@ class _Batch:
 def _batch(
     model: Any, data: Any, scene: Scene, setting: Setting, moments: Sequence[Array], clock: Clock
 ) -> _Batch:
-    """A job that takes about as long as it should."""
-    longest = max(1, round(scene.scenario.duration / MOMENTS / setting.timestep))
-    steps = repeats = 1
+    """A job that takes about as long as it should.
+
+    It begins at all moments more often where steps are cheap; what is done from each of them is
+    always the same.
+    """
+    steps = _steps(model, scene, setting)
+    repeats = 1
     while True:
         job = _job(model, data, setting, moments, steps, repeats)
         before = clock()
@@ -144,10 +150,15 @@ def _batch(
         took = clock() - before
         if took >= JOB or repeats >= 1 << 12:
             return _Batch(job, steps * repeats * len(moments), repeats)
-        if steps < longest:
-            steps = min(longest, 2 * steps)
-        else:
-            repeats *= 2
+        repeats *= 2
+
+
+def _steps(model: Any, scene: Scene, setting: Setting) -> int:
+    """Steps from each moment: over the same time with every timestep, as far as that is little."""
+    most = min(MOST_STEPS, max(FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
+    end = scene.scenario.duration / MOMENTS
+    span = min(most * scene.own, end)
+    return max(1, min(round(span / setting.timestep), most))
 
 
 def _job(

@@ -13,6 +13,7 @@ Entry points: `compiled`, `varied`, `simulate`, `advance`, `watched`, `refsafe_a
 from __future__ import annotations
 
 import copy
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -180,11 +181,19 @@ def simulate_model(problem: Setup, model: Any, thickness: Array | None = None) -
 def refsafe_active(model: Any) -> bool:
     """Whether MuJoCo may soften a constraint because the timestep is long for its time constant.
 
+    See `refsafe_from`.
+    """
+    return float(model.opt.timestep) * (1 - 1e-12) > refsafe_from(model)
+
+
+def refsafe_from(model: Any) -> float:
+    """The timestep beyond which MuJoCo may soften a constraint, s; infinite where there is none.
+
     Unless `refsafe` is off it raises time constants to two timesteps: that is stable, and another
     model. Said of geoms that can touch, equalities, limits and dry friction.
     """
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
-        return False
+        return math.inf
     disabled = int(model.opt.disableflags)
     touching = (model.geom_contype | model.geom_conaffinity) != 0
     if disabled & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
@@ -201,7 +210,7 @@ def refsafe_active(model: Any) -> bool:
         ]
     )
     # A constant that is not positive is a stiffness, which is taken as it is.
-    return bool(np.any((constants > 0) & (constants < 2 * model.opt.timestep * (1 - 1e-12))))
+    return float(np.min(constants[constants > 0], initial=math.inf)) / 2
 
 
 def begun(problem: Setup, model: Any) -> Any:

@@ -119,27 +119,47 @@ def verdict(
     own: int,
     seen: float | None,
     reasons: Sequence[str],
+    enough: int | None = None,
 ) -> Verdict:
     """What the measurement says of the scene's own setting, number `own`.
 
     `seen`: its error in a picture, where 1 is just visible; `None` where it is not known.
     `reasons`: why it has none.
+    `enough`: the cheapest setting whose error is not seen; `None` where there is none.
     """
     noticeable = None if seen is None else seen >= 1
     mine, better = points[own], placed[own].dominated_by
     if reasons:
         return _lost(settings, points, placed, own, reasons)
+    told = _noticed(seen) + _enough(settings, points, own, seen, enough)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
         return Verdict(False, None, None, None, noticeable, text + _noticed(seen))
     if better is None:
         text = "no other setting is cheaper without being less accurate"
-        return Verdict(True, None, None, None, noticeable, text + _noticed(seen))
+        return Verdict(True, None, None, None, noticeable, text + told)
     other = points[better]
     assert other is not None
     cost, error = other.cost / mine.cost, other.error / mine.error if mine.error > 0 else 1.0
     text = f"{words(settings[better])} is {_compared(cost, error)}"
-    return Verdict(False, better, cost, error, noticeable, text + _noticed(seen))
+    return Verdict(False, better, cost, error, noticeable, text + told)
+
+
+def _enough(
+    settings: Sequence[Setting],
+    points: Sequence[Point | None],
+    own: int,
+    seen: float | None,
+    enough: int | None,
+) -> str:
+    """With what a learner would notice nothing, where something is noticed now."""
+    mine, other = points[own], None if enough is None else points[enough]
+    if seen is None or seen < 1 or mine is None:
+        return ""
+    if enough is None or other is None:
+        return ", as with every other setting that was measured"
+    cost = f"{other.cost / mine.cost:.2g} times its cost"
+    return f"; the cheapest without one that is seen is {words(settings[enough])}, at {cost}"
 
 
 def _lost(

@@ -140,7 +140,8 @@ class _Look:
 
     def __init__(self, model: Any) -> None:
         self.contact = self.limit = self.constrained = False
-        self.friction = False
+        self.friction = self.full = False
+        self._limited, self._range = _limited_activations(model)
 
     def __call__(self, data: Any) -> None:
         """See what acts."""
@@ -149,6 +150,9 @@ class _Look:
             self.limit = self.limit or data.nl > 0
             self.friction = self.friction or data.nf > 0
         self.contact = self.contact or data.ncon > 0
+        if self._limited.size and not self.full:
+            act = data.act[self._limited]
+            self.full = bool(np.any((act <= self._range[:, 0]) | (act >= self._range[:, 1])))
 
     def jumps(self, model: Any) -> tuple[str, ...]:
         """What makes accelerations jump."""
@@ -156,12 +160,24 @@ class _Look:
             (self.contact, "contact"),
             (self.limit, "a limit that is reached"),
             (self.friction, "dry friction"),
+            (self.full, "an activation at its limit"),
             (bool(model.nplugin), "a plugin"),
             (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator")
             if hasattr(model, "actuator_history")
             else (False, ""),
         )
         return tuple(words for there, words in found if there)
+
+
+def _limited_activations(model: Any) -> tuple[Any, Array]:
+    """Which activations are clamped, by number (n,), and between what (n, 2)."""
+    found = [
+        (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
+        for i in np.flatnonzero(model.actuator_actlimited)
+        for k in range(int(model.actuator_actnum[i]))
+    ]
+    limits: Array = np.array([limits for _, limits in found]).reshape(-1, 2)
+    return np.array([number for number, _ in found], dtype=np.intp), limits
 
 
 def _own(model: Any) -> Integrator:

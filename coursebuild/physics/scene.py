@@ -24,6 +24,8 @@ from coursebuild.values import dataclass
 
 DURATION = 2.0
 """Seconds of a scenario that does not say how long it takes."""
+MOST_STEPS = 20_000
+"""Steps under the model's own timestep that it takes at most."""
 LOOKS = 100
 """Samples that a scenario has where its author does not say, about."""
 FEWEST = 25
@@ -77,7 +79,7 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
     scenario = _timed(step, None, None, None, ())
     found = []
     for key in range(int(model.nkey)) or (-1,):
-        name = "start" if key < 0 else (model.key(key).name or f"keyframe-{key}")
+        name = "start" if key < 0 else _named(model, key)
         title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
         one = Scenario(scenario.duration, scenario.sample, keyframe=key)
         found.append(Scene(name, title, one, _ladder(one, step, powers), step, visible, None))
@@ -127,6 +129,18 @@ def _declared(
     return Scene(declared.name, title, scenario, ladder, step, visible, declared)
 
 
+def _named(model: Any, key: int) -> str:
+    """What the scenario of a keyframe is called: as no other is."""
+    own = str(model.key(key).name)
+    if own.strip():
+        return own
+    others = {str(model.key(other).name) for other in range(int(model.nkey))}
+    name = f"keyframe-{key}"
+    while name in others:
+        name += "-"
+    return name
+
+
 def _keyframe(model: Any, declared: DeclaredScenario) -> int:
     wanted = declared.keyframe
     if wanted is None:
@@ -169,7 +183,7 @@ def _timed(
     whole = {name: _steps(length, step, name) for name, length in given if length is not None}
     held, looks = whole.get("hold"), whole.get("sample")
     last = held * len(controls) if held is not None and len(controls) > 1 else 0
-    total = whole.get("duration") or max(last, round(DURATION / step), 1)
+    total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
     if looks is None:
         basis = math.gcd(*(whole[name] for name in ("duration", "hold") if name in whole))
         looks = _looks(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))

@@ -2,10 +2,11 @@
 
 Entry point: `timed(jobs, own, clock)`.
 
-1. Every candidate is timed beside the scene's own setting, one right after the other and in
-   alternating order, so that what slows the machine slows both: their ratio is what counts.
-2. The median of the ratios forgets the disturbed ones. Rounds go on until all medians are known
-   well enough, or a cap is reached.
+1. Candidates are timed in turns, each beside the scene's own setting and in alternating order, so
+   that what slows the machine for a while slows all.
+2. Of the times of each, the lowest tenth counts: it forgets those that were disturbed, and does not
+   hang on a single lucky one. Rounds go on until all ratios are known well enough, or a cap is
+   reached.
 3. The least time of all rounds is what an undisturbed machine takes; the median over it says how
    much it was disturbed.
 
@@ -27,15 +28,13 @@ Clock: TypeAlias = Callable[[], int]
 Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
-FEWEST, MOST = 12, 120
+FEWEST, MOST = 24, 60
 """Rounds."""
-QUICK_MOST = 30
+QUICK_MOST = 24
 ENOUGH = 0.005
-"""Relative uncertainty of a median at which rounds end."""
-_MAD = 1.4826
-"""Standard deviations in a median of absolute deviations, of a normal distribution."""
-_MEDIAN = 1.2533
-"""Uncertainty of a median over that of a mean."""
+"""Relative uncertainty of a ratio at which rounds end."""
+_PARTS = 4
+"""Into so many parts the rounds are cut, to see how much ratios vary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +42,9 @@ class Timing:
     """What a candidate took."""
 
     ratio: float
-    """Median of its time over the own setting's beside it."""
+    """Its time over the own setting's, the lowest tenths of both."""
     uncertainty: float
-    """Of the ratio, relative: one standard error of the median."""
+    """Of the ratio, relative: its standard error, from parts of the rounds."""
     least: float
     """Least time of one job, ns."""
     spread: float
@@ -73,25 +72,20 @@ def timed(
         job()
     aside = [0.0] * len(jobs) if idle is None else idle
     times: list[list[float]] = [[] for _ in jobs]
-    ratios: list[list[float]] = [[] for _ in jobs]
-    open_ones = [index for index in range(len(jobs)) if index != own]
+    others = [index for index in range(len(jobs)) if index != own]
+
+    def take(index: int) -> None:
+        times[index].append(max(0.0, _once(jobs[index], clock) - aside[index]))
+
     for turn in range(most):
-        for place, index in enumerate(open_ones):
-            first, second = (own, index) if (turn + place) % 2 else (index, own)
-            a = max(0.0, _once(jobs[first], clock) - aside[first])
-            b = max(0.0, _once(jobs[second], clock) - aside[second])
-            theirs, ours = (b, a) if first == own else (a, b)
-            times[index].append(theirs)
-            times[own].append(ours)
-            if ours > 0:
-                ratios[index].append(theirs / ours)
-        if not open_ones:
-            times[own].append(max(0.0, _once(jobs[own], clock) - aside[own]))
-        if turn + 1 >= FEWEST:
-            open_ones = [i for i in open_ones if not _uncertainty(ratios[i]) <= enough]
-            if not open_ones:
-                break
-    return tuple(_timing(times[i], [1.0] if i == own else ratios[i]) for i in range(len(jobs)))
+        for place, index in enumerate(others or [own]):
+            for one in (own, index) if (turn + place) % 2 else (index, own):
+                take(one)
+        if turn + 1 >= FEWEST and all(
+            _uncertainty(times[index], times[own]) <= enough for index in others
+        ):
+            break
+    return tuple(_timing(mine, times[own], exact=index == own) for index, mine in enumerate(times))
 
 
 def _once(job: Job, clock: Clock) -> int:
@@ -100,21 +94,42 @@ def _once(job: Job, clock: Clock) -> int:
     return clock() - before
 
 
-def _timing(times: Sequence[float], ratios: Sequence[float]) -> Timing:
+def _timing(times: Sequence[float], own: Sequence[float], *, exact: bool) -> Timing:
     least = min(times)
     return Timing(
-        ratio=statistics.median(ratios) if ratios else math.nan,
-        uncertainty=_uncertainty(ratios),
+        ratio=1.0 if exact else _ratio(times, own),
+        uncertainty=0.0 if exact else _uncertainty(times, own),
         least=least,
         spread=statistics.median(times) / least if least > 0 else math.inf,
         rounds=len(times),
     )
 
 
-def _uncertainty(ratios: Sequence[float]) -> float:
-    """Relative standard error of the median, from the median of absolute deviations."""
-    if not ratios:
+def _ratio(times: Sequence[float], own: Sequence[float]) -> float:
+    ours = _low(own)
+    return _low(times) / ours if ours > 0 else math.nan
+
+
+def _low(times: Sequence[float]) -> float:
+    """The lowest tenth, between the two times that are nearest to it."""
+    ordered = sorted(times)
+    place = (len(ordered) - 1) / 10
+    below = math.floor(place)
+    above = min(below + 1, len(ordered) - 1)
+    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
+
+
+def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:
+    """Relative standard error of a ratio, from the ratios of parts of the rounds."""
+    if len(times) < _PARTS:
         return math.inf
-    middle = statistics.median(ratios)
-    off = statistics.median(abs(one - middle) for one in ratios)
-    return _MEDIAN * _MAD * off / (math.sqrt(len(ratios)) * middle) if middle > 0 else math.inf
+    parts = [_ratio(a, b) for a, b in zip(_cut(times), _cut(own), strict=True)]
+    middle = statistics.fmean(parts)
+    if not middle > 0:
+        return math.inf
+    return statistics.stdev(parts) / (math.sqrt(_PARTS) * middle)
+
+
+def _cut(times: Sequence[float]) -> list[Sequence[float]]:
+    size = len(times) // _PARTS
+    return [times[at : at + size] for at in range(0, size * _PARTS, size)]

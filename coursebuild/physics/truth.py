@@ -5,7 +5,8 @@ Entry points: `references(model, scene, pilot)`, `conserved(…)`, `energy_beyon
 1. Errors under a cone are those of the timestep and the solver: they are measured against what the
    engine tends to under that cone in small steps.
 2. What remains then is the model's own error, a figure by itself: against the closed form where the
-   scenario names one, else of a pyramid against the cone that it stands for.
+   scenario names one, else of a pyramid against the cone that it stands for. As any error it is
+   given no smaller than ten floors.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from coursebuild.physics.detector import Judgement, Status
 from coursebuild.physics.engine import Run, begun, invariants, simulate_model, varied
 from coursebuild.physics.knowing import Known, difference, itself, know
-from coursebuild.physics.measure import energy_drift, energy_scale, momentum_drift
+from coursebuild.physics.measure import FLOORS, energy_drift, energy_scale, momentum_drift
 from coursebuild.physics.pilot import Pilot
 from coursebuild.physics.problem import Integrator
 from coursebuild.physics.rows import Conserved, visible_error
@@ -63,13 +64,15 @@ def references(model: Any, scene: Scene, first: Pilot, *, quick: bool = False) -
         count = min(len(limit.states.times), len(truth.states.times))
         gap = difference(limit.until(count).motion, truth.until(count).motion)
         sticks = sticking(model, scene, limit.states)
+        least = FLOORS * max(limit.floor.place, truth.floor.place)
         if known.kind == "closed":
-            found[cone] = Cone(known, gap.place, 0.0, sticks)
+            found[cone] = Cone(known, max(gap.place, least), 0.0, sticks)
         elif cone == "elliptic":
             found[cone] = Cone(limit, None, 0.0, sticks)
         else:
             near, true = limit.until(count).states, truth.until(count).states
-            found[cone] = Cone(limit, gap.place, visible_error(model, scene, near, true), sticks)
+            seen = visible_error(model, scene, near, true) if gap.place > least else 0.0
+            found[cone] = Cone(limit, max(gap.place, least), seen, sticks)
     return found
 
 

@@ -24,6 +24,7 @@ from coursebuild.effects.aside import Aside
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
+from coursebuild.pipeline.bundles import Bundle
 from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
 from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Later, Read, Request
 from coursebuild.pipeline.shelf import Shelf
@@ -94,10 +95,11 @@ class Documents:
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the outlines of sources, of which it is said which are lessons."""
         missing: list[Task] = []
+        bundled = Bundle(self._store, len(sources))
         for source, lesson in sources:
             task = Task.of(source, callouts, lesson)
             self._tasks[source.path] = task
-            outline = self._stored(task)
+            outline = self._stored(task, bundled)
             if outline is None:
                 missing.append(task)
             else:
@@ -108,14 +110,17 @@ class Documents:
             prepare_to_read(missing[0])
         rest = iter(missing)
         while tasks := tuple(islice(rest, _AT_ONCE)):
-            self._read(tasks)
+            self._read(tasks, bundled)
+        bundled.save()
 
-    def _read(self, tasks: Sequence[Task]) -> None:
+    def _read(self, tasks: Sequence[Task], bundled: Bundle) -> None:
         requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in tasks]
         answers, readers = self._work("reading lessons and pages", requests)
         for task, data, reader in zip(tasks, answers, readers, strict=True):
             outline = self._opened(data, task)
             assert outline is not None
+            if outline.lasting:
+                bundled.add(task.key, data)
             self._outlines[task.source.path] = outline
             self._readers[task.source.path] = reader
 
@@ -194,9 +199,16 @@ class Documents:
         """A page and its body, drawn here and now."""
         return self._here().draw(page)
 
-    def _stored(self, task: Task) -> Outline | None:
-        data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
-        return None if data is None else self._opened(data, task)
+    def _stored(self, task: Task, bundled: Bundle) -> Outline | None:
+        if self._store.fresh:
+            return None
+        data = bundled.get(task.key)
+        if data is None:
+            data = self._store.peek(OUTLINES, task.key)
+            if data is None:
+                return None
+            bundled.add(task.key, data)
+        return self._opened(data, task)
 
     def _opened(self, data: bytes, task: Task) -> Outline | None:
         """An outline, put aside where that is wanted; `None` where the bytes are none."""

@@ -68,7 +68,7 @@ class Pages:
         self._store = store
         self._aside = documents.aside or Aside(store.folder)
         self._facts = _Facts()
-        self._pages = tuple(self._made([self._wanted(make) for make in sheets(library)]))
+        self._pages = self._made([self._wanted(make) for make in sheets(library)])
 
     @property
     def facts(self) -> PageFacts:
@@ -140,33 +140,39 @@ class Pages:
 
     # --- records and bodies
 
-    def _made(self, pages: list[_Wanted]) -> Iterator[_Page]:
+    def _made(self, pages: list[_Wanted]) -> list[_Page]:
         """The pages with their records, which are drawn where they are nowhere."""
         last = self._load_last()
-        same = list(last) == [page.key for page in pages]
-        known = {page.key: data for page in pages if (data := self._known(page.key, last))}
-        new = [page for page in pages if page.key not in known]
+        packed = {page.key: self._known(page.key, last) for page in pages}
+        found = {page.key: made for page in pages if (made := self._noted(page, packed[page.key]))}
+        new = [page for page in pages if page.key not in found]
         self.drawn = tuple(page.path for page in new)
         """Site paths of the pages that were drawn just now."""
         later = [Later(p.document, functools.partial(self._request, p)) for p in new]
-        drawn = self._documents.draw(later)
-        known |= {page.key: data for page, data in zip(new, drawn, strict=True)}
-        if not same:
-            data = bundle((page.key, known[page.key]) for page in pages)
-            self._store.keep(_SITE, self._name(), data, local=True)
-        for page in pages:
-            record = unpack_record(known[page.key])
-            assert record is not None
-            self._facts.add(record)
-            yield _Page(page, self._aside.put(known[page.key]), record.draft.indexed)
+        for page, data in zip(new, self._documents.draw(later), strict=True):
+            packed[page.key] = data
+            made = self._noted(page, data)
+            assert made is not None
+            found[page.key] = made
+        if list(last) != list(packed):
+            self._store.keep(_SITE, self._name(), bundle(packed.items()), local=True)
+        return [found[page.key] for page in pages]
 
-    def _known(self, key: str, last: Mapping[str, bytes]) -> bytes | None:
-        """A packed record that can be read."""
+    def _known(self, key: str, last: Mapping[str, bytes]) -> bytes:
+        """A packed record; empty where there is none."""
         data = last.get(key)
         if data is None and not self._store.fresh:
             kept = self._store.peek(PAGES, key)
             data = None if kept is None else part(kept)[0]
-        return data if data and unpack_record(data) is not None else None
+        return data or b""
+
+    def _noted(self, page: _Wanted, packed: bytes) -> _Page | None:
+        """A page whose record can be read, now that it is known what it says."""
+        record = unpack_record(packed) if packed else None
+        if record is None:
+            return None
+        self._facts.add(record)
+        return _Page(page, self._aside.put(packed), record.draft.indexed)
 
     def _load_last(self) -> dict[str, bytes]:
         data = None if self._store.fresh else self._store.peek(_SITE, self._name())

@@ -1,6 +1,7 @@
 """Records of pages as bytes, alone, with the body of their page, and all of a site together.
 
-Entry points: `pack_record` and `unpack_record`; `join` and `part`; `bundle` and `unbundle`.
+Entry points: `pack_record` and `unpack_record`; `join` and `part`; `bundle` and `unbundle`, for any
+bytes whose keys are hashes.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def part(data: bytes) -> tuple[bytes, bytes]:
 
 
 def bundle(records: Iterable[tuple[str, bytes]]) -> bytes:
-    """Packed records with their keys."""
+    """All of them with their keys."""
     return b"".join(
         piece
         for key, record in records
@@ -54,7 +55,7 @@ def bundle(records: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def unbundle(data: bytes) -> dict[str, bytes]:
-    """The packed records by their keys; as many as there are whole ones."""
+    """The same by their keys; as many as there are whole ones."""
     found: dict[str, bytes] = {}
     at = 0
     while at + _KEY + _LENGTH.size <= len(data):

@@ -51,7 +51,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
         head += "  " + style.paint("quick: fewer settings, rough times", _YELLOW)
     lines = [head, *_wrapped(_machine(scene.machine), style, _INDENT)]
     if not scene.scenarios:
-        lines.append(f"{_INDENT}no scenario was measured")
+        lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
     for scenario in scene.scenarios:
         lines += ["", *_scenario(scenario, style)]
     return "\n".join(lines) + "\n"
@@ -100,7 +100,10 @@ def _usual(report: ScenarioReport) -> list[str]:
 
 
 def _reference(report: ScenarioReport) -> list[str]:
-    said = [f"reference ({report.reference}, known to {report.floor:.0e}): {report.source}"]
+    known = f"known to {report.floor:.0e}"
+    if report.velocity_floor > report.floor:
+        known += f", velocities to {report.velocity_floor:.0e}"
+    said = [f"reference ({report.reference}, {known}): {report.source}"]
     if report.second:
         off = "" if report.agreement is None else f", which differs by {report.agreement:.1e}"
         said.append(f"second: {report.second}{off}")

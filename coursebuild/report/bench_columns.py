@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 from coursebuild.measured.bench import ScenarioReport, Setting, WorkPrecisionRow
 from coursebuild.measured.points import (
+    FLOORS,
     quantities,
     seconds_text,
     solving_parts,
@@ -71,10 +72,20 @@ def _figures(report: ScenarioReport) -> Iterator[Column]:
     yield _column(report, "mean energy", 5, lambda row: _drift(row.mean_energy))
     yield _column(report, "depth", 5, lambda row: _number(row.penetration or None))
     yield _column(report, "slip", 5, lambda row: _number(row.slip))
-    yield _column(report, "model error", 5, lambda row: _number(row.model_error))
+    large = any(_large_model_error(row, report.floor) for row in report.rows)
+    yield _column(report, "model error", 1 if large else 5, lambda row: _number(row.model_error))
     yield _column(report, "cost", 0, lambda row: _number(row.cost, 3))
-    yield _column(report, "× real time", 4, lambda row: _speed(row.realtime))
+    costs = any(row.cost is not None for row in report.rows)
+    yield _column(report, "× real time", 4 if costs else 0, lambda row: _speed(row.realtime))
     yield _column(report, "spread", 8, lambda row: _number(row.spread, 3))
+
+
+def _large_model_error(row: WorkPrecisionRow, floor: float) -> bool:
+    """Whether it is beyond what can be told, and no less than what the timestep adds."""
+    if row.model_error is None or row.model_error <= FLOORS * floor * (1 + 1e-9):
+        return False
+    pairs = (row.position, row.attitude)
+    return all(pair is None or row.model_error >= pair[0] for pair in pairs)
 
 
 def _judged(report: ScenarioReport) -> Iterator[Column]:

@@ -19,6 +19,7 @@ from typing import Any
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.measured.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.measured.departures import Checked
+from coursebuild.measured.points import quantities
 from coursebuild.measured.records import Failure
 
 COLUMNS = (
@@ -104,9 +105,11 @@ def _setting(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, Any]:
 
 def _figures(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, Any]:
     value: dict[str, Any] = {"figure": scenario.figure}
+    least = {one.name: one.least for one in quantities(scenario)}
     for name in ("position", "attitude", "velocity", "figure"):
         pair: tuple[float, float] = getattr(row, name) or (math.nan, math.nan)
-        value[f"{name}_error"], value[f"{name}_error_end"] = map(_finite, pair)
+        told = (max(one, least.get(name, 0.0)) for one in pair)  # what is no number stays so
+        value[f"{name}_error"], value[f"{name}_error_end"] = map(_finite, told)
     order = next((o for o in scenario.orders if o.integrator == row.setting.integrator), None)
     for name in ("position", "attitude", "velocity"):
         value[f"order_{name}"] = _finite(None if order is None else getattr(order, name))

@@ -35,6 +35,8 @@ def divergence(
         if run.outcome is Outcome.OK and run.trace is not None and not found:
             yield _stable(extraction)
         return
+    if not found:
+        return
     by_path = {each.path: each for each in extractions}
     lost = _lost(run)
     if lost:

@@ -12,8 +12,10 @@ from coursekit import Folder, block
 
 from coursebuild.pipeline import documents
 from coursebuild.pipeline.build import build, prepare
+from coursebuild.pipeline.bundles import WORTHWHILE
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.results import KeptFile, OutputFile
 
 FEW, MANY = 12, 48
 TEXT = 20_000
@@ -51,7 +53,8 @@ def peak(folder: Folder) -> int:
             assert prepared.report.ok, prepared.report.diagnostics
             for file in prepared.files:
                 if file.path.endswith(".html"):
-                    file.data if hasattr(file, "data") else file.make()
+                    assert isinstance(file, KeptFile)
+                    file.make()
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -81,7 +84,6 @@ def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, aga
         peaks.append(peak(folder))
     _, few, many = peaks
     slope = (many - few) / (MANY - FEW)
-    print(peaks, slope)
     assert slope < SLOPE, f"{slope:.0f} bytes a lesson"
 
 
@@ -99,3 +101,36 @@ def test_pages_are_drawn_in_copies_of_what_was_read_here(
         assert build(options(folder, jobs), Path("public")).ok
         sites.append(folder.tree("public"))
     assert sites[0] == sites[1]
+
+
+def test_outlines_come_from_one_file_and_from_many(tmp_path: Path, stores: Path) -> None:
+    """Whether they are in the bundle, beside it, in neither, or damaged: the site is the same."""
+    folder = Folder(tmp_path / "course")
+    write_course(folder, WORTHWHILE + 8, 300)
+    folder.borrow(stores)
+    for store in ("outlines", "bundles"):
+        (folder.root / ".coursebuild" / store).unlink(missing_ok=True)
+    kept = folder.root / ".coursebuild"
+    assert build(options(folder), Path("public")).ok
+    clean = folder.tree("public")
+    (bundled,) = (kept / "bundles").iterdir()
+
+    def again() -> dict[str, bytes]:
+        with prepare(options(folder), Progress(quiet=True)) as prepared:
+            assert prepared.report.ok, prepared.report.diagnostics
+            made = {
+                f.path: f.data if isinstance(f, OutputFile) else f.make() for f in prepared.files
+            }
+        return {path: data for path, data in clean.items() if made.get(path) != data}
+
+    marker = {".coursebuild-site"}
+    shutil.rmtree(kept / "outlines")
+    assert again().keys() == marker  # only what publishing adds
+    assert not (kept / "outlines").exists(), "nothing was read again"
+    bundled.write_bytes(bundled.read_bytes()[:-7])
+    assert again().keys() == marker
+    assert len(list((kept / "outlines").iterdir())) == WORTHWHILE + 8
+    (bundled,) = (kept / "bundles").iterdir()
+    shutil.rmtree(kept / "bundles")
+    assert again().keys() == marker
+    assert [entry.name for entry in (kept / "bundles").iterdir()] == [bundled.name]

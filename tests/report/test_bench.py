@@ -70,7 +70,7 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
 def test_where_nothing_was_measured() -> None:
     text = bench_text([scene(scenario([])), replace(scene(), scenarios=())], Style(width=80))
     assert "    no setting was measured\n" in text
-    assert text.endswith("A Processor @ 2 GHz\n  no scenario was measured\n")
+    assert text.endswith("A Processor @ 2 GHz\n  nothing can move in it, so that nothing was measured\n")
     assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
 
 
