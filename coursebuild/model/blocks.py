@@ -304,6 +304,14 @@ class Document:
         default=None, init=False, repr=False, compare=False, hash=False
     )
     """Gives the document with its blocks, where they are away."""
+    _keep: Callable[[Excerpt], Callable[[], Excerpt]] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """Puts code aside, where blocks are away."""
+    _scripts: list[Script] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """What `document_scripts` gives, once it was asked for and blocks are away."""
 
     @property
     def is_away(self) -> bool:
@@ -311,14 +319,22 @@ class Document:
         return self._load is not None
 
     @classmethod
-    def away(cls, source: Source, load: Callable[[], Document]) -> Document:
+    def away(
+        cls,
+        source: Source,
+        load: Callable[[], Document],
+        keep: Callable[[Excerpt], Callable[[], Excerpt]] | None = None,
+    ) -> Document:
         """A document whose blocks are fetched each time they are asked for.
 
-        They are equal each time, but need not be the same objects.
+        They are equal each time, but need not be the same objects. `keep` puts code aside and says
+        how to get it back, without the rest of the document.
         """
         document = object.__new__(cls)
         object.__setattr__(document, "source", source)
         object.__setattr__(document, "_load", load)
+        object.__setattr__(document, "_keep", keep)
+        object.__setattr__(document, "_scripts", None)
         return document
 
     if not TYPE_CHECKING:

@@ -7,8 +7,6 @@ Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_b
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
-from itertools import islice
 
 from coursebuild.model.blocks import (
     Block,
@@ -117,19 +115,14 @@ def document_blocks(document: Document) -> Iterator[Block]:
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
     """The complete scripts of a document; where its blocks are away, so is the code of these."""
-    if not document.is_away:
-        return tuple(block for block in document_blocks(document) if isinstance(block, Script))
-    return tuple(
-        replace(block, code=Excerpt.away(document.source, partial(_code, document, number)))
-        for number, block in enumerate(document_blocks(document))
-        if isinstance(block, Script)
-    )
-
-
-def _code(document: Document, number: int) -> Excerpt:
-    block = next(islice(document_blocks(document), number, None))
-    assert isinstance(block, Script)
-    return block.code
+    known = document._scripts
+    if known is None:
+        known = [block for block in document_blocks(document) if isinstance(block, Script)]
+        if document._keep is not None:
+            source, keep = document.source, document._keep
+            known = [replace(s, code=Excerpt.away(source, keep(s.code))) for s in known]
+            object.__setattr__(document, "_scripts", known)
+    return tuple(known)
 
 
 def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:

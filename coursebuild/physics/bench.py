@@ -169,8 +169,17 @@ def _verdict(
         if point is not None and row.seen is not None
         if row.seen + by_cone[row.setting.cone].seen < 1
     ]
-    enough = min(unseen)[1] if unseen else None
-    return verdict(chosen, points, placed, own, seen, mine.judgement.reasons, enough)
+    hopeless = all(row.noticeable for row in found if row.judgement.ok)
+    return verdict(
+        chosen,
+        points,
+        placed,
+        own,
+        seen,
+        mine.judgement.reasons,
+        min(unseen)[1] if unseen else None,
+        hopeless=hopeless,
+    )
 
 
 # ------------------------------------------------------------------------------------------- rows

@@ -120,18 +120,21 @@ def verdict(
     seen: float | None,
     reasons: Sequence[str],
     enough: int | None = None,
+    *,
+    hopeless: bool = False,
 ) -> Verdict:
     """What the measurement says of the scene's own setting, number `own`.
 
     `seen`: its error in a picture, where 1 is just visible; `None` where it is not known.
     `reasons`: why it has none.
     `enough`: the cheapest setting whose error is not seen; `None` where there is none.
+    `hopeless`: whether the errors of all are.
     """
     noticeable = None if seen is None else seen >= 1
     mine, better = points[own], placed[own].dominated_by
     if reasons:
         return _lost(settings, points, placed, own, reasons)
-    told = _noticed(seen) + _enough(settings, points, own, seen, enough)
+    told = _noticed(seen) + _enough(settings, points, own, seen, enough, hopeless)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
         return Verdict(False, None, None, None, noticeable, text + _noticed(seen))
@@ -151,13 +154,14 @@ def _enough(
     own: int,
     seen: float | None,
     enough: int | None,
+    hopeless: bool,
 ) -> str:
     """With what a learner would notice nothing, where something is noticed now."""
     mine, other = points[own], None if enough is None else points[enough]
     if seen is None or seen < 1 or mine is None:
         return ""
     if enough is None or other is None:
-        return ", as with every other setting that was measured"
+        return ", and that of every other setting too" if hopeless else ""
     cost = f"{other.cost / mine.cost:.2g} times its cost"
     return f"; the cheapest without one that is seen is {words(settings[enough])}, at {cost}"
 

@@ -99,7 +99,7 @@ def measured(
         found = _raised(errors(motion, known.motion), known)
         floor = FLOORS * visible_error(model, scene, known.states, known.other)
         shown = visible_error(model, scene, states, known.states)
-        seen, noticeable = max(shown, floor), None if shown < 1 <= floor else shown >= 1
+        seen, noticeable = max(shown, floor), None if max(1, shown) <= floor else shown >= 1
         figure = _figure(model, scene, states, known)
         creep = None if sticks is None else slip(model, scene, states, sticks)
     return Measured(

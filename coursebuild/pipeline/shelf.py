@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 from coursebuild.effects.aside import Aside, Kept
 from coursebuild.model import Document
-from coursebuild.pipeline.outlines import unpack
-from coursebuild.source import Source
+from coursebuild.pipeline.outlines import pack, unpack
+from coursebuild.source import Excerpt, Source
 
 ROOM = 4 << 20
 """Bytes of packed documents that stay; in memory they take about three times as much."""
@@ -37,7 +37,12 @@ class Shelf:
     def document(self, source: Source, data: bytes, again: Callable[[], Document]) -> Document:
         """A document by what `pack` made of it; `again` makes it where that cannot be used."""
         kept = self.aside.put(data)
-        return Document.away(source, lambda: self._fetched(kept, source, again))
+
+        def keep(code: Excerpt) -> Callable[[], Excerpt]:
+            put = self.aside.put(pack((code.text, code.pieces)))
+            return lambda: Excerpt(source, *unpack(put(), source))
+
+        return Document.away(source, lambda: self._fetched(kept, source, again), keep)
 
     def _fetched(self, kept: Kept, source: Source, again: Callable[[], Document]) -> Document:
         with self._lock:

@@ -174,14 +174,14 @@ class _Site:
         if not self.library.scripts:
             return zips.Surroundings()
         known = all_imports(self.documents.outlines)
-        texts = {
-            script.code.text: known[path]
+        by_text = {
+            _digest(script.code.text): known[path]
             for path, (script, _) in self.library.scripts.items()
             if path in known
         }
-        used = {name for modules in texts.values() for name in modules}
+        used = {name for modules in by_text.values() for name in modules}
         library = library_files() if "mjcourse" in used else ()
-        imports = _Imports(self.store, texts)
+        imports = _Imports(self.store, by_text)
         modules = zips.imported_modules(self.course, library, imports)
         packages = tuple(zips.Package(*p) for p in kept_distributions(self.store, modules))
         meshes = tuple(
@@ -238,25 +238,31 @@ class _Data:
 class _Imports:
     """What Python texts import: those of lessons are known, others are kept."""
 
-    def __init__(self, store: Store, known: dict[str, frozenset[str]]) -> None:
+    def __init__(self, store: Store, known: dict[bytes, frozenset[str]]) -> None:
+        """`known` go by the hash of their text."""
         self._store = store
         self._known = known
 
     def __call__(self, text: str) -> frozenset[str]:
-        if text not in self._known:
+        digest = _digest(text)
+        if digest not in self._known:
             data = self._store.kept(
                 "imports",
                 _key(sys.version, text),
                 lambda: json.dumps(sorted(zips.imports(text))).encode(),
             )
-            self._known[text] = frozenset(json.loads(data))
-        return self._known[text]
+            self._known[digest] = frozenset(json.loads(data))
+        return self._known[digest]
 
 
 def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
     archive = make()
     assert archive is not None
     return archive.packed()
+
+
+def _digest(text: str) -> bytes:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).digest()
 
 
 def _key(*parts: str) -> str:

@@ -140,9 +140,9 @@ def imported_modules(
         for script in document_scripts(document)
     ]
     own = {_module(script.path) for script in scripts} | {"mjcourse"}
-    texts = [script.code.text for script in scripts]
-    texts += [file.data.decode() for file in library if file.path.endswith(".py")]
-    found = {name for text in texts for name in imports(text)}
+    found = {name for script in scripts for name in imports(script.code.text)}
+    texts = (file.data.decode() for file in library if file.path.endswith(".py"))
+    found |= {name for text in texts for name in imports(text)}
     return tuple(sorted(found - own - sys.stdlib_module_names))
 
 

@@ -83,6 +83,19 @@ def test_a_verdict_on_a_bad_one() -> None:
     )
 
 
+def test_a_verdict_names_what_would_be_enough() -> None:
+    points: list[Point | None] = [Point(0.5, 50), Point(2, 1e-6)]
+    found = verdict([EULER, RK4], points, front(points), 0, 50, (), 1)
+    assert found.text.endswith(
+        "a learner would notice its error, which is 50 times what can be seen; the cheapest "
+        "without one that is seen is RK4 at 0.01 s, at 4 times its cost"
+    )
+    found = verdict([EULER, RK4], points, front(points), 0, 50, (), hopeless=True)
+    assert found.text.endswith("times what can be seen, and that of every other setting too")
+    found = verdict([EULER, RK4], points, front(points), 0, 0.5, (), 1)
+    assert found.text.endswith("which is 0.5 of what can be seen")
+
+
 def test_a_verdict_where_too_little_is_known() -> None:
     found = judged([Point(1, 2.0), Point(0.5, 2.0)], None)
     assert found.noticeable is None

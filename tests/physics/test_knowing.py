@@ -18,6 +18,7 @@ from coursebuild.physics.problems import all_problems
 from coursebuild.physics.scene import SceneError, scenes
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
+from coursebuild.values import replace
 from coursebuild.vocabulary import CLOSED_FORMS
 
 PENDULUM = """\
@@ -113,6 +114,53 @@ def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: 
     assert found.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
     assert found.second == f"the same under Euler at {2 * step:g} s"
     assert found.floor.place > 1e-7, "it is not called better known than it is"
+
+
+FULL = 'dyntype="integrator" gainprm="2" actlimited="true" actrange="-{most} {most}"'
+"""An activation that a constant command fills until it is full."""
+
+
+def test_an_activation_at_its_limit_is_a_jump() -> None:
+    # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    first = pilot(model, scene)
+    assert first.jumps == ("an activation at its limit",)
+    found = know(model, scene, first, quick=True)
+    assert found.kind == "self"
+    model.opt.timestep = 1e-4
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 20_000)
+    assert data.act[0] == 0.3
+    assert found.states.act[-1, 0] == 0.3
+    assert found.motion.position[-1, 0] == pytest.approx(data.qpos[0], abs=1e-3)
+    wide = pendulum("damping='1'", actuator=FULL.format(most=9))
+    wide.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(wide, None, quick=True)
+    assert pilot(wide, scene).jumps == ()
+
+
+def test_an_integration_of_other_accelerations_is_no_reference() -> None:
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    unseen = replace(pilot(model, scene), jumps=())  # as of something that is not looked for
+    found = know(model, scene, unseen, quick=True)
+    assert found.kind == "self"
+    assert found.note == "no integration: the engine in small steps tends elsewhere"
+
+
+def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
+    text = 'dyntype="filterexact" dynprm="0.1" gainprm="2"'
+    early = pendulum(actuator=f'{text} actearly="true"')
+    late = pendulum(actuator=text)
+    for model in (early, late):
+        model.key_ctrl[0, 0] = 1.0
+    first, second = known(early), known(late)
+    assert (first.kind, second.kind) == ("ode", "ode")
+    assert np.array_equal(first.states.qpos, second.states.qpos)
 
 
 def test_a_limit_that_is_not_reached_changes_nothing() -> None:

@@ -163,3 +163,22 @@ def test_half_thicknesses() -> None:
         '<geom type="box" size="1 0.02 3"/></worldbody></mujoco>'
     )
     assert np.array_equal(thickness(model), [np.inf, 0.3, 0.02, np.inf])
+
+
+def test_names_of_scenarios_that_nobody_wrote_differ() -> None:
+    keys = '<key qpos="1"/><key name="keyframe-0"/><key name="  "/><key name="low"/>'
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody>"
+        f"<keyframe>{keys}</keyframe></mujoco>"
+    )
+    names = [one.name for one in scenes(model, None)]
+    assert names == ["keyframe-0-", "keyframe-0", "keyframe-2", "low"]
+
+
+def test_a_tiny_timestep_makes_a_short_scenario() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><option timestep='1e-6'/><worldbody><body><joint/><geom size='1'/></body>"
+        "</worldbody></mujoco>"
+    )
+    (found,) = scenes(model, None)
+    assert found.scenario.duration == pytest.approx(0.02, rel=0.01)

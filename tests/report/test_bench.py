@@ -70,7 +70,9 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
 def test_where_nothing_was_measured() -> None:
     text = bench_text([scene(scenario([])), replace(scene(), scenarios=())], Style(width=80))
     assert "    no setting was measured\n" in text
-    assert text.endswith("A Processor @ 2 GHz\n  nothing can move in it, so that nothing was measured\n")
+    assert text.endswith(
+        "A Processor @ 2 GHz\n  nothing can move in it, so that nothing was measured\n"
+    )
     assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
 
 
@@ -186,6 +188,26 @@ def test_json_is_a_table_with_every_column() -> None:
     assert rows[0]["reasons"] == ["the state is not finite"]
     assert rows[6]["largest_stable_timestep"] is None  # all are stable
     assert rows[18]["visible_error"] == 3.21 and rows[18]["reference_kind"] == "self"
+
+
+def test_json_gives_no_error_below_ten_floors() -> None:
+    small = row("RK4", 0.01, position=(3e-12, 1e-12), attitude=(2e-11, 4e-12), velocity=(0.0, 0.0))
+    value = json.loads(bench_json([scene(scenario([small], floor=1e-12, velocity_floor=1e-10))]))
+    (found,) = value["rows"]
+    assert (found["position_error"], found["position_error_end"]) == (1e-11, 1e-11)
+    assert (found["attitude_error"], found["attitude_error_end"]) == (2e-11, 1e-11)
+    assert (found["velocity_error"], found["velocity_error_end"]) == (1e-9, 1e-9)
+
+
+def test_a_large_model_error_is_shown_even_where_there_is_little_room() -> None:
+    both = [row("RK4", 0.01, position=(1e-3, 1e-3), model_error=error) for error in (0.5, None)]
+    assert "model error" in bench_text([scene(scenario(both, floor=1e-6))], Style(width=80))
+
+
+def test_where_nothing_has_a_cost_speeds_are_shown() -> None:
+    fast = row("RK4", 0.01, cost=None, realtime=1234.0)
+    text = bench_text([scene(scenario([fast]))], Style(width=60))
+    assert "× real time" in text and "1,234" in text
 
 
 def test_json_says_what_holds_for_a_whole_scenario() -> None:
