@@ -156,7 +156,7 @@ def test_changes_of_inputs() -> None:
         20.0,
         (),
         (("Python", "CPython 3.12.1"), ("environment variable MUJOCO_GL", "egl")),
-        "2",
+        "of another version",
     )
     assert input_changes(INPUTS, now) == [
         "its text changed",
