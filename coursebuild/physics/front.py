@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 
 from coursebuild.measured.bench import Setting, Verdict
+from coursebuild.measured.points import seconds_text
 from coursebuild.values import dataclass
 
 COST_SLACK = (0.03, 0.12)
@@ -187,7 +188,7 @@ def words(setting: Setting) -> str:
     """A setting in a sentence."""
     more = [setting.solver and f"{setting.solver}, at most {setting.iterations} iterations"]
     more.append(setting.cone and f"{setting.cone} cone")
-    text = f"{setting.integrator} at {setting.timestep:.6g} s"
+    text = f"{setting.integrator} at {seconds_text(setting.timestep)}"
     return ", ".join((text, *(part for part in more if part)))
 
 

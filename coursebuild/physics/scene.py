@@ -34,6 +34,10 @@ LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
 """Powers of 2 by which timesteps differ from the model's own."""
 
 
+LONGEST = 10_000_000
+"""Steps of a scenario at its shortest timestep, at most: more would take hours."""
+
+
 class SceneError(Exception):
     """A scenario does not fit its model; `span` is where it says so."""
 
@@ -125,6 +129,10 @@ def _declared(
     ladder = _ladder(scenario, step, powers)
     if declared.timesteps:
         ladder = _chosen(scenario, step, declared)
+    if scenario.duration > LONGEST * ladder[0]:
+        message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
+        place = declared.place("duration" if declared.duration is not None else "timesteps")
+        raise SceneError(message, place, "measure a shorter time, or longer timesteps")
     title = declared.title or declared.name
     return Scene(declared.name, title, scenario, ladder, step, visible, declared)
 

@@ -16,7 +16,7 @@ import time
 
 import msgspec
 
-from coursebuild.diagnostics import did_you_mean, nearest
+from coursebuild.diagnostics import nearest
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.versions import engine_version, package_version, python_version
 from coursebuild.measured.cases import (
@@ -90,8 +90,9 @@ def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
         found = {one for one in known if one == name or one.startswith(f"{name}-")}
         if not found:
             near = nearest(name, known)
-            help = f"did you mean `{near}`?" if near is not None else did_you_mean("", known)
-            raise UsageError(f"no hard case is called `{name}`" + (f"; {help}" if help else ""))
+            all_of_them = "known: " + ", ".join(known)
+            help = all_of_them if near is None else f"did you mean `{near}`?"
+            raise UsageError(f"no hard case is called `{name}`; {help}")
         wanted |= found
     return [one for one in known if one in wanted]
 

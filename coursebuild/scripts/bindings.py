@@ -9,7 +9,8 @@ Entry points: `check_bindings` (a document), `leaning_on` (who leans on what has
 3. Text beside the numbers (a unit, a name) chooses: where it stands beside printed numbers as well,
    only those count. A binding without a number must stand in the output as text.
 4. Recorded text decides, whatever this run printed: drift is reported by itself, with the bindings
-   that lean on it. Only where recorded text leaves things out (`...`, tables) does the run count.
+   that lean on it. The run counts where recorded text leaves things out (`...`, tables), and for a
+   binding that does not hold in a text that has drifted: what is recorded may be what is wrong.
 """
 
 from __future__ import annotations
@@ -152,7 +153,7 @@ def _leans_on(binding: NumberBinding, printed: Printed) -> str:
             parts += [recording.prefix, recording.body_span.text]
         else:
             parts.append(body.text)
-        parts += [repr(verdict.comparison), str(isinstance(body, Table))]
+        parts += [repr(verdict.comparison), str(isinstance(body, Table)), verdict.status]
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -178,8 +179,9 @@ def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
     if _holds(binding, lines):
         return None
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
-    if partial and run is not None and run.outcome is Outcome.OK:
-        lines += lines_of_run(run.stdout)
+    drifted = any(v.status == "drift" for v in steady)
+    if (partial or drifted) and run is not None and run.outcome is Outcome.OK:
+        lines = ([] if drifted else lines) + list(lines_of_run(run.stdout))
         if _holds(binding, lines):
             return None
     return _mismatch(binding, path, lines)

@@ -1,8 +1,8 @@
 """Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
 
 Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body),
-`no_body` and `nothing_recorded` (what follows is none), `stray_keys` (on a fence that records
-nothing).
+`no_body` and `nothing_recorded` (what follows is none), `no_caption` and `stray_keys` (on a fence
+that records nothing).
 """
 
 from __future__ import annotations
@@ -46,6 +46,13 @@ def near_caption(inlines: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
     message = "this looks like the caption of a recorded output, and nothing is compared"
     help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
     return [diagnose("recording-caption", span, message, help=help)]
+
+
+def no_caption(fence: Span) -> Diagnostic:
+    """A warning where a `text` block stands directly below a script."""
+    message = "this looks like the output of the script above it, and nothing is compared"
+    help = "write a paragraph `Output:` between the two"
+    return diagnose("recording-caption", fence.first_line(), message, help=help)
 
 
 def record_fence(

@@ -42,7 +42,7 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     name: Annotated[Slug, Meta(description="by which reports call it")]
     title: Annotated[Text | None, Meta(description="shown over its figures")] = None
     keyframe: Annotated[
-        Text | Annotated[int, Meta(ge=0)] | None,
+        Annotated[int, Meta(ge=0)] | Text | None,
         Meta(description="where it begins, by name or by number from 0"),
     ] = None
     qpos: Annotated[

@@ -30,6 +30,7 @@ from coursebuild.model import (
     MathBlock,
     Paragraph,
     Recording,
+    Script,
     Table,
     ThematicBreak,
     plain_text,
@@ -48,6 +49,7 @@ from coursebuild.syntax.recording import (
     is_caption,
     near_caption,
     no_body,
+    no_caption,
     nothing_recorded,
     record_fence,
     record_table,
@@ -170,9 +172,13 @@ class TextReader:
         return anchors.make(plain_text(children)), False
 
     def _fence(self, token: Placed) -> Block:
-        return fence_block(
-            read_fence(token, self.base, nested=self.nested), self.session, self.texts
-        )
+        fence = read_fence(token, self.base, nested=self.nested)
+        block = fence_block(fence, self.session, self.texts)
+        if isinstance(block, Script) and not block.norun and self._before_text():
+            below = self.tokens[self.at]
+            if below.info.split() == ["text"]:  # its keys are told as what they are
+                self.session.report(no_caption(self._span(below)))
+        return block
 
     def _code(self, token: Placed) -> CodeBlock:
         code = locate(self.base, token.rows)

@@ -385,7 +385,7 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     assert own.growth is None or own.growth > 1
     assert not report.verdict.on_front
     assert report.verdict.text.startswith(
-        "the scene does not run under its own setting, Euler at 0.008 s: "
+        "the scene does not run under its own setting, Euler at 8 ms: "
     )
     limits = {one.integrator: one.largest for one in report.stable}
     for name in ("Euler", "implicit", "implicitfast"):
@@ -435,7 +435,7 @@ def test_what_is_being_done_is_told() -> None:
     assert said[:3] == [
         "keyframe-0: a first run",
         "keyframe-0: the reference",
-        "keyframe-0: Euler at 0.02 s",
+        "keyframe-0: Euler at 20 ms",
     ]
     assert said[-1] == "keyframe-0: stable timesteps"
 

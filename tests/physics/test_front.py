@@ -78,7 +78,7 @@ def test_a_verdict_on_a_bad_one() -> None:
     assert found.cost_ratio == pytest.approx(0.94)
     assert found.error_ratio == pytest.approx(1e-6)
     assert found.text == (
-        "RK4 at 0.01 s is better: it takes 0.94 of the time and errs far less; a learner would "
+        "RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; a learner would "
         "notice its error, which is 2.5 times what can be seen"
     )
 
@@ -88,7 +88,7 @@ def test_a_verdict_names_what_would_be_enough() -> None:
     found = verdict([EULER, RK4], points, front(points), 0, 50, (), 1)
     assert found.text.endswith(
         "a learner would notice its error, which is 50 times what can be seen; the cheapest "
-        "without one that is seen is RK4 at 0.01 s, at 4 times its cost"
+        "without one that is seen is RK4 at 10 ms, at 4 times its cost"
     )
     found = verdict([EULER, RK4], points, front(points), 0, 50, (), hopeless=True)
     assert found.text.endswith("times what can be seen, and that of every other setting too")
@@ -100,7 +100,7 @@ def test_a_verdict_where_too_little_is_known() -> None:
     found = judged([Point(1, 2.0), Point(0.5, 2.0)], None)
     assert found.noticeable is None
     assert found.text == (
-        "RK4 at 0.01 s is better: it takes 0.5 of the time and errs no more; whether a learner "
+        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
         "would notice its error is not known"
     )
 
@@ -109,10 +109,10 @@ def test_a_verdict_where_the_scene_does_not_run() -> None:
     found = judged([None, Point(1, 2.0)], None, ("the state is not finite",))
     assert (found.on_front, found.better, found.cost_ratio) == (False, 1, None)
     assert found.text == (
-        "the scene does not run under its own setting, Euler at 0.002 s: the state is not finite; "
-        "RK4 at 0.01 s is the most accurate that does"
+        "the scene does not run under its own setting, Euler at 2 ms: the state is not finite; "
+        "RK4 at 10 ms is the most accurate that does"
     )
-    assert judged([None, None], None, ("it hangs",)).text.endswith("Euler at 0.002 s: it hangs")
+    assert judged([None, None], None, ("it hangs",)).text.endswith("Euler at 2 ms: it hangs")
 
 
 def test_a_verdict_where_nothing_was_timed() -> None:
@@ -123,4 +123,4 @@ def test_a_verdict_where_nothing_was_timed() -> None:
 
 def test_settings_in_words() -> None:
     full = Setting("implicitfast", 0.002, "Newton", 20, "elliptic")
-    assert words(full) == "implicitfast at 0.002 s, Newton, at most 20 iterations, elliptic cone"
+    assert words(full) == "implicitfast at 2 ms, Newton, at most 20 iterations, elliptic cone"

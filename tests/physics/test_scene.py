@@ -182,3 +182,29 @@ def test_a_tiny_timestep_makes_a_short_scenario() -> None:
     )
     (found,) = scenes(model, None)
     assert found.scenario.duration == pytest.approx(0.02, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "line"),
+    [
+        (
+            "duration = 1e9",
+            "1e+09 s in steps of 0.0005 s are over 10,000,000 steps",
+            3,
+        ),
+        (
+            "sample = 0.1\ntimesteps = [1e-8]",
+            "2.5 s in steps of 1e-08 s are over 10,000,000 steps",
+            4,
+        ),
+    ],
+)
+def test_a_scenario_that_would_take_hours_is_refused(text: str, message: str, line: int) -> None:
+    source = Source("models/arm.toml", f'[[scenario]]\nname = "a"\n{text}\n')
+    parsed = parse_declarations(source)
+    assert parsed.value is not None
+    with pytest.raises(SceneError) as caught:
+        scenes(arm(0.002), parsed.value, quick=True)
+    assert caught.value.message == message
+    assert caught.value.help == "measure a shorter time, or longer timesteps"
+    assert caught.value.span is not None and caught.value.span.line == line

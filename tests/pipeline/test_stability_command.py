@@ -52,6 +52,11 @@ def test_a_family_and_a_name_that_is_none(course: Path, capsys: pytest.CaptureFi
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
     said = capsys.readouterr().err
     assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in said
+    assert main(["-C", str(course), "stability", "nope"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        "coursebuild: no hard case is called `nope`; known: tumbling-box, pendulum-hinge-90, "
+    )
     assert main(["-C", str(course), "stability", "stack-1", "stack-10", "-q"]) == 0
     out = capsys.readouterr().out
     assert [line.split()[0] for line in out.splitlines() if line[:1] not in (" ", "")] == [

@@ -196,7 +196,7 @@ def test_the_nearest_output_above_counts() -> None:
         script() + output("x 1.5\n") + "\n`1.5`{out} `2.5`{out}\n\n" + output("x 2.5\n")
         + "\n`2.5`{out} `1.5`{out}\n"
     )  # fmt: skip
-    found = check(text, ran("x 1.5\nx 2.5\n"))
+    found = check(text)
     assert [(d.rule, d.span.text) for d in found] == [
         ("binding-mismatch", "2.5"),
         ("binding-mismatch", "1.5"),
@@ -293,9 +293,16 @@ def test_recorded_text_counts_where_nothing_ran() -> None:
         assert [d.span.text for d in check(text, *runs)] == ["99"]
 
 
-def test_recorded_text_counts_where_it_drifted() -> None:
-    text = LESSON + "\n`6.6 %`{out} `6.7 %`{out}\n"
-    assert [d.span.text for d in check(text, ran(PRINTED.replace("6.641", "6.702")))] == ["6.7 %"]
+def test_where_recorded_text_drifted_the_run_counts_too() -> None:
+    text = LESSON + "\n`6.6 %`{out} `6.7 %`{out} `6.8 %`{out}\n"
+    (found,) = check(text, ran(PRINTED.replace("6.641", "6.702")))
+    assert (found.span.text, found.help) == ("6.8 %", "write `6.7 %`")
+
+
+def test_before_anything_is_recorded_the_run_counts() -> None:
+    text = script() + output("") + "\n`6.6 %`{out} `6.7 %`{out}\n"
+    (found,) = check(text, ran(PRINTED))
+    assert (found.span.text, found.help) == ("6.7 %", "write `6.6 %`")
 
 
 def test_what_an_ellipsis_leaves_out_was_printed_too() -> None:

@@ -44,7 +44,7 @@ controls = [[1, 2]]
 reference = "self"
 
 [[keep]]
-finding = "sensor-unread:tip"
+finding = "sensor-unread tip"
 reason = "lesson 5.2 reads it"
 """
 
@@ -85,8 +85,8 @@ def test_everything_that_a_file_can_say() -> None:
     assert (other.title, other.keyframe, other.reference) == ("", None, "self")
     assert other.conserved is None
     (keep,) = declared.keep
-    assert (keep.finding, keep.reason) == ("sensor-unread:tip", "lesson 5.2 reads it")
-    assert keep.finding_span.text == '"sensor-unread:tip"'
+    assert (keep.finding, keep.reason) == ("sensor-unread tip", "lesson 5.2 reads it")
+    assert keep.finding_span.text == '"sensor-unread tip"'
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "[bench]\n"])
@@ -111,7 +111,7 @@ MISTAKES = [
     ('[[scenario]]\nname = "A b"\n', ["2:8-13 field-value: `name` cannot be `A b` [expected:"]),
     (ONE + 'keyfram = "x"\n', ["3:1-8 field-unknown: unknown field `keyfram` [did you mean `k"]),
     (ONE + "keyframe = -1\n", ["3:12-14 field-value: `keyframe` must be at least 0, not -1"]),
-    (ONE + "keyframe = true\n", ["3:12-16 field-type: `keyframe` must be a string or an intege"]),
+    (ONE + "keyframe = true\n", ["3:12-16 field-type: `keyframe` must be an integer or a string"]),
     (ONE + "duration = 0\n", ["3:12-13 field-value: `duration` must be greater than 0, not 0"]),
     (ONE + "duration = inf\n", ["3:12-15 field-value: `duration` must be a finite number, not i"]),
     (ONE + 'duration = "2"\n', ["3:12-15 field-type: `duration` must be a number, not a string"]),
