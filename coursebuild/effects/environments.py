@@ -182,8 +182,9 @@ def _told(what: str) -> Iterator[None]:
 
 def _run(command: Sequence[str], *, check: bool = True) -> subprocess.CompletedProcess[str]:
     """Run a program; if we are interrupted it ends, with all that it has started."""
-    unsaid = ("PYTHONPATH", "PYTHONHOME", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
-    outer = {name: value for name, value in os.environ.items() if name not in unsaid}
+    # What is meant for this process's Python, such as warnings as errors, would disturb pip's.
+    unsaid = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
+    outer = {name: value for name, value in os.environ.items() if not name.startswith(unsaid)}
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
     process = subprocess.Popen(
         command,

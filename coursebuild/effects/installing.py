@@ -59,6 +59,8 @@ def pip_error(engine: str, said: str, held: Mapping[str, str]) -> EffectError:
         return EffectError("the package index cannot be reached", help=_OFFLINE)
     errors = [line.partition("ERROR:")[2].strip() for line in said.splitlines() if "ERROR:" in line]
     lines = errors or [line.strip() for line in said.splitlines() if line.strip()]
+    if errors[-1:] == ["Exception:"]:  # pip itself failed: its traceback ends with what happened
+        lines = [line.strip() for line in said.splitlines() if line.strip()][-1:]
     return EffectError(f"pip cannot install MuJoCo {engine}: {'; '.join(lines[-_LINES:])}")
 
 

@@ -74,7 +74,15 @@ def test_the_mistake_of_the_readme(course: Path) -> None:
     assert done.returncode == 1
     wanted = message.text.rstrip().splitlines()
     assert done.stdout.splitlines()[: len(wanted)] == wanted
-    assert "error[binding-mismatch]" in done.stdout  # the last sentence is checked as well
+    assert "error[binding-mismatch]" not in done.stdout  # the number printed is the one in the text
+
+    assert lesson.count("`4.915`") == 1  # the last sentence is checked as well
+    changed = lesson.replace("`4.915`", "`4.815`")
+    (course / LESSON).write_text(changed, encoding="utf-8")
+    done = coursebuild(course, "check")
+    assert done.returncode == 1
+    assert "error[binding-mismatch]" in done.stdout
+    assert "help: write `4.915`" in done.stdout
 
 
 def shell_lines(path: Path) -> list[str]:

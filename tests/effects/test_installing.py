@@ -71,6 +71,10 @@ def test_packages_that_do_not_go_together() -> None:
             "[Errno 28] No space left on device",
         ),
         ("first\n  last words  \n", "first; last words"),
+        (
+            "ERROR: Exception:\nTraceback (most recent call last):\n  File x\nOSError: gone\n",
+            "OSError: gone",
+        ),
         ("", ""),
     ],
 )

@@ -91,7 +91,7 @@ class TestParity:
     def test_what_the_lab_changed_in_the_model_is_changed_natively_too(self, bench: Bench) -> None:
         lab = make_lab(
             xml=HEAP.format("RK4"),
-            setup="data.qvel[0] = 2; data.qpos[2] = 0.5; data.time = 3",
+            setup="data.qvel[0] = 2; data.qpos[2] = 0.2; data.time = 3",
             controls=[
                 {**SLIDER, "label": "dt", "value": 0.004, "set": "model.opt.timestep"},
                 {**SLIDER, "label": "mass", "value": 3, "set": "model.body_mass[1]"},
