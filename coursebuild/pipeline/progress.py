@@ -40,6 +40,7 @@ class Progress:
         self._running: dict[str, float] = {}
         self._doing: dict[str, str] = {}
         self._stage = ""
+        self._told = ""
         self._since = 0.0
         self._done = 0
         self._total = 0
@@ -50,7 +51,10 @@ class Progress:
         """A stage of the work, with so many scripts to run."""
         self._stage, self._done, self._total, self._since = name, 0, total, time.monotonic()
         if not self.live:
-            self.say(f"{name} ({total})" if total else name)
+            told = f"{name} ({total})" if total else name
+            if told != self._told:  # it goes on with the next part of the same work
+                self.say(told)
+            self._told = told
             yield
             return
         self._stop.clear()

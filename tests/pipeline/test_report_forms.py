@@ -53,6 +53,9 @@ def test_plain_lines_say_what_runs_and_what_ran(make: Make) -> None:
 def test_the_stages_of_a_build(make: Make) -> None:
     folder = make("## One $x$\n\n" + block("one.py", "print(1)", info="norun"))
     folder.write("models/m.xml", "<mujoco/>")
+    page = '[[page]]\nid = "guide"\ntitle = "Guide"\nfile = "docs/guide.md"\n'
+    folder.write("content/course.toml", folder.text("content/course.toml") + page)
+    folder.write("docs/guide.md", "One.\n")  # read apart from the lessons, and told with them
     done = folder.main("build")
     said = done.err.splitlines()
     assert said[:3] == ["reading lessons and pages", "compiling models", "drawing pages"]
