@@ -101,7 +101,9 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     explain.add_argument(
-        "path", metavar="PATH", help="a script, lesson, page, model, or any file of the project"
+        "path",
+        metavar="PATH",
+        help="a script, lab, lesson, page, model, or any file of the project",
     )
     explain.add_argument(
         "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"

@@ -48,7 +48,7 @@ from coursebuild.scripts.remembered import Record
 
 
 def explain(options: Options, name: str) -> Explanation:
-    """What is known of a script, a lesson or page, a model, or any file of the project.
+    """What is known of a script, lab, lesson, page, model, or any file of the project.
 
     Raises:
         UsageError: the course cannot be read, or nothing in it is called so.
@@ -86,7 +86,7 @@ class _Explainer:
         dependents = self._dependents(path)
         whole = self._part_of(path)
         if not dependents and not whole and not (self.root / path).exists():
-            near = nearest(name, [*self.scripts, *self._documents()])
+            near = nearest(name, [*self.scripts, *self.labs, *self._documents()])
             help = f"; did you mean `{near}`?" if near is not None else ""
             raise UsageError(f"nothing of this course is called `{name}`{help}")
         return self._file(path, "file", dependents)
@@ -96,6 +96,8 @@ class _Explainer:
             dependents = self._dependents(name)
             own = self._script(name)
             return Explanation(name, "script", (own,), dependents, shown=self._shown(name))
+        if name in self.labs:
+            return Explanation(name, "lab", (self._lab(name),))
         part = self._documents().get(name)
         if part is not None:
             scripts = [

@@ -44,7 +44,7 @@ class Explanation:
     """What is known of a path."""
 
     path: str
-    kind: Literal["script", "lesson", "page", "model", "file"]
+    kind: Literal["script", "lab", "lesson", "page", "model", "file"]
     own: tuple[Explained, ...]
     """The script itself, or those of a lesson or page with its labs."""
     dependents: tuple[Explained, ...] = ()
@@ -67,7 +67,7 @@ def explained_text(explanation: Explanation, style: Style) -> str:
     """As text for people."""
     e = explanation
     parts: list[str] = []
-    if e.kind == "script":
+    if e.kind in ("script", "lab"):
         parts += ["\n".join(_whole(one, style)) for one in e.own]
     else:
         parts.append(style.paint(_head(e), _BOLD))

@@ -77,6 +77,20 @@ def test_labs_of_a_lesson(course: Folder) -> None:
     assert tried(course) == [], "this was so before"
 
 
+def test_a_lab_by_its_name(course: Folder) -> None:
+    assert explained(course, "1.1-lab-2") == (
+        "1.1-lab-2 would be tried\n"
+        "  because there is no result of it on this machine\n"
+        "  of 1.1, not run yet on this machine\n"
+    )
+    assert course.main("check").status == 0
+    assert explained(course, "1.1-lab-2").startswith("1.1-lab-2 is remembered\n")
+    done = course.main("explain", "1.1-lap-2")
+    assert done.err == (
+        "coursebuild: nothing of this course is called `1.1-lap-2`; did you mean `1.1-lab-2`?\n"
+    )
+
+
 def test_an_edit_of_a_lab(course: Folder) -> None:
     tried(course)
     course.replace(course.lesson(), '"title": "Fall"', '"title": "Falling"')
