@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import islice
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.diagnostics import Parsed
 from coursebuild.effects.aside import Aside
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob
     from coursebuild.render.record import PageRecord
 
+Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
 
 
@@ -134,30 +135,36 @@ class Documents:
 
     def course_map(self, source: Source) -> Parsed[Course | None]:
         """The course that a map describes, and what is wrong in it."""
-        parts = (tool_digest(), source.path, source.text)
-        key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
-        data = None if self._store.fresh else self._store.peek(_MAPS, key)
-        found = None if data is None else unpack(data, source)
-        if isinstance(found, Parsed):
-            return found
-        from coursebuild.syntax.coursemap import parse_course_map
 
-        parsed = parse_course_map(source)
-        self._store.keep(_MAPS, key, pack(parsed), local=True)
-        return parsed
+        def parse(source: Source) -> Parsed[Course | None]:
+            from coursebuild.syntax.coursemap import parse_course_map
+
+            return parse_course_map(source)
+
+        return self._remembered(_MAPS, source, parse)
 
     def declarations(self, source: Source) -> Parsed[Declarations | None]:
         """What a file beside a model declares, and what is wrong in it."""
+
+        def parse(source: Source) -> Parsed[Declarations | None]:
+            from coursebuild.syntax.scenarios import parse_declarations
+
+            return parse_declarations(source)
+
+        return self._remembered(_DECLARATIONS, source, parse)
+
+    def _remembered(
+        self, kind: str, source: Source, parse: Callable[[Source], Parsed[Value]]
+    ) -> Parsed[Value]:
+        """What a text parses to: kept, or parsed now, by what is imported only then."""
         parts = (tool_digest(), source.path, source.text)
         key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
-        data = None if self._store.fresh else self._store.peek(_DECLARATIONS, key)
+        data = None if self._store.fresh else self._store.peek(kind, key)
         found = None if data is None else unpack(data, source)
         if isinstance(found, Parsed):
             return found
-        from coursebuild.syntax.scenarios import parse_declarations
-
-        parsed = parse_declarations(source)
-        self._store.keep(_DECLARATIONS, key, pack(parsed), local=True)
+        parsed = parse(source)
+        self._store.keep(kind, key, pack(parsed), local=True)
         return parsed
 
     def task(self, path: str) -> Task:

@@ -60,29 +60,37 @@ def _stable(extraction: Extraction) -> Diagnostic:
 def _diverged(
     extraction: Extraction, lost: Sequence[Divergence], by_path: Mapping[str, Extraction]
 ) -> Diagnostic:
-    first, fence = lost[0], extraction.script.span.first_line()
-    return diagnose(
-        "script-diverged",
-        _place(extraction, first, by_path) or fence,
-        f"a simulation of `{extraction.path}` diverged: {_told(first)}",
-        help="try a smaller timestep or another integrator; if it is to diverge, say so by "
-        "`diverges` on its fence",
-        notes=_more(extraction, lost, by_path),
+    said = f"a simulation of `{extraction.path}` diverged"
+    help = (
+        "try a smaller timestep or another integrator; if it is to diverge, say so by "
+        "`diverges` on its fence"
     )
+    return _found("script-diverged", extraction, lost, by_path, said, help)
 
 
 def _deep(
     extraction: Extraction, deep: Sequence[Divergence], by_path: Mapping[str, Extraction]
 ) -> Diagnostic:
-    first, fence = deep[0], extraction.script.span.first_line()
-    return diagnose(
-        "script-penetration",
-        _place(extraction, first, by_path) or fence,
-        f"bodies of `{extraction.path}` lie deep in each other: {_told(first)}",
-        help="MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), "
-        "or look at where they start",
-        notes=_more(extraction, deep, by_path),
+    said = f"bodies of `{extraction.path}` lie deep in each other"
+    help = (
+        "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), "
+        "or look at where they start"
     )
+    return _found("script-penetration", extraction, deep, by_path, said, help)
+
+
+def _found(
+    rule: str,
+    extraction: Extraction,
+    found: Sequence[Divergence],
+    by_path: Mapping[str, Extraction],
+    said: str,
+    help: str,
+) -> Diagnostic:
+    """The first of what was found, where it was found, and some more in notes."""
+    place = _place(extraction, found[0], by_path) or extraction.script.span.first_line()
+    message = f"{said}: {_told(found[0])}"
+    return diagnose(rule, place, message, help=help, notes=_more(extraction, found, by_path))
 
 
 def _more(
