@@ -1,0 +1,81 @@
+"""A course with a model, and something that says what it was told to in the place of measuring."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from coursekit import ROOT
+
+sys.path.insert(0, str(ROOT / "tests" / "measured"))
+
+from benchkit import swing
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.store import Store
+from coursebuild.measured.bench import ScenarioReport
+from coursebuild.pipeline.measuring import Loaded
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.scenes import Scene
+
+BOX = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <geom size="0.1" pos="0 0 -1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+PATH = "content/reports/box.bench.json"
+TOML = '[[scenario]]\nname = "swing"\nduration = 0.2\nsample = 0.02\nqvel = [1.0]\n'
+
+
+class Fake:
+    """Says what it was told to, and what it was asked."""
+
+    def __init__(self, *found: ScenarioReport | Diagnostic | BaseException) -> None:
+        self.found = list(found) or [swing()]
+        self.asked: list[tuple[str, int, bool, bool]] = []
+
+    def scenarios_of(self, root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+        assert root.is_absolute()
+        scenes: Any = tuple(self.found)
+        return Loaded(scene, None, scenes)
+
+    def measured(
+        self, loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+    ) -> ScenarioReport | Diagnostic:
+        tell("swing: Euler")
+        self.asked.append((loaded.scene.name, number, quick, timed))
+        found = self.found[number]
+        if isinstance(found, BaseException):
+            raise found
+        return found
+
+
+def bench_course(tmp_path: Path) -> Path:
+    """A course with one model."""
+    root = tmp_path / "a cöurse"
+    write(root / "content" / "course.toml", "")
+    write(root / "models" / "box.xml", BOX)
+    return root
+
+
+def write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def options(root: Path, **other: Any) -> Options:
+    return Options(root, 1, True, Store(root, **other))
+
+
+def asked(fake: Fake) -> list[str]:
+    names = [name for name, *_ in fake.asked]
+    fake.asked.clear()
+    return names

@@ -1,0 +1,122 @@
+"""`coursebuild bench` from end to end, as a process and through its arguments."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from coursekit import ROOT
+from measurekit import BOX, PATH, TOML, bench_course, write
+
+from coursebuild.cli import main
+from coursebuild.measured.records import decode_bench, encode_bench
+from coursebuild.values import replace
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    return bench_course(tmp_path)
+
+
+def run(course: Path, *arguments: str) -> int:
+    return main(["-C", str(course), "bench", *arguments])
+
+
+@pytest.mark.slow
+def test_the_command_from_end_to_end(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(course / "models" / "box.toml", TOML)
+    plot = course / "plot.svg"
+    assert run(course, "--quick", "--plot", str(plot)) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("box  quick: fewer settings, rough times\n  MuJoCo ")
+    assert "\n  swing  " in out and "RK4" in out and "the scene's own" in out
+    assert out.endswith("\nwrote plot.svg\n")
+    assert "measuring (1)\n  box\n  box: measured after " in err
+    assert ElementTree.fromstring(plot.read_bytes()).tag.endswith("svg")
+    assert run(course, "--quick", "--format", "json", "-q") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    rows = json.loads(out)["rows"]
+    assert {one["integrator"] for one in rows} >= {"Euler", "RK4", "implicit", "discrete"}
+    assert [one["timestep"] for one in rows if one["own"]] == [0.002]
+    errors = [one["position_error"] for one in rows if one["integrator"] == "RK4"]
+    assert all(error is not None and error < 1e-3 for error in errors)
+
+
+@pytest.mark.slow
+def test_recorded_by_one_command_and_checked_by_another(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(course / "models" / "box.toml", TOML)
+    assert run(course, "--check", "-q") == 1
+    assert "make it with `coursebuild bench box --record`" in capsys.readouterr().out
+    assert run(course, "--record", "-q") == 0
+    assert capsys.readouterr().out.endswith(f"\nwrote {PATH}\n")
+    assert run(course, "--check", "-q") == 0
+    assert capsys.readouterr().out == f"box  as recorded in {PATH}\n"
+    path = course / PATH
+    report = decode_bench(path.read_bytes())
+    (one,) = report.scenarios
+    wrong = tuple(replace(r, velocity=(0.5, 0.5)) if r.own else r for r in one.rows)
+    path.write_bytes(encode_bench(replace(report, scenarios=(replace(one, rows=wrong),))))
+    assert run(course, "--check", "-q") == 1
+    out = capsys.readouterr().out
+    assert out.startswith(f"box  2 figures not as recorded in {PATH}\n\n  swing\n")
+    assert "error of velocity " in out and "0.5" in out and "± 5 %" in out
+
+
+def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course, "bix") == 2
+    assert "no model is called `bix`; did you mean `box`?" in capsys.readouterr().err
+    assert run(course, "--check", "--quick") == 2
+    assert "--check takes no --quick" in capsys.readouterr().err
+    assert run(course, "--plot", "plot.png") == 2
+    assert "--plot: 'plot.png' is no name of an SVG file: plot.svg" in capsys.readouterr().err
+    assert run(course, "--plot", str(course / "no" / "plot.svg")) == 2
+    assert "--plot: there is no folder" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as caught:
+        run(course, "--record", "--check")
+    assert caught.value.code == 2
+
+
+def test_a_course_without_models(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (course / "models" / "box.xml").unlink()
+    assert run(course, "-q") == 0
+    assert capsys.readouterr().out == "there is no model to measure\n"
+
+
+def test_a_model_that_does_not_compile(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(course / "models" / "box.xml", BOX.replace("<joint", "<joynt"))
+    assert run(course, "-q") == 1
+    out = capsys.readouterr().out
+    assert out.startswith("error[model-error]: the model `box` does not compile: ")
+    assert " --> models/box.xml:5:7" in out
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_it_and_leaves_no_litter(course: Path) -> None:
+    write(course / "models" / "box.toml", TOML.replace("0.2", "2000"))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        [sys.executable, "-m", "coursebuild", "-C", str(course), "bench"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        cwd=course,
+    ) as running:
+        assert running.stderr is not None
+        while running.stderr.readline() != "  box\n":
+            assert running.poll() is None
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert err.endswith("interrupted\n")
+    assert out == ""
+    assert sorted(path.name for path in course.iterdir()) == [".coursebuild", "content", "models"]
