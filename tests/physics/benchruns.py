@@ -1,0 +1,53 @@
+"""Models measured whole, and what is looked for in their reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from coursebuild.measured.bench import ScenarioReport, WorkPrecisionRow
+from coursebuild.physics.bench import measure_scene
+from coursebuild.physics.problems import problem_named
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations
+
+MODELS = Path(__file__).parents[2] / "models"
+FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
+
+
+def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
+    parsed = parse_declarations(Source("models/m.toml", text))
+    assert parsed.value is not None, parsed.diagnostics
+    return measure_scene(model, parsed.value, quick=quick, clock=None)
+
+
+def of_problem(name: str, text: str) -> ScenarioReport:
+    """A hard case, as a model with a scenario."""
+    mjcf = problem_named(name).mjcf.replace("<mujoco>", '<mujoco><option timestep="0.004"/>')
+    (found,) = measured(
+        mujoco.MjModel.from_xml_string(mjcf),
+        f'[[scenario]]\nname = "a"\nreference = "closed:{name}"\n{text}',
+    )
+    return found
+
+
+def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:
+    (found,) = (
+        one
+        for one in report.rows
+        if (one.setting.integrator, one.setting.timestep) == (integrator, timestep)
+        and (one.setting.solver, one.setting.iterations, one.setting.cone)
+        == next(
+            (own.setting.solver, own.setting.iterations, own.setting.cone)
+            for own in report.rows
+            if own.own
+        )
+    )
+    return found
+
+
+def orders(report: ScenarioReport, part: str) -> dict[str, float]:
+    found = {one.integrator: getattr(one, part) for one in report.orders}
+    return {name: value for name, value in found.items() if value is not None}
