@@ -6,6 +6,8 @@ Entry point: `Course`.
 from __future__ import annotations
 
 import enum
+import hashlib
+import re
 
 from coursebuild.model.blocks import Comparison, Document, Filter
 from coursebuild.model.scenarios import Declarations
@@ -125,6 +127,15 @@ class Course:
     to the root."""
     declarations: tuple[Declarations, ...] = ()
     """What `models/NAME.toml` say, each of a model that is there."""
+    id: str = ""
+    """Names the course where its title may change; see `key`."""
+
+    @property
+    def key(self) -> str:
+        """What readers' browsers keep their progress under: the id, else made of the title."""
+        words = re.findall(r"[a-z0-9]+", self.title.lower())
+        digest = hashlib.sha256(self.title.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+        return self.id or "-".join((*words, digest))
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:

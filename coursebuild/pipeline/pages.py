@@ -128,6 +128,7 @@ class Pages:
             tool_digest(),
             course.language,
             course.title,
+            course.key,
             course.base_url,
             course.repository,
             course.licence,
@@ -193,7 +194,7 @@ class Pages:
         if record is None:  # it was damaged, or the store cannot be written
             record, text = self._documents.drawn(self._request(page))
             body = text.encode()
-        before, after = frames.around(record.draft, live=record.live)
+        before, after = frames.around(record.draft, record.parts)
         return before.encode() + body + after.encode()
 
 

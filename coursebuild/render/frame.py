@@ -34,11 +34,13 @@ PAGE_WORDS = (
 )
 """Interface texts that the page's script shows."""
 
-_LAB_WORDS = ("lab.live.", "overlay.")
-"""Beginnings of the keys of what running labs say."""
-
-LIVE_LAB = "data-script="
-"""What a page with a lab that runs has in it."""
+_LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
+_PARTS = {
+    "labs": ("data-script=", ("lab.live.", "overlay.", *_LAB_KEYS)),
+    "quiz": ("data-quiz=", ("quiz.live.",)),
+}
+"""What not every page has and the page's script brings to life: a mark by which it is known in a
+body, and the interface texts that it needs; of some, the beginnings of their keys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,17 +91,24 @@ def place_of(library: Library, path: str) -> urls.Place:
 
 def frame(library: Library, draft: Draft, names: Names) -> str:
     """The finished text of a page."""
-    before, after = frame_around(library, draft, names, live=LIVE_LAB in draft.body)
+    before, after = frame_around(library, draft, names, parts_of(draft.body))
     return before + visible(draft.body) + after
 
 
 _HERE = Markup("<!--here-->")
 
 
-def frame_around(library: Library, draft: Draft, names: Names, *, live: bool) -> tuple[str, str]:
-    """What stands before and after the body of a page; `live`: whether labs run on it."""
+def parts_of(body: str) -> tuple[str, ...]:
+    """Which parts with scripts of their own a page's body has: `labs`, `quiz`."""
+    return tuple(part for part, (mark, _) in _PARTS.items() if mark in body)
+
+
+def frame_around(
+    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
+) -> tuple[str, str]:
+    """What stands before and after the body of a page with these parts; see `parts_of`."""
     own = _own_values(library, draft)
-    shared = _shared_values(library, draft, names, live=live)
+    shared = _shared_values(library, draft, names, parts)
     return _cut(library.render("base.html", **own, **shared))
 
 
@@ -123,7 +132,7 @@ def _own_values(library: Library, draft: Draft) -> dict[str, object]:
 
 
 def _shared_values(
-    library: Library, draft: Draft, names: Names, *, live: bool
+    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
 ) -> dict[str, object]:
     """What the frames of pages of one kind in one folder show, where no menu has these pages."""
     course = library.course
@@ -132,6 +141,8 @@ def _shared_values(
         "kind": draft.kind,
         "body": _HERE,
         "language": course.language or "en",
+        "course_key": course.key,
+        "root": place.href(urls.HOME).removesuffix(urls.HOME),
         "robots": "" if draft.indexed else "noindex",
         "icon": place.href(names.icon),
         "style": place.href(names.style),
@@ -144,7 +155,7 @@ def _shared_values(
         "course": course,
         "source": course.repository if "{path}" not in course.repository else "",
         "results": library.results,
-        "page_words": _page_words(library, live=live),
+        "page_words": _page_words(library, parts),
     }
 
 
@@ -161,16 +172,16 @@ class Frames:
         self._names = names
         self._pieces: dict[object, tuple[list[str], list[str]]] = {}
 
-    def around(self, draft: Draft, *, live: bool) -> tuple[str, str]:
+    def around(self, draft: Draft, parts: tuple[str, ...]) -> tuple[str, str]:
         """See `frame_around`."""
         if draft.kind not in _ALIKE:
-            return frame_around(self._library, draft, self._names, live=live)
+            return frame_around(self._library, draft, self._names, parts)
         own = _own_values(self._library, draft)
         slots, filled = _slots(own)
         folder = draft.path.rpartition("/")[0]
-        key = (draft.kind, folder, draft.indexed, live, repr(slots))
+        key = (draft.kind, folder, draft.indexed, parts, repr(slots))
         if key not in self._pieces:
-            shared = _shared_values(self._library, draft, self._names, live=live)
+            shared = _shared_values(self._library, draft, self._names, parts)
             before, after = _cut(self._library.render("base.html", **slots, **shared))
             self._pieces[key] = _SLOT.split(before), _SLOT.split(after)
         before, after = (_joined(pieces, filled) for pieces in self._pieces[key])
@@ -203,12 +214,13 @@ def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
     return "".join(filled[p] if number % 2 else p for number, p in enumerate(pieces))
 
 
-def _page_words(library: Library, *, live: bool) -> tuple[str, ...]:
+def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     """Keys of the texts that the page carries for its scripts."""
-    if not live:
-        return PAGE_WORDS
-    labs = sorted(key for key in library.words.keys if key.startswith(_LAB_WORDS))
-    return (*PAGE_WORDS, *labs, "lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
+    keys = library.words.keys
+    needed = [key for part in parts for key in _PARTS[part][1]]
+    begun = tuple(key for key in needed if key.endswith("."))
+    found = sorted(key for key in keys if begun and key.startswith(begun))
+    return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
 
 
 def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[NavLink, ...]:

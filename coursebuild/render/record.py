@@ -10,7 +10,7 @@ from markupsafe import Markup
 from coursebuild.render import formulas, styles
 from coursebuild.render.characters import visible
 from coursebuild.render.draft import Draft
-from coursebuild.render.frame import LIVE_LAB
+from coursebuild.render.frame import parts_of
 from coursebuild.render.links import Reference, page_references
 from coursebuild.render.shared import PageFacts, page_facts
 from coursebuild.values import dataclass, replace
@@ -22,8 +22,8 @@ class PageRecord:
 
     draft: Draft
     """Without its body."""
-    live: bool
-    """Whether labs run on it."""
+    parts: tuple[str, ...]
+    """See `frame.parts_of`."""
     text: str
     """Characters of its text, as `PageFacts` has them, sorted; so are the others."""
     mathematics: str
@@ -52,7 +52,7 @@ def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
     ids, references = page_references(draft.path, body, base_url, plain=plain)
     found = PageRecord(
         draft=replace(draft, body=Markup()),
-        live=LIVE_LAB in body,
+        parts=parts_of(body),
         text="".join(sorted(facts.text)),
         mathematics="".join(sorted(facts.mathematics)),
         declarations=tuple(sorted(declarations)),

@@ -40,6 +40,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What the course is."""
 
     title: Text
+    id: Annotated[
+        Slug | None,
+        Meta(description="what readers' progress is kept under; without it, the title"),
+    ] = None
     summary: Annotated[str, Meta(description="one or two sentences, for the home page")] = ""
     language: Annotated[
         Annotated[

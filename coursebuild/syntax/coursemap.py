@@ -84,6 +84,7 @@ def _course(
         base_url=about.base_url or "",
         repository=about.repository or "",
         licence=about.licence,
+        id=about.id or "",
         engine=about.engine,
         engine_span=engine.span if engine is not None else None,
         comparison=comparison(root, fields.verify),

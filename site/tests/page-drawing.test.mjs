@@ -8,6 +8,7 @@ import { Lights, ambientOf } from '../js/lab/page/lights.js'
 import { Materials, finishOf } from '../js/lab/page/materials.js'
 import { reflect } from '../js/lab/page/mirror.js'
 import { Solid } from '../js/lab/page/solid.js'
+import { Stage } from '../js/lab/page/stage.js'
 import { Flex, stretch } from '../js/lab/page/surfaces.js'
 import { World, aim } from '../js/lab/page/world.js'
 import { withSmallTextures } from '../js/lab/trial/record.js'
@@ -220,4 +221,14 @@ test('textures are made small by the mean of their texels', () => {
   assert.ok(textures[2].data.every((x, i) => x === ((i % 256 < 128) === Math.floor(i / 256) < 128 ? 255 : 0)))
   assert.deepEqual([textures[3].width, textures[3].height], [64, 384])
   assert.ok(textures[3].data.every((x, i) => x === 40 * Math.floor(i / 64 / 64)))
+})
+
+test('shadows are made once for each picture: for its reflection where it has one', () => {
+  const stage = new Stage()
+  const made = []
+  stage.renderer = { shadowMap: { autoUpdate: false }, setPixelRatio() {}, setSize() {}, render: () => made.push(stage.renderer.shadowMap.autoUpdate) }
+  Object.assign(stage, { software: true })
+  const view = (mirrors) => ({ width: 4, height: 3, scene: {}, reflect: ({ renderer }) => (mirrors && renderer.render(), mirrors) })
+  for (const mirrors of [true, true, false, true]) stage.draw(view(mirrors))
+  assert.deepEqual(made, [true, false, true, false, true, true, false])
 })

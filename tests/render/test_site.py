@@ -252,7 +252,7 @@ def test_every_page_has_one_heading_one_main_and_unique_ids(site: dict[str, byte
         assert page.count("<h1") == 1, path
         assert len(re.findall('<main [^>]*id="_main"', page)) == 1
         assert '<a class="skip" href="#_main">' in page
-        assert page.startswith('<!DOCTYPE html>\n<html lang="en">\n')
+        assert page.startswith('<!DOCTYPE html>\n<html lang="en" data-course="')
         ids = re.findall(r'\sid="([^"]*)"', page)
         assert len(ids) == len(set(ids)), path
 

@@ -113,7 +113,8 @@ export class Stage {
       renderer.setPixelRatio(this.ratio)
       renderer.setSize(width, height, false)
     }
-    // What a mirror shows comes first; it has made the shadow maps, too.
+    // What a mirror shows comes first, and makes the shadow maps, too.
+    renderer.shadowMap.autoUpdate = true
     renderer.shadowMap.autoUpdate = !view.reflect(this)
     renderer.render(view.scene, view.lens)
   }
