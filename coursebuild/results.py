@@ -7,7 +7,7 @@ and those that read them don't import each other.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Literal, TypeAlias
 
 from coursebuild.model import Comparison, Recording
@@ -302,9 +302,35 @@ class KeptFile:
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
     """Gives its bytes; called at most once, and not at all where the published file is whole."""
+    pieces: Callable[[], Iterable[bytes]] | None = None
+    """Gives them one after the other, where all at once would take too much room."""
 
 
 SiteFile: TypeAlias = OutputFile | KeptFile
+
+
+@dataclass(frozen=True, slots=True)
+class FileFacts:
+    """What a list of a site's files says of one."""
+
+    path: str
+    """Its path in the site."""
+    digest: str
+    """SHA-256 of its bytes, in hexadecimal digits."""
+    size: int
+    """Bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileList:
+    """A file of the site that is made of what all others are."""
+
+    path: str
+    """Its path in the site (POSIX, relative)."""
+    key: str
+    """A hash of all that its bytes depend on besides the other files."""
+    make: Callable[[Iterable[FileFacts]], bytes]
+    """Gives its bytes; the other files come sorted by path."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("heading-skip", "warning", "A heading skips a level."),
     ("heading-empty", "error", "A heading has no text."),
     ("heading-attributes", "error", "The attributes after a heading cannot be read."),
-    ("anchor-repeated", "error", "Two headings of a page have the same explicit id."),
+    ("anchor-repeated", "error", "Two things on a page have the same id."),
     (
         "fence-unclosed",
         "error",
@@ -86,6 +86,14 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
     ("math-syntax", "error", "A formula does not parse."),
     ("math-unclosed", "error", "Display math is never closed."),
+    ("equation-label", "error", "The label of a formula cannot be read, or stands where none may."),
+    # terms and symbols
+    ("term-attribute", "error", "The attribute by which a text defines a term cannot be read."),
+    ("term-place", "error", "A term is defined elsewhere than in a paragraph of the text."),
+    ("term-repeated", "error", "Two places of the course define the same term."),
+    ("symbol-attribute", "error", "What a symbol stands for cannot be read."),
+    ("symbol-formula", "error", "Something is declared as a symbol that is not a single one."),
+    ("symbol-repeated", "warning", "A text says twice what a symbol stands for."),
     (
         "table-cells",
         "error",
@@ -115,6 +123,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("link-lesson", "error", "A link or mention names a lesson that the map does not have."),
     ("link-level", "error", "A mention names a level that the map does not have."),
     ("link-page", "error", "A link names a page that the map does not have."),
+    ("link-term", "error", "A link names a term that no lesson defines."),
     ("link-model", "error", "A link names a model that is not in models/."),
     ("link-example", "error", "A link names a script that no lesson has."),
     ("link-file", "error", "A relative link or image names a file that is not there."),
@@ -239,8 +248,14 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ),
     # quizzes
     ("quiz-id-repeated", "error", "Two quizzes of the course have the same id."),
+    ("question-id-repeated", "error", "Two questions of a quiz have the same id."),
     ("quiz-answer", "error", "The answer of a question is not one of its options."),
     ("quiz-output", "error", "An output question names a script or a line that no run has."),
+    (
+        "package-reduced",
+        "warning",
+        "A QTI package cannot hold a question as its page shows it.",
+    ),
 )
 
 RULES: dict[str, Rule] = {

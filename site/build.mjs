@@ -6,7 +6,7 @@
  * Sources are the js/, css/ and licences/ folders beside this file. In OUT, in this order:
  *
  *   js/NAME.js           one ES module for each js/NAME.js; js/lab-trial.js is a classic script for V8 without a page
- *   css/NAME.css         css/site.css with its imports, and css/preview.css, which only the preview has
+ *   css/NAME.css         css/site.css with its imports, and css/preview.css and css/scorm.css, which only the preview and packages have
  *   mujoco/mujoco.wasm   the physics engine of js/lab-worker.js and js/lab-trial.js
  *   temml/temml.min.js   a classic script that defines the global `temml`
  *   fonts/*.woff2        and fonts.json, which says what each file holds (see `readFaces`)
@@ -126,7 +126,7 @@ async function bundleStyles(out) {
     throw new BuildError('site/css/site.css is missing: nothing to bundle')
   }
   return bundle({
-    entryPoints: ['site.css', 'preview.css'].map((file) => join('css', file)).filter((file) => existsSync(join(HERE, file))),
+    entryPoints: ['site.css', 'preview.css', 'scorm.css'].map((file) => join('css', file)).filter((file) => existsSync(join(HERE, file))),
     outdir: join(out, 'css'),
     external: ['*.woff2'], // the site writes its own @font-face rules, for the subsets that it makes
     loader: { '.svg': 'dataurl' },

@@ -10,8 +10,8 @@ command line for work on site/ itself:
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
 new folder beside; install the packages of the lock file there unless site/node_modules has them;
-run build.mjs; cut fonts and compile templates (prepare_fonts.py, prepare_templates.py); put the
-result in the place of site/dist. One process at a time does this (`exclusive`). Killed at any
+run build.mjs; cut fonts, draw icons and compile templates (prepare_*.py); put the result in the
+place of site/dist. One process at a time does this (`exclusive`). Killed at any
 point, it leaves site/dist whole or absent, and the next run clears up.
 
 Only the standard library is used here: the module runs in pip's build environment. POSIX only.
@@ -53,10 +53,12 @@ _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
 _AHEAD = (
     "site/prepare_fonts.py",
+    "site/prepare_icons.py",
     "site/prepare_templates.py",
     "coursebuild/render/assets.py",
     "coursebuild/render/cutting.py",
     "coursebuild/render/fonts.py",
+    "templates/icon.svg",
 )
 """What makes things ahead."""
 _NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
@@ -127,6 +129,7 @@ def bundle() -> bool:
         _run((*node.node, "build.mjs", str(out)), scratch)
         if (SITE.parent / "coursebuild").is_dir():
             _run((sys.executable, str(SITE / "prepare_fonts.py"), str(out), str(DIST)), scratch)
+            _run((sys.executable, str(SITE / "prepare_icons.py"), str(out), str(DIST)), scratch)
             _run((sys.executable, str(SITE / "prepare_templates.py"), str(out)), scratch)
         stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
         (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")

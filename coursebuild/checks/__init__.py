@@ -18,16 +18,18 @@ from coursebuild.checks.formulas import formula_findings as formula_findings
 from coursebuild.checks.labs import lab_findings
 from coursebuild.checks.links import Places as Places
 from coursebuild.checks.links import anchors as anchors
+from coursebuild.checks.links import defined_terms as defined_terms
 from coursebuild.checks.links import document_links, remembered_anchors
 from coursebuild.checks.links import places as places
 from coursebuild.checks.quizzes import quiz_findings
+from coursebuild.checks.terms import term_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course, Document, Script, document_blocks
 from coursebuild.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
-    """Links, mentions, quizzes and labs, checked against each other."""
+    """Links, mentions, quizzes, labs and terms, checked against each other."""
     scripts = {
         block.path: block.norun
         for document in course.documents
@@ -43,6 +45,7 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         found += document_links(course, document, known, anchors_of)
         found += quiz_findings(blocks, scripts, quizzes)
         found += lab_findings(blocks, course)
+        found += term_findings(blocks, known.terms)
     return tuple(found)
 
 
@@ -56,4 +59,5 @@ def check_document(
     """
     blocks = tuple(document_blocks(document))
     links = document_links(course, document, known)
-    return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course))
+    own = term_findings(blocks, known.terms)
+    return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)

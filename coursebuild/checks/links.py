@@ -30,15 +30,24 @@ from coursebuild.model import (
     PageTarget,
     Quiz,
     RawInline,
+    Recording,
     Script,
     Target,
+    Term,
+    TermTarget,
     UrlTarget,
     block_inlines,
     document_blocks,
+    document_inlines,
+    line_anchor,
+    linked_lines,
+    listing_anchor,
     local_file,
+    output_anchor,
     resolve,
     walk_inlines,
 )
+from coursebuild.model.equations import equation_ids
 from coursebuild.source import Span
 from coursebuild.values import dataclass
 
@@ -58,6 +67,8 @@ class Places:
     models: frozenset[str]
     scripts: frozenset[str]
     files: frozenset[str]
+    terms: Mapping[str, Span]
+    """Where each is defined, by its id; of two places the first."""
 
 
 def places(course: Course, scripts: Iterable[str] | None = None) -> Places:
@@ -72,26 +83,59 @@ def places(course: Course, scripts: Iterable[str] | None = None) -> Places:
         frozenset(model.name for model in course.models),
         frozenset(scripts),
         frozenset(course.files),
+        defined_terms(course.documents),
     )
+
+
+def defined_terms(documents: Iterable[Document]) -> dict[str, Span]:
+    """The terms that documents define, and where."""
+    found: dict[str, Span] = {}
+    for document in documents:
+        for inline in document_inlines(document) if "]{" in document.source.text else ():
+            if isinstance(inline, Term):
+                found.setdefault(inline.id, inline.span)
+    return found
 
 
 def anchors(document: Document) -> frozenset[str]:
     """The ids that a link may name in a document.
 
-    Headings, quizzes, and ids written in raw HTML.
+    Headings, quizzes, listings, outputs, formulas, terms, and ids written in raw HTML; of lines,
+    see `_is_line`.
     """
-    found: set[str] = set()
+    outputs: dict[str, int] = {}
+    lexicon = document.lexicon
+    found = {*equation_ids(document)} if lexicon is None else {e.id for e in lexicon.equations}
     for block in document_blocks(document):
         if isinstance(block, Heading):
             found.add(block.anchor)
         elif isinstance(block, Quiz):
-            found.add(block.id)
+            found.update((block.id, *map(block.anchor, block.keys)))
+        elif isinstance(block, Script):
+            found.add(listing_anchor(block.path))
+        elif isinstance(block, Recording) and block.script is not None:
+            outputs[block.script] = outputs.get(block.script, 0) + 1
+            found.add(output_anchor(block.script, outputs[block.script]))
         elif isinstance(block, HtmlBlock):
             found.update(_HTML_ID.findall(block.html))
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, RawInline):
                 found.update(_HTML_ID.findall(inline.html))
+            elif isinstance(inline, Term):
+                found.add(inline.anchor)
     return frozenset(found)
+
+
+def _is_line(anchor: str, document: Document) -> bool:
+    """Whether an anchor names lines of a script of a document."""
+    if (lines := linked_lines(anchor)) is None:
+        return False
+    return any(
+        isinstance(block, Script)
+        and line_anchor(block.path, lines[1]) == f"{lines[0]}.L{lines[1]}"
+        and lines[2] <= block.code.text.rstrip("\n").count("\n") + 1
+        for block in document_blocks(document)
+    )
 
 
 def remembered_anchors() -> AnchorsOf:
@@ -188,6 +232,14 @@ def _check_link(
                     f"no lesson has a script `{target.path}`",
                     help=did_you_mean(target.path, known.scripts),
                 )
+        case TermTarget():
+            if target.id not in known.terms:
+                yield diagnose(
+                    "link-term",
+                    span,
+                    f"no lesson defines the term `{target.id}`",
+                    help=did_you_mean(target.id, known.terms),
+                )
         case UrlTarget():
             yield from _check_url(span, target.url, document, known, anchors_of)
         case _:
@@ -208,7 +260,8 @@ def _anchor(
         )
         return
     known = anchors_of(document)
-    if unquote(anchor) not in known:
+    name = unquote(anchor)
+    if name not in known and not _is_line(name, document):
         yield diagnose(
             "link-anchor",
             span,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Block, Course, OutputQuestion, Quiz, document_blocks
+from coursebuild.model import Block, Course, Heading, OutputQuestion, Quiz, document_blocks
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.source import Span
 
@@ -23,7 +23,9 @@ def quiz_findings(
     """
     seen = {} if seen is None else seen
     found: list[Diagnostic] = []
-    for quiz in (block for block in blocks if isinstance(block, Quiz)):
+    blocks = tuple(blocks)
+    quizzes = tuple(block for block in blocks if isinstance(block, Quiz) and block.id)
+    for quiz in quizzes:
         first = seen.setdefault(quiz.id, quiz.id_span)
         if first is not quiz.id_span:
             note = Note("the first one is here", first)
@@ -36,8 +38,27 @@ def quiz_findings(
                     notes=[note],
                 )
             )
+    found += _taken_anchors(blocks, quizzes)
+    for quiz in (block for block in blocks if isinstance(block, Quiz)):
         found += _output_questions(quiz, scripts)
     return tuple(found)
+
+
+def _taken_anchors(blocks: tuple[Block, ...], quizzes: tuple[Quiz, ...]) -> Iterator[Diagnostic]:
+    """Questions whose anchor a heading or another quiz has."""
+    taken = {block.anchor: block.span for block in blocks if isinstance(block, Heading)}
+    taken |= {quiz.id: quiz.id_span for quiz in quizzes}
+    for quiz in quizzes:
+        for key in quiz.keys:
+            first = taken.get(quiz.anchor(key))
+            if first is not None:
+                yield diagnose(
+                    "anchor-repeated",
+                    first,
+                    f"the id `{quiz.anchor(key)}` is already used",
+                    help="it is the address of a question; choose another one here",
+                    notes=[Note("in this quiz", quiz.id_span)],
+                )
 
 
 def _output_questions(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:

@@ -14,6 +14,7 @@ from coursebuild.cli.commands import (
     check_command,
     diet_command,
     explain_command,
+    export_command,
     extract_command,
     schema_command,
     serve_command,
@@ -93,6 +94,23 @@ def parser() -> argparse.ArgumentParser:
         type=_port,
         default=8000,
         help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
+    )
+    export = _command(
+        commands,
+        "export",
+        export_command,
+        "verify everything and write an archive for learning platforms",
+    )
+    export.add_argument(
+        "kind",
+        choices=("qti", "scorm"),
+        help="the quizzes as IMS QTI 2.1, or the course as SCORM 1.2",
+    )
+    export.add_argument(
+        "--out",
+        default=None,
+        metavar="FILE",
+        help="from the course's folder (default: quizzes-qti.zip, course-scorm.zip)",
     )
     explain = commands.add_parser(
         "explain",

@@ -156,6 +156,17 @@ def extract_command(arguments: argparse.Namespace) -> int:
     return print_report(extract(options, adopt=arguments.adopt), "text", options)
 
 
+def export_command(arguments: argparse.Namespace) -> int:
+    """Write an archive for learning platforms."""
+    from pathlib import Path
+
+    from coursebuild.pipeline.packages import NAMES, export
+
+    options = options_of(arguments)
+    out = Path(arguments.out or NAMES[arguments.kind])
+    return print_report(export(options, arguments.kind, out), "text", options)
+
+
 def serve_command(arguments: argparse.Namespace) -> int:
     """Preview."""
     from coursebuild.pipeline.serve import serve

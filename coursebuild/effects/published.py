@@ -28,6 +28,8 @@ class Entry:
 
     key: str
     """A hash of all that its bytes depend on; no white space."""
+    digest: str
+    """SHA-256 of its bytes, in hexadecimal digits."""
     size: int
     """Bytes."""
     modified: int
@@ -35,9 +37,9 @@ class Entry:
     inode: int
 
     @classmethod
-    def of(cls, key: str, status: os.stat_result) -> Entry:
+    def of(cls, key: str, digest: str, status: os.stat_result) -> Entry:
         """The entry of a file that was just written, or linked."""
-        return cls(key, status.st_size, status.st_mtime_ns, status.st_ino)
+        return cls(key, digest, status.st_size, status.st_mtime_ns, status.st_ino)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +69,13 @@ class Published:
             status = os.lstat(f"{self.place}/{path}")
         except OSError:
             return False
-        return stat.S_ISREG(status.st_mode) and Entry.of(key, status) == entry
+        return stat.S_ISREG(status.st_mode) and Entry.of(key, entry.digest, status) == entry
 
 
 def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> None:
     """Keep a record; one that cannot be written only costs time."""
     body = "".join(
-        f"{entry.key} {entry.size} {entry.modified} {entry.inode} {path}\n"
+        f"{entry.key} {entry.digest} {entry.size} {entry.modified} {entry.inode} {path}\n"
         for path, entry in sorted(entries.items())
     )
     data = f"{hashlib.sha256(body.encode()).hexdigest()}\n{body}".encode()
@@ -100,5 +102,5 @@ def _file(root: Path, place: Path) -> Path:
 
 
 def _parsed(line: str) -> tuple[str, Entry]:
-    key, size, modified, inode, path = line.split(" ", 4)
-    return path, Entry(key, int(size), int(modified), int(inode))
+    key, digest, size, modified, inode, path = line.split(" ", 5)
+    return path, Entry(key, digest, int(size), int(modified), int(inode))

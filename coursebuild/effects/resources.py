@@ -75,7 +75,7 @@ def template_texts() -> tuple[tuple[str, str], ...]:
     return tuple(
         (path.relative_to(folder).as_posix(), path.read_text(encoding="utf-8"))
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.suffix in (".html", ".toml", ".svg")
+        if path.is_file() and path.suffix in (".html", ".toml", ".svg", ".css")
     )
 
 

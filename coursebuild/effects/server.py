@@ -8,7 +8,9 @@ Entry point: `PreviewServer`.
 3. Pages get one script and one style sheet more. The script listens to `/.coursebuild/events`:
    `page` says which state of the page there is now, `news` what is to be said beside its text.
    A listener is told how things stand when it begins, so that nothing is lost by one that was away.
-4. What an author accepts in a page comes by `POST /.coursebuild/accept`, with a token that only a
+4. In the place of a published site's service worker there is one that goes: a browser may have met
+   such a site at this address before.
+5. What an author accepts in a page comes by `POST /.coursebuild/accept`, with a token that only a
    page of this server can know.
 """
 
@@ -55,6 +57,7 @@ _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
 """
 _LASTING = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
+_WORKER = "/service-worker.js"
 _LARGEST = 1 << 16
 """Bytes of a request's body."""
 _NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
@@ -90,7 +93,7 @@ class PreviewServer:
     """Serves a site on `127.0.0.1:port`; port 0 takes any free one."""
 
     def __init__(self, port: int, site: PreviewSite, own: Mapping[str, bytes]) -> None:
-        """`own` are the preview's files, by name: `preview.js`, `preview.css`."""
+        """`own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`."""
         self.site = site
         self.own = own
         self.tool = digest(b"".join(own.values()))
@@ -131,6 +134,8 @@ class PreviewServer:
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
         """Status, content type and bytes of an address path."""
+        if path.endswith(_WORKER):
+            path = f"{PREFIX}worker.js"
         own = self.own.get(path.removeprefix(PREFIX)) if path.startswith(PREFIX) else None
         if own is not None:
             return HTTPStatus.OK, _type_of(path), own

@@ -21,19 +21,20 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import hashlib
 import os
 import shutil
 import stat
 import unicodedata
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 from coursebuild.effects.exchange import exchange
 from coursebuild.effects.locks import is_abandoned, try_lock
 from coursebuild.effects.published import Entry, Published, write_published
-from coursebuild.results import OutputFile, SiteFile
+from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
 from coursebuild.values import dataclass
 
 MARKER = ".coursebuild-site"
@@ -85,13 +86,16 @@ def check_out(root: Path, out: Path) -> Path:
     return place
 
 
-def publish(root: Path, out: Path, files: Iterable[SiteFile]) -> tuple[str, ...]:
+def publish(
+    root: Path, out: Path, files: Iterable[SiteFile], listed: FileList | None = None
+) -> tuple[str, ...]:
     """Replace the site at `out` by these files.
 
     Args:
         root: the course folder.
         out: where the site goes; a link to a folder stays one.
         files: each path once; POSIX, relative, without `..`.
+        listed: a file that is made of what all these are.
 
     Returns:
         The paths of the files that were written, sorted: the others are as they were.
@@ -104,7 +108,8 @@ def publish(root: Path, out: Path, files: Iterable[SiteFile]) -> tuple[str, ...]
     recover(out)
     place = check_out(root, out)
     root = Path(os.path.realpath(root))
-    site = _Site(Published.read(root, place), tuple((file, _key(file)) for file in files))
+    keyed = tuple((file, _key(file)) for file in files)
+    site = _Site(Published.read(root, place), keyed, listed)
     if site.is_there():
         return ()
     try:
@@ -174,13 +179,17 @@ class _Site:
     old: Published
     files: tuple[tuple[SiteFile, str], ...]
     """Each with its key."""
+    listed: FileList | None
 
     def is_there(self) -> bool:
         """Whether it is there already, whole and with nothing beside it."""
-        paths = {file.path for file, _ in self.files}
-        if len(paths) != len(self.files) or paths != self.old.entries.keys():
+        keys = [(file.path, key) for file, key in self.files]
+        if self.listed is not None:
+            keys.append((self.listed.path, self._list_key(self.listed)))
+        paths = {path for path, _ in keys}
+        if len(paths) != len(keys) or paths != self.old.entries.keys():
             return False
-        if not all(self.old.is_whole(file.path, key) for file, key in self.files):
+        if not all(self.old.is_whole(path, key) for path, key in keys):
             return False
         try:
             found = [path for path in _files(self.old.place) if path != MARKER]
@@ -194,20 +203,34 @@ class _Site:
         folders = {""}
         entries: dict[str, Entry] = {}
         made: list[str] = []
-        for file, key in self.files:
-            path = file.path
+
+        def put(path: str, key: str, make: Callable[[], Iterable[bytes]]) -> None:
             _check_path(path, entries)
             parent = path.rpartition("/")[0]
             if parent not in folders:
                 _make_folders(folder, parent, folders)
             target = f"{folder}/{path}"
-            if not self._linked(path, key, target):
-                data = file.data if isinstance(file, OutputFile) else file.make()
-                _write_file(target, data)
+            if self._linked(path, key, target):
+                digest = self.old.entries[path].digest
+            else:
+                digest = _write_file(target, make())
                 made.append(path)
-            entries[path] = Entry.of(key, os.lstat(target))
-        _write_file(f"{folder}/{MARKER}", _marker(entries))
+            entries[path] = Entry.of(key, digest, os.lstat(target))
+
+        for file, key in self.files:
+            put(file.path, key, functools.partial(_pieces, file))
+        if self.listed is not None:
+            facts = [FileFacts(p, e.digest, e.size) for p, e in sorted(entries.items())]
+            listed = self.listed
+            put(listed.path, self._list_key(listed), lambda: (listed.make(facts),))
+        _write_file(f"{folder}/{MARKER}", (_marker(entries),))
         return entries, made
+
+    def _list_key(self, listed: FileList) -> str:
+        """What the list's bytes depend on: nothing of it is known before all files are."""
+        lines = sorted(f"{key} {file.path}\n" for file, key in self.files)
+        text = "".join((listed.key, "\n", *lines))
+        return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
     def _linked(self, path: str, key: str, target: str) -> bool:
         """Link a file of the old site that is as it should be."""
@@ -250,15 +273,27 @@ def _make_folders(folder: Path, path: str, made: set[str]) -> None:
     made.add(path)
 
 
-def _write_file(path: str, data: bytes) -> None:
+def _pieces(file: SiteFile) -> Iterable[bytes]:
+    """The bytes of a file, at once or one after the other."""
+    if isinstance(file, OutputFile):
+        return (file.data,)
+    return (file.make(),) if file.pieces is None else file.pieces()
+
+
+def _write_file(path: str, pieces: Iterable[bytes]) -> str:
+    """Write a file; gives the hash of its bytes."""
+    digest = hashlib.sha256()
     fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
     try:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(fd, rest) :]
+        for piece in pieces:
+            digest.update(piece)
+            rest = memoryview(piece)
+            while rest:
+                rest = rest[os.write(fd, rest) :]
         os.fchmod(fd, 0o644)  # whatever the umask is
     finally:
         os.close(fd)
+    return digest.hexdigest()
 
 
 def _swap(staging: Path, place: Path) -> None:

@@ -8,7 +8,11 @@ end (`assert_never`). A document is the tree of one Markdown text: a lesson, a p
 inside a quiz.
 """
 
+from coursebuild.model.addresses import line_anchor as line_anchor
+from coursebuild.model.addresses import linked_lines as linked_lines
+from coursebuild.model.addresses import listing_anchor as listing_anchor
 from coursebuild.model.addresses import local_file as local_file
+from coursebuild.model.addresses import output_anchor as output_anchor
 from coursebuild.model.addresses import resolve as resolve
 from coursebuild.model.blocks import Block as Block
 from coursebuild.model.blocks import BlockQuote as BlockQuote
@@ -49,10 +53,12 @@ from coursebuild.model.inlines import FootnoteRef as FootnoteRef
 from coursebuild.model.inlines import HardBreak as HardBreak
 from coursebuild.model.inlines import Image as Image
 from coursebuild.model.inlines import Inline as Inline
+from coursebuild.model.inlines import Label as Label
 from coursebuild.model.inlines import LessonTarget as LessonTarget
 from coursebuild.model.inlines import LevelTarget as LevelTarget
 from coursebuild.model.inlines import Link as Link
 from coursebuild.model.inlines import Math as Math
+from coursebuild.model.inlines import Meaning as Meaning
 from coursebuild.model.inlines import ModelTarget as ModelTarget
 from coursebuild.model.inlines import NumberBinding as NumberBinding
 from coursebuild.model.inlines import PageTarget as PageTarget
@@ -61,6 +67,8 @@ from coursebuild.model.inlines import SoftBreak as SoftBreak
 from coursebuild.model.inlines import Strikethrough as Strikethrough
 from coursebuild.model.inlines import Strong as Strong
 from coursebuild.model.inlines import Target as Target
+from coursebuild.model.inlines import Term as Term
+from coursebuild.model.inlines import TermTarget as TermTarget
 from coursebuild.model.inlines import Text as Text
 from coursebuild.model.inlines import UrlTarget as UrlTarget
 from coursebuild.model.inlines import plain_text as plain_text
@@ -80,6 +88,10 @@ from coursebuild.model.interactive import OrderQuestion as OrderQuestion
 from coursebuild.model.interactive import OutputQuestion as OutputQuestion
 from coursebuild.model.interactive import Question as Question
 from coursebuild.model.interactive import Quiz as Quiz
+from coursebuild.model.lexicon import DefinedTerm as DefinedTerm
+from coursebuild.model.lexicon import Equation as Equation
+from coursebuild.model.lexicon import Lexicon as Lexicon
+from coursebuild.model.lexicon import SymbolUse as SymbolUse
 from coursebuild.model.scenarios import Declarations as Declarations
 from coursebuild.model.scenarios import DeclaredScenario as DeclaredScenario
 from coursebuild.model.scenarios import Keep as Keep

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from decimal import Decimal
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from coursebuild.model.inlines import Inline
+from coursebuild.model.inlines import Inline, Label
+from coursebuild.model.lexicon import Lexicon
 from coursebuild.model.interactive import Lab, Quiz
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.values import dataclass, field
@@ -122,6 +123,7 @@ class MathBlock:
 
     span: Span
     tex: Excerpt
+    label: Label | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +298,8 @@ class Document:
     source: Source
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
+    lexicon: Lexicon | None = None
+    """Only of a skeleton, which does not have what it was taken from."""
     _all: list[Block] = field(
         default_factory=list, init=False, repr=False, compare=False, hash=False
     )
@@ -341,6 +345,6 @@ class Document:
 
         def __getattr__(self, name: str) -> object:
             """Blocks that are away: their slots are empty."""
-            if name in ("blocks", "footnotes", "_all"):
+            if name in ("blocks", "footnotes", "lexicon", "_all"):
                 return getattr(self._load(), name)
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

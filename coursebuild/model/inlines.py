@@ -64,12 +64,53 @@ class NumberBinding:
 
 
 @dataclass(frozen=True, slots=True)
+class Label:
+    """`{#eq:euler}` after a formula on a line of its own: its id, colon included."""
+
+    span: Span
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """`{symbol="angular velocity" unit="rad/s"}` after a formula: what the symbol stands for."""
+
+    span: Span
+    text: str
+    unit: str
+    """Empty where none is given."""
+
+
+@dataclass(frozen=True, slots=True)
 class Math:
     """A formula; `display` for `$$…$$`."""
 
     span: Span
     tex: Excerpt
     display: bool
+    label: Label | None = None
+    """Only where it is on a line of its own."""
+    meaning: Meaning | None = None
+    """Only where it is not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """`[inertia tensor]{term}`: where the text says what a term means."""
+
+    span: Span
+    children: tuple[Inline, ...]
+    name: str
+    """As the glossary calls it."""
+    id: str
+    """Its name in links: `term:inertia-tensor`."""
+    renamed: bool
+    """Whether the name is given, by `{term="…"}`, and not the text itself."""
+
+    @property
+    def anchor(self) -> str:
+        """The id of the place on its page; no heading's has a colon but an explicit one."""
+        return f"term:{self.id}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +157,15 @@ class UrlTarget:
     url: str
 
 
+@dataclass(frozen=True, slots=True)
+class TermTarget:
+    """`term:inertia-tensor`."""
+
+    id: str
+
+
 Target: TypeAlias = (
-    LessonTarget | LevelTarget | ModelTarget | PageTarget | ExampleTarget | UrlTarget
+    LessonTarget | LevelTarget | ModelTarget | PageTarget | ExampleTarget | TermTarget | UrlTarget
 )
 
 
@@ -190,6 +238,7 @@ Inline: TypeAlias = (
     | CodeSpan
     | NumberBinding
     | Math
+    | Term
     | Link
     | Image
     | RawInline
@@ -208,7 +257,7 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
                 parts.append(inline.text)
             case Math():
                 parts.append(inline.tex.text)
-            case Emphasis() | Strong() | Strikethrough() | Link():
+            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
                 parts.append(plain_text(inline.children))
             case Image():
                 parts.append(inline.alt)

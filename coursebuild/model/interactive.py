@@ -148,6 +148,8 @@ class Choice:
     """An option of a question, with what to say to a learner who takes it."""
 
     span: Span
+    key: str
+    """Among the options of its question; it depends on the text alone."""
     text: tuple[Inline, ...]
     feedback: tuple[Block, ...]
 
@@ -157,6 +159,8 @@ class Question:
     """What every question has, whatever its kind."""
 
     span: Span
+    key: str
+    """Among the questions of its quiz: a learner's answer hangs on it."""
     label: str
     text: tuple[Block, ...]
     explain: tuple[Block, ...]
@@ -211,6 +215,8 @@ class OrderQuestion(Question):
     """Put the items in order; they are written in the right order."""
 
     items: tuple[tuple[Inline, ...], ...]
+    item_keys: tuple[str, ...]
+    """Of each item; it depends on the item's text alone."""
 
 
 AnyQuestion: TypeAlias = (
@@ -227,3 +233,9 @@ class Quiz:
     id_span: Span
     title: str
     questions: tuple[AnyQuestion, ...]
+    keys: tuple[str, ...]
+    """Of all questions, also where `questions` holds only some of them."""
+
+    def anchor(self, key: str) -> str:
+        """The anchor of the question with a key; its dot parts it from the quiz's own."""
+        return f"{self.id}.{key}"

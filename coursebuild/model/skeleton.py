@@ -3,7 +3,8 @@
 Entry point: `skeleton(document)`, a document of the same type whose walk (`document_blocks`,
 `document_inlines`) meets, in the same order, everything that somebody other than the document's own
 page looks at, or for which that page looks up something elsewhere: headings with their anchors,
-scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, callouts, links, pictures, raw HTML.
+scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, callouts, links, terms, pictures, raw
+HTML.
 
 1. Containers are opened, since nobody outside the page asks what stands in what.
 2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
@@ -36,13 +37,13 @@ from coursebuild.model.blocks import (
     Table,
     ThematicBreak,
 )
-from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInline
+from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInline, Term
 from coursebuild.model.interactive import Lab, OutputQuestion, Quiz
 from coursebuild.model.walk import block_inlines, document_blocks, walk_inlines
 from coursebuild.source import Span
 from coursebuild.values import replace
 
-_KEPT = (Link, Image, NumberBinding, RawInline)
+_KEPT = (Link, Image, NumberBinding, RawInline, Term)
 
 
 def skeleton(document: Document) -> Document:
@@ -89,7 +90,7 @@ def _text(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:
 def _inlines(block: Block) -> tuple[Inline, ...]:
     """The inlines of a block that stay, one after the other: none is in another."""
     return tuple(
-        replace(inline, children=()) if isinstance(inline, Link) else inline
+        replace(inline, children=()) if isinstance(inline, Link | Term) else inline
         for inline in walk_inlines(block_inlines(block))
         if isinstance(inline, _KEPT)
     )

@@ -22,7 +22,7 @@ from coursebuild.model.blocks import (
     Script,
     Table,
 )
-from coursebuild.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong
+from coursebuild.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
 from coursebuild.model.interactive import (
     AnyQuestion,
     ChoiceQuestion,
@@ -37,7 +37,7 @@ from coursebuild.values import replace
 _HOLDERS = (BlockQuote, Callout, ListBlock, Lab, Quiz, Recording)
 """Blocks that may have others in them."""
 _LINES = (Heading, Paragraph, HtmlFlow)
-_AROUND = (Emphasis, Strong, Strikethrough, Link)
+_AROUND = (Emphasis, Strong, Strikethrough, Link, Term)
 """Inlines that may have others in them."""
 
 

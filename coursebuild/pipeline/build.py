@@ -6,9 +6,10 @@ Entry points: `build(options, out)`; `prepare(options, progress)`, what it would
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.effects.aside import Aside
@@ -24,8 +25,13 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report
-from coursebuild.results import SiteFile
+from coursebuild.results import FileList, Results, SiteFile
 from coursebuild.values import dataclass, replace
+
+if TYPE_CHECKING:
+    from coursebuild.measured.shown import Reports
+    from coursebuild.model import Course
+    from coursebuild.pipeline.site import Site
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +42,8 @@ class Prepared:
     files: tuple[SiteFile, ...]
     drawn: tuple[str, ...] = ()
     """The pages that were drawn, and not known from before; site paths."""
+    listed: FileList | None = None
+    """The list of all files."""
 
 
 def build(options: Options, out: Path) -> Report:
@@ -46,8 +54,9 @@ def build(options: Options, out: Path) -> Report:
         if not prepared.report.ok:
             return replace(prepared.report, remarks=(_unpublished(options.root, out),))
         with progress.stage("publishing"):
-            publish(options.root, options.root / out, prepared.files)
-    return replace(prepared.report, remarks=(f"published {len(prepared.files)} files in {out}",))
+            publish(options.root, options.root / out, prepared.files, prepared.listed)
+    count = len(prepared.files) + (prepared.listed is not None)
+    return replace(prepared.report, remarks=(f"published {count} files in {out}",))
 
 
 def _unpublished(root: Path, out: Path) -> str:
@@ -55,15 +64,24 @@ def _unpublished(root: Path, out: Path) -> str:
     return "nothing was published" + (f"; {out} stays as it is" if there else "")
 
 
+Make: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], Site]"
+"""Puts files together from a course in which nothing is wrong."""
+
+
 @contextmanager
-def prepare(options: Options, progress: Progress) -> Iterator[Prepared]:
-    """Verify and render. The caller holds the course's lock, and has the files made meanwhile."""
+def prepare(options: Options, progress: Progress, make: Make | None = None) -> Iterator[Prepared]:
+    """Verify and render. The caller holds the course's lock, and has the files made meanwhile.
+
+    `make` puts other files together than those of the site.
+    """
     aside = Aside(options.store.folder)
     with Documents(options.store, options.jobs, progress.stage, aside) as documents:
-        yield _prepared(options, progress, documents)
+        yield _prepared(options, progress, documents, make)
 
 
-def _prepared(options: Options, progress: Progress, documents: Documents) -> Prepared:
+def _prepared(
+    options: Options, progress: Progress, documents: Documents, make: Make | None
+) -> Prepared:
     began = time.monotonic()
     loaded = load(
         options.root,
@@ -82,16 +100,17 @@ def _prepared(options: Options, progress: Progress, documents: Documents) -> Pre
     found += reports.diagnostics
     files: tuple[SiteFile, ...] = ()
     drawn: tuple[str, ...] = ()
+    listed: FileList | None = None
     if all(d.severity is not Severity.ERROR for d in found):
         from coursebuild.pipeline.site import site_files
 
         results = verified.results
-        site = site_files(loaded.course, results, documents, options, reports.value)
-        files, drawn = site.files, site.drawn
+        site = (make or site_files)(loaded.course, results, documents, options, reports.value)
+        files, drawn, listed = site.files, site.drawn, site.listed
         found += site.diagnostics
     report = _report(loaded, verified, found, time.monotonic() - began)
     report = replace(report, depends=depends_on(loaded.course, verified.results))
-    return Prepared(report, files if report.ok else (), drawn)
+    return Prepared(report, files if report.ok else (), drawn, listed if report.ok else None)
 
 
 def _report(loaded: Loaded, verified: Verified, found: list[Diagnostic], seconds: float) -> Report:

@@ -26,7 +26,7 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.bundles import Bundle
 from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
-from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Later, Read, Request
+from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Drawn, Later, Read, Request
 from coursebuild.pipeline.shelf import Shelf
 from coursebuild.source import Source
 from coursebuild.values import replace
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from coursebuild.effects.pool import Pool
     from coursebuild.pipeline.reading import Reader
     from coursebuild.render.fonts import FontJob
-    from coursebuild.render.record import PageRecord
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
@@ -202,8 +201,8 @@ class Documents:
                 self._store.keep(_FONTS, job.key, made)
         return lambda job: found[job.key]
 
-    def drawn(self, page: Draw) -> tuple[PageRecord, str]:
-        """A page and its body, drawn here and now."""
+    def drawn(self, page: Draw) -> Drawn:
+        """A page, its body, and what it is found by, drawn here and now."""
         return self._here().draw(page)
 
     def _stored(self, task: Task, bundled: Bundle) -> Outline | None:

@@ -43,7 +43,7 @@ def words_for(store: Store, texts: tuple[tuple[str, str], ...], language: str) -
     key = hashlib.sha256(f"{tool_digest()}\0{language}".encode()).hexdigest()
     data = None if store.fresh else store.peek(_WORDS, key)
     if data is not None:
-        return Strings.of(json.loads(data))
+        return Strings.of(json.loads(data), language)
     from coursebuild.render.assets import strings_for
 
     words = strings_for(texts, language)

@@ -18,22 +18,43 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
+from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.records import bundle, part, unbundle, unpack_record
-from coursebuild.pipeline.requests import PAGES, Draw, Later
+from coursebuild.pipeline.records import (
+    bundle,
+    part,
+    searched_part,
+    unbundle,
+    unpack_record,
+    unpack_value,
+)
+from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, Draw, Later
 from coursebuild.render import lesson, pages
 from coursebuild.render.frame import Frames, Names
+from coursebuild.render.glossary import glossary_sheet
 from coursebuild.render.library import Library
+from coursebuild.render.links import has
 from coursebuild.render.numerics import numerics_sheet
+from coursebuild.render.offline import offline_sheet
+from coursebuild.render.own_pages import own_pages
+from coursebuild.render.reader import progress_sheet, review_sheet
 from coursebuild.render.record import PageRecord
+from coursebuild.render.search.files import Entry
+from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.shared import PageFacts
 from coursebuild.render.sheet import Sheet, fingerprint
+from coursebuild.render.symbol_index import symbols_sheet
 from coursebuild.results import KeptFile
 from coursebuild.values import dataclass
+
+if TYPE_CHECKING:
+    from coursebuild.render.exports.page import Beside
+    from coursebuild.render.exports.parts import LessonPart
 
 _SITE = "site"
 """The kind of the entry that holds the records of the last site."""
@@ -57,6 +78,8 @@ class _Page:
     record: Kept
     """Packed."""
     indexed: bool
+    entry: Entry | None
+    """Where it is searched."""
 
 
 class Pages:
@@ -68,6 +91,7 @@ class Pages:
         self._store = store
         self._aside = documents.aside or Aside(store.folder)
         self._facts = _Facts()
+        self._by_path: dict[str, _Wanted] = {}
         self._pages = self._made([self._wanted(make) for make in sheets(library)])
 
     @property
@@ -80,14 +104,32 @@ class Pages:
         """Site paths of the pages that search engines should list."""
         return (page.wanted.path for page in self._pages if page.indexed)
 
+    @property
+    def searched(self) -> tuple[Entry, ...]:
+        """The pages that are searched, in order."""
+        return tuple(page.entry for page in self._pages if page.entry is not None)
+
+    def found_by(self, path: str) -> tuple[bytes, bytes]:
+        """The text and the terms that a page is found by."""
+        page = self._at(path)
+        data = self._store.peek(PAGES, page.key)
+        text, terms = (b"", b"") if data is None else searched_part(data)
+        if not text:  # it was damaged, or the store cannot be written
+            searched = self._documents.drawn(self._request(page)).searched
+            assert searched is not None
+            text, terms = searched.text, searched.terms
+        return text, terms
+
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
         pages = {page.wanted.path: page for page in self._pages}
         if not self._facts.sound or not self._facts.leads <= files | pages.keys():
             return False
         for path, anchors in self._facts.anchors.items():
-            if path in pages and not anchors <= {"top", *self._record(pages[path]).ids}:
-                return False
+            if path in pages:
+                ids = frozenset(self._record(pages[path]).ids)
+                if not all(anchor == "top" or has(ids, anchor) for anchor in anchors):
+                    return False
         return True
 
     def files(self, names: Names) -> Iterator[KeptFile]:
@@ -99,20 +141,43 @@ class Pages:
             make = functools.partial(self._framed, page.wanted, frames)
             yield KeptFile(page.wanted.path, key, make)
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The site paths of all pages."""
+        return tuple(page.wanted.path for page in self._pages)
+
+    def key(self, path: str) -> str:
+        """The key of a page."""
+        return self._at(path).key
+
+    def beside(self, path: str) -> Beside:
+        """What a page gives to the files beside it."""
+        from coursebuild.render.exports.page import Beside
+
+        page = self._at(path)
+        found = unpack_value(self._store.peek(EXPORTS, page.key), Beside)
+        return found or self._documents.drawn(self._request(page)).exports.beside
+
+    def part(self, path: str) -> LessonPart:
+        """What a lesson gives to the files of the whole course."""
+        from coursebuild.render.exports.parts import LessonPart
+
+        page = self._at(path)
+        found = unpack_value(self._store.peek(PARTS, page.key), LessonPart)
+        found = found or self._documents.drawn(self._request(page)).exports.part
+        assert found is not None, "a written lesson has a part"
+        return found
+
+    def _at(self, path: str) -> _Wanted:
+        if not self._by_path:
+            self._by_path.update((page.wanted.path, page.wanted) for page in self._pages)
+        return self._by_path[path]
+
     # --- keys
 
     def _wanted(self, make: Callable[[], Sheet]) -> _Wanted:
         sheet = make()
-        course = self._library.course
-        task = self._documents.task(sheet.document) if sheet.document is not None else None
-        parts = (
-            tool_digest(),
-            course.language,
-            course.base_url,
-            fingerprint(sheet),
-            task.key if task is not None else "",
-        )
-        key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+        key = page_key(self._library.course, self._documents, sheet)
         return _Wanted(sheet.path, key, make, sheet.document)
 
     def _request(self, wanted: _Wanted) -> Draw:
@@ -133,6 +198,7 @@ class Pages:
             course.repository,
             course.licence,
             tuple((page.id, page.title, page.menu) for page in course.pages),
+            own_pages(self._library),
             results.engine,
             results.python,
             names,
@@ -173,7 +239,12 @@ class Pages:
         if record is None:
             return None
         self._facts.add(record)
-        return _Page(page, self._aside.put(packed), record.draft.indexed)
+        kept, draft = self._aside.put(packed), record.draft
+        entry = None
+        if record.search is not None:
+            name, digest = record.search
+            entry = Entry(draft.path, draft.kind, draft.title, name, digest)
+        return _Page(page, kept, draft.indexed, entry)
 
     def _load_last(self) -> dict[str, bytes]:
         data = None if self._store.fresh else self._store.peek(_SITE, self._name())
@@ -192,10 +263,23 @@ class Pages:
         packed, body = (b"", b"") if data is None else part(data)
         record = unpack_record(packed)
         if record is None:  # it was damaged, or the store cannot be written
-            record, text = self._documents.drawn(self._request(page))
-            body = text.encode()
+            drawn = self._documents.drawn(self._request(page))
+            record, body = drawn.record, drawn.body.encode()
         before, after = frames.around(record.draft, record.parts)
         return before.encode() + body + after.encode()
+
+
+def page_key(course: Course, documents: Documents, sheet: Sheet) -> str:
+    """A hash of all that a page depends on."""
+    task = documents.task(sheet.document) if sheet.document is not None else None
+    parts = (
+        tool_digest(),
+        course.language,
+        course.base_url,
+        fingerprint(sheet),
+        task.key if task is not None else "",
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 class _Facts:
@@ -220,7 +304,7 @@ class _Facts:
         own = {"", "top", *record.ids}
         for path, anchor in record.references:
             if path == record.draft.path:
-                self.sound = self.sound and anchor in own
+                self.sound = self.sound and has(own, anchor)
             else:
                 self.leads.add(path)
                 if anchor not in ("", "top"):
@@ -246,9 +330,18 @@ def sheets(library: Library) -> Iterator[Callable[[], Sheet]]:
             yield partial(lesson.lesson_sheet, library, entry, entry.document)
     for model in course.models:
         yield partial(pages.model_sheet, library, model)
+    if library.references.terms:
+        yield partial(glossary_sheet, library)
+    if library.references.symbols:
+        yield partial(symbols_sheet, library)
     if library.reports.cases:
         yield partial(numerics_sheet, library)
     for page in course.pages:
         if page.document is not None:
             yield partial(pages.page_sheet, library, page, page.document)
+    yield partial(progress_sheet, library)
+    if library.asked:
+        yield partial(review_sheet, library)
+    yield partial(offline_sheet, library)
+    yield partial(search_sheet, library)
     yield partial(pages.not_found_sheet, library)

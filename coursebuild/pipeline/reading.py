@@ -35,9 +35,24 @@ from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
 from coursebuild.pipeline.outlines import Outline, Task, pack, packed, unpack
-from coursebuild.pipeline.records import join, pack_record
-from coursebuild.pipeline.requests import OUTLINES, PAGES, Answer, Cut, Draw, Later, Read, Request
-from coursebuild.render.record import PageRecord, record
+from coursebuild.pipeline.records import join, pack_record, pack_value
+from coursebuild.pipeline.requests import (
+    EXPORTS,
+    ITEMS,
+    OUTLINES,
+    PAGES,
+    PARTS,
+    Answer,
+    Ask,
+    Cut,
+    Draw,
+    Drawn,
+    Later,
+    Read,
+    Request,
+)
+from coursebuild.render.lexicon import lexicon, misdeclared
+from coursebuild.render.record import record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
@@ -140,6 +155,9 @@ class Reader:
             case Draw():
                 self._rest()
                 return self._draw(request)
+            case Ask():
+                self._rest()
+                return self._ask(request.page)
             case Later():
                 return self.answer(request.make())
             case Cut():
@@ -155,10 +173,13 @@ class Reader:
 
     def _outline(self, whole: _Whole) -> Outline:
         found = formula_findings(whole.document, whole.formulas)
+        told = misdeclared(whole.document, whole.formulas)
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
         return Outline(
-            skeleton=skeleton(whole.document),
-            diagnostics=(*whole.diagnostics, *found),
+            skeleton=replace(
+                skeleton(whole.document), lexicon=lexicon(whole.document, whole.formulas)
+            ),
+            diagnostics=(*whole.diagnostics, *found, *told),
             imports={s.path: tuple(sorted(imports(s.code.text))) for s in scripts},
             lasting=not found,
         )
@@ -251,23 +272,49 @@ class Reader:
 
     # --- drawing
 
-    def draw(self, request: Draw) -> tuple[PageRecord, str]:
-        """A page and its body."""
-        from coursebuild.render.draw import draw
+    def draw(self, request: Draw) -> Drawn:
+        """A page, its body, and what it is found by."""
+        from coursebuild.render.draw import draw_whole
+        from coursebuild.render.exports.page import page_exports
+        from coursebuild.render.search.page import searched
 
         whole = self._whole(request.task) if request.task is not None else None
         tools = self._tools_for(request.language)
         document = None
         if whole is not None:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
-        return record(draw(request.sheet, document, tools), request.base_url)
+        draft, text = draw_whole(request.sheet, document, tools)
+        found, body = record(draft, request.base_url)
+        by = searched(request.sheet, document, str(draft.body))
+        if by is not None:
+            found = replace(found, search=(by.name, by.digest))
+        base = request.base_url
+        exports = page_exports(request.sheet, document, tools, base, body, str(text))
+        return Drawn(found, body, by, exports)
 
     def _draw(self, request: Draw) -> bytes:
-        record, body = self.draw(request)
-        packed_record = pack_record(record)
-        data = join(packed_record, body)
+        drawn = self.draw(request)
+        packed_record = pack_record(drawn.record)
+        data = join(packed_record, drawn.body, drawn.searched)
         self._store.keep(PAGES, request.key, data, local=True)
+        made = drawn.exports
+        self._store.keep(EXPORTS, request.key, pack_value(made.beside), local=True)
+        if made.part is not None:
+            self._store.keep(PARTS, request.key, pack_value(made.part), local=True)
         return packed_record
+
+    def _ask(self, request: Draw) -> bytes:
+        """The items of a page's quizzes, and what they cannot hold."""
+        from coursebuild.render.packages.quizzes import page_quizzes
+
+        assert request.task is not None
+        whole = self._whole(request.task)
+        tools = replace(self._tools_for(request.language), formulas=whole.formulas)
+        language, base_url = request.language, request.base_url
+        made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
+        data = pack(made)
+        self._store.keep(ITEMS, request.key, data, local=True)
+        return data
 
     def _tools_for(self, language: str) -> Tools:
         if language not in self._tools:

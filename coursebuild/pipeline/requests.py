@@ -1,19 +1,25 @@
 """What is asked of a `Reader`, and what it answers.
 
-Entry points: `Read`, `Draw`; `Later`, a page that is put together when it is sent.
+Entry points: `Read`, `Draw`; `Later`, a page that is put together when it is sent; `Drawn`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from coursebuild.pipeline.outlines import Task
 from coursebuild.render.fonts import FontJob
+from coursebuild.render.record import PageRecord
+from coursebuild.render.search.values import Searched
 from coursebuild.render.sheet import Sheet
 from coursebuild.values import dataclass
 
-OUTLINES, PAGES = "outlines", "pages"
+if TYPE_CHECKING:
+    from coursebuild.render.exports.page import PageExports
+
+OUTLINES, PAGES, EXPORTS, ITEMS = "outlines", "pages", "exports", "items"
+PARTS = "parts"
 """Kinds of entries in the store. They stay on this machine: reading them may run code."""
 
 
@@ -39,6 +45,13 @@ class Draw:
 
 
 @dataclass(frozen=True, slots=True)
+class Ask:
+    """Make the items of a page's quizzes; they are kept under the page's key."""
+
+    page: Draw
+
+
+@dataclass(frozen=True, slots=True)
 class Cut:
     """Cut a font."""
 
@@ -46,24 +59,37 @@ class Cut:
 
 
 class Later:
-    """A page of which only little is held until it is sent; it arrives as `Draw`."""
+    """A page of which only little is held until it is sent; it arrives as what is made of it."""
 
     __slots__ = ("make", "path")
 
-    def __init__(self, path: str | None, make: Callable[[], Draw]) -> None:
+    def __init__(self, path: str | None, make: Callable[[], Draw | Ask]) -> None:
         """`path` is that of its document, if it has one."""
         self.path = path
         self.make = make
 
-    def __reduce__(self) -> tuple[Callable[[Draw], Draw], tuple[Draw]]:
+    def __reduce__(self) -> tuple[Callable[[Draw | Ask], Draw | Ask], tuple[Draw | Ask]]:
         """The page itself."""
         return _same, (self.make(),)
 
 
-def _same(request: Draw) -> Draw:
+def _same(request: Draw | Ask) -> Draw | Ask:
     return request
 
 
-Request: TypeAlias = Read | Draw | Later | Cut
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A page that was drawn."""
+
+    record: PageRecord
+    body: str
+    searched: Searched | None
+    """What it is found by; `None` where it is not searched."""
+    exports: PageExports
+    """What it gives to the files beside it."""
+
+
+Request: TypeAlias = Read | Draw | Ask | Later | Cut
 Answer: TypeAlias = bytes
-"""The outline of what was read; the packed record of the page that was drawn; the font."""
+"""The outline of what was read; the packed record of the page that was drawn; the packed
+items of its quizzes; the font."""

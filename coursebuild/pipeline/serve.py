@@ -82,6 +82,7 @@ def serve(options: Options, port: int) -> None:
     files = {
         "preview.js": page_script(bundled["js/preview.js"]),
         "preview.css": bundled["css/preview.css"],
+        "worker.js": page_script(bundled["js/preview-worker.js"]),
     }
     try:
         server = PreviewServer(port, Site(live), files)

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.aside import Aside
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import kept_distributions, library_files
 from coursebuild.effects.read import read_bytes
@@ -35,13 +36,18 @@ from coursebuild.render import meta, urls, zips
 from coursebuild.render.assets import Assets, templates_of
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
+from coursebuild.render.offline import file_list, offline_files
+from coursebuild.render.search.files import SearchFiles
+from coursebuild.render.search.sheet import search_words
 from coursebuild.render.shared import PageFacts, common_characters
-from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
+from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
+_CELLS = "search"
+"""Kind of the entries that hold parts of the index of the search."""
 _DIGEST = hashlib.sha256().digest_size * 2
 
 
@@ -51,6 +57,8 @@ class Site:
 
     files: tuple[SiteFile, ...]
     """Sorted by path."""
+    listed: FileList | None
+    """The list of them all, where there is one."""
     diagnostics: tuple[Diagnostic, ...]
     drawn: tuple[str, ...]
     """The pages that were drawn just now, and not before."""
@@ -61,6 +69,20 @@ def site_files(
 ) -> Site:
     """The site of a course whose documents are skeletons; `reports` are those that it shows."""
     return _Site(course, results, documents, options, reports).made()
+
+
+def library_of(
+    course: Course, results: Results, assets: Assets, store: Store, reports: Reports
+) -> Library:
+    """What pages look up, with templates and words that an earlier run has compiled."""
+    return Library.of(
+        course,
+        results,
+        assets,
+        templates_of(assets.templates, CompiledTemplates(store)),
+        words_for(store, assets.templates, course.language),
+        reports,
+    )
 
 
 class _Site:
@@ -77,30 +99,32 @@ class _Site:
         self.store = options.store
         self.documents = documents
         self.assets = Assets(template_texts(), Bundle())
-        self.library = Library.of(
-            course,
-            results,
-            self.assets,
-            templates_of(self.assets.templates, CompiledTemplates(self.store)),
-            words_for(self.store, self.assets.templates, course.language),
-            reports,
-        )
+        self.library = library_of(course, results, self.assets, self.store, reports)
+        self._packed: dict[str, tuple[str, Callable[[], zips.Archive | None]]] = {}
+        """The archives, with their keys."""
+        self._imports: Callable[[str], frozenset[str]] = zips.imports
+        self._files: dict[str, tuple[str, Callable[[], bytes]]] = {}
+        """Files of the course, with their keys."""
 
     def made(self) -> Site:
         pages = Pages(self.library, self.documents, self.store)
         names, files = self._shared(pages.facts)
         files += self._labs()
         files += self._downloads()
+        files += offline_files(self.course, self.assets)
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
+        files += self._search(pages)
+        files += self._exports(pages, names, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        return Site(everything, found, pages.drawn)
+        listed = file_list(names, _key(tool_digest(), repr(names)))
+        return Site(everything, listed, found, pages.drawn)
 
     # --- what all pages share
 
@@ -134,6 +158,16 @@ class _Site:
         files = self.library.labs.files
         return [*files, *self._copies(files)]
 
+    def _search(self, pages: Pages) -> Iterator[SiteFile]:
+        files = SearchFiles(
+            pages.searched,
+            search_words(self.library),
+            lambda path: pages.found_by(path)[0],
+            lambda path: pages.found_by(path)[1],
+            _Cells(self.store, self.documents.aside or Aside(self.store.folder)),
+        )
+        return files.files()
+
     # --- downloads
 
     def _downloads(self) -> Iterator[SiteFile]:
@@ -153,10 +187,12 @@ class _Site:
     def _archives(self) -> Iterator[SiteFile]:
         """The archives; of each only its key is held until it is written."""
         around = self._around()
+        self._imports = around.imports
         for make in zips.archives(self.library, around):
             archive = make()
             if archive is not None:
                 key = _key(tool_digest(), archive.key)
+                self._packed[archive.path] = key, make
                 yield KeptFile(archive.path, key, functools.partial(_packed, make))
 
     def _course_files(self) -> Iterator[SiteFile]:
@@ -166,6 +202,7 @@ class _Site:
             read = functools.partial(read_bytes, self.options.root, path)
             if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
                 digest = hashlib.sha256(read()).hexdigest()
+            self._files[urls.file_path(path)] = digest, read
             yield KeptFile(urls.file_path(path), digest, read)
         digests.save()
 
@@ -190,6 +227,24 @@ class _Site:
             if path.startswith("models/")
         )
         return zips.Surroundings(packages, library, meshes, imports)
+
+    # --- what the site gives away
+
+    def _exports(self, pages: Pages, names: Names, taken: frozenset[str]) -> Iterator[SiteFile]:
+        from coursebuild.render.exports.files import Around, Exports
+
+        labs = {file.path: file.data for file in self.library.labs.files}
+        around = Around(
+            style=self.assets.template("exports/epub.css"),
+            picture=lambda path: labs[path] if path in labs else self._files[path][1](),
+            pictures=repr([(path, digest) for path, (digest, _) in self._files.items()]),
+            archives=self._packed,
+            imports=self._imports,
+            declarations=pages.facts.declarations,
+            taken=taken,
+            keep=functools.partial(self.store.kept, "chapters"),
+        )
+        return Exports(self.library, pages, around).files(names)
 
 
 class _Data:
@@ -233,6 +288,23 @@ class _Data:
             return None if data is None else pickle.loads(data)
         except Exception:  # whatever damaged bytes make of it
             return None
+
+
+class _Cells:
+    """Parts of the index of the search, in the store; those that are made now are put aside too."""
+
+    def __init__(self, store: Store, aside: Aside) -> None:
+        self._store = store
+        self._aside = aside
+
+    def get(self, key: str) -> bytes | None:
+        """What an earlier build made."""
+        return None if self._store.fresh else self._store.peek(_CELLS, key)
+
+    def put(self, key: str, data: bytes) -> Callable[[], bytes]:
+        """Keep it for the next build, and for this one."""
+        self._store.keep(_CELLS, key, data, local=True)
+        return self._aside.put(data)
 
 
 class _Imports:

@@ -10,27 +10,17 @@ from markupsafe import Markup
 from coursebuild.model import (
     Block,
     Document,
-    Emphasis,
-    FootnoteRef,
-    HardBreak,
     Heading,
     HtmlBlock,
-    Image,
-    Inline,
     Lab,
-    Link,
     Mjcf,
     Quiz,
-    RawInline,
     Recording,
     Script,
-    SoftBreak,
-    Strikethrough,
-    Strong,
     Table,
-    Text,
 )
 from coursebuild.render.context import PageContext
+from coursebuild.render.plainly import without_links
 from coursebuild.values import dataclass
 
 
@@ -111,23 +101,3 @@ def contents(page: PageContext, document: Document) -> tuple[Entry, ...]:
         else:
             entries.append(entry)
     return tuple(entries)
-
-
-def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
-    """Inlines that may stand inside a link: no link, footnote, raw HTML or picture, in one line."""
-    kept: list[Inline] = []
-    for inline in inlines:
-        match inline:
-            case Link():
-                kept += without_links(inline.children)
-            case Emphasis() | Strong() | Strikethrough():
-                kept.append(type(inline)(inline.span, without_links(inline.children)))
-            case Image():
-                kept.append(Text(inline.span, inline.alt))
-            case SoftBreak() | HardBreak():
-                kept.append(Text(inline.span, " "))
-            case RawInline() | FootnoteRef():
-                pass
-            case _:
-                kept.append(inline)
-    return tuple(kept)

@@ -151,8 +151,8 @@ def _bytecode_cache(compiled: Compiled) -> BytecodeCache:
 def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
     """The interface texts of a language (`pt-BR`): its file over `pt` over English."""
     texts = dict(templates)
-    strings = parse_strings(texts[f"strings/{DEFAULT_LANGUAGE}.toml"])
+    strings = parse_strings(texts[f"strings/{DEFAULT_LANGUAGE}.toml"], None, language)
     for name in (language.split("-")[0].lower(), language):
         if name != DEFAULT_LANGUAGE and f"strings/{name}.toml" in texts:
-            strings = parse_strings(texts[f"strings/{name}.toml"], strings)
+            strings = parse_strings(texts[f"strings/{name}.toml"], strings, language)
     return strings

@@ -23,9 +23,12 @@ from coursebuild.model import (
     Recording,
     Script,
     Table,
+    listing_anchor,
+    output_anchor,
 )
 from coursebuild.render.characters import visible
 from coursebuild.render.folding import Part, fold
+from coursebuild.render.listings import numbered
 from coursebuild.render.sheet import ShownRun, ShownVerdict
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
@@ -41,6 +44,8 @@ class CodePart:
     """A stretch of a script's lines, as HTML."""
 
     html: Markup
+    first: int
+    """The number of its first line."""
     folded: bool
     label: str
     """What a fold holds, in words."""
@@ -61,11 +66,12 @@ def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) 
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page.tools, block.code.text),
+        parts=_parts(page.tools, block),
+        anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
         command=" ".join(("python", block.path, *block.args)),
         outputs=tuple(_output(page, recording) for recording in recordings),
-        receipt=None if recordings else _script_receipt(page, run),
+        receipt=None if recordings else script_receipt(page, run),
     )
 
 
@@ -132,6 +138,8 @@ class Output:
 
     caption: Markup
     path: str
+    anchor: str
+    """Empty where it is not known whose output it is."""
     text: str | None
     """The recorded text; `None` where it is a table."""
     table: Markup | None
@@ -139,16 +147,21 @@ class Output:
 
 
 def _output(page: PageContext, block: Recording) -> Output:
-    verdict = page.shown.verdicts.get(block.span.start)
-    run = page.shown.runs.get(block.script) if block.script is not None else None
-    table = isinstance(block.body, Table)
     return Output(
         caption=page.inlines(block.caption),
         path=block.script or "",
+        anchor=output_anchor(block.script, page.outputs[block.span.start]) if block.script else "",
         text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),
         table=page.blocks((block.body,)) if isinstance(block.body, Table) else None,
-        receipt=_output_receipt(page, verdict, run, table),
+        receipt=output_receipt(page, block),
     )
+
+
+def output_receipt(page: PageContext, block: Recording) -> Receipt:
+    """What can be said for a recorded output."""
+    verdict = page.shown.verdicts.get(block.span.start)
+    run = page.shown.runs.get(block.script) if block.script is not None else None
+    return _output_receipt(page, verdict, run, isinstance(block.body, Table))
 
 
 def _output_receipt(
@@ -197,7 +210,7 @@ def short(value: Decimal) -> str:
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
-def _script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
+def script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
     """What can be said for a script without a recorded output."""
     words, shown = page.tools.words, page.shown
     if run is not None and run.outcome is Outcome.OK:
@@ -217,15 +230,17 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 # --- code
 
 
-def _parts(tools: Tools, text: str) -> tuple[CodePart, ...]:
-    lines = tools.mark("python", text.rstrip("\n"))
+def _parts(tools: Tools, block: Script) -> tuple[CodePart, ...]:
+    text = block.code.text.rstrip("\n")
+    lines = tools.mark("python", text)
     return tuple(
         CodePart(
-            Markup("\n".join(lines[part.first - 1 : part.last])),
+            numbered(lines[part.first - 1 : part.last], block.path, part.first),
+            part.first,
             part.folded,
             _fold_label(tools.words, part),
         )
-        for part in fold(text.rstrip("\n"))
+        for part in fold(text)
     )
 
 

@@ -22,6 +22,8 @@ _SMALLEST = 1024
 """Bytes: below, headers outweigh what is saved."""
 _LARGE = 2 << 20
 """Bytes: from here on the last tenth would cost a quarter of a minute."""
+COPIES = ("br", "gz")
+"""What the names of copies end with."""
 Keep = Callable[[str, Callable[[], bytes]], bytes]
 """Gives what was made under a key before, or makes it."""
 
@@ -42,15 +44,20 @@ def _copies(file: OutputFile, keep: Keep) -> Iterator[OutputFile]:
             yield OutputFile(f"{file.path}.{suffix}", data)
 
 
+def copy_of(data: bytes, suffix: str, quality: int) -> bytes:
+    """A copy of one of `COPIES`; `quality` is Brotli's."""
+    return _brotli(data, quality) if suffix == "br" else _gzip(data)
+
+
 def _quality(data: bytes) -> int:
     """Of Brotli; one more for small files would be two percent fewer bytes for twice the time."""
     return 9 if len(data) >= _LARGE else 10
 
 
-def _brotli(data: bytes) -> bytes:
+def _brotli(data: bytes, quality: int | None = None) -> bytes:
     import brotli
 
-    packed: bytes = brotli.compress(data, quality=_quality(data))
+    packed: bytes = brotli.compress(data, quality=quality or _quality(data))
     return packed
 
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import assert_never
+from urllib.parse import quote, unquote
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from coursebuild.model import (
     Block,
@@ -28,9 +29,13 @@ from coursebuild.model import (
     Recording,
     Script,
     Target,
+    UrlTarget,
     child_blocks,
+    document_blocks,
 )
 from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
+from coursebuild.render.direction import direction
+from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
 from coursebuild.render.sheet import Shown
 from coursebuild.render.shown import file_address, shown
@@ -51,6 +56,10 @@ class PageContext:
     """The recordings drawn with a script, by the offset at which the script begins."""
     look: markup.Look
     """The words that Markdown's own elements need."""
+    outputs: Mapping[int, int]
+    """Which output of its script a recording is, from 1, by the offset at which it begins."""
+    equations: Mapping[int, NumberedFormula]
+    """Formulas on lines of their own, by their offset."""
 
     @classmethod
     def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
@@ -60,8 +69,12 @@ class PageContext:
     @classmethod
     def made(cls, tools: Tools, shown: Shown, place: urls.Place, document: Document) -> PageContext:
         """The context, once it is known what the page shows of the course."""
-        look = markup.Look(words=_markup_words(tools.words))
-        return cls(tools, shown, place, document, dict(_joined(document)), look)
+        look = markup.Look(
+            words=_markup_words(tools.words), quantities=direction(tools.words.language)
+        )
+        joined, outputs = dict(_joined(document)), _numbers(document)
+        equations = numbered(document, lambda tex: tools.mathml(tex, True))
+        return cls(tools, shown, place, document, joined, look, outputs, equations)
 
     # what the Markdown renderer asks
 
@@ -73,12 +86,34 @@ class PageContext:
         """An address as written, but a file of the course becomes its place in the site."""
         return file_address(self.place, self.document.source.path, url)
 
-    def math(self, tex: str, display: bool) -> Markup:
-        """A formula; one on a line of its own scrolls inside itself where it is too wide."""
-        mathml = self.tools.mathml(tex, display)
-        if display:
-            return self.tools.enclose("blocks/formula.html", "mathml", mathml)
-        return Markup(formulas.breakable(mathml))
+    def math(self, tex: str) -> Markup:
+        """A formula in a line of text."""
+        label = self.tools.words("markup.formula")
+        return Markup(formulas.contained(formulas.breakable(self.tools.mathml(tex, False)), label))
+
+    def display(self, tex: str, start: int) -> Markup:
+        """A formula on a line of its own, which scrolls inside itself where it is too wide."""
+        mathml = self.tools.mathml(tex, True)
+        html = self.tools.enclose("blocks/formula.html", "mathml", mathml)
+        known = self.equations.get(start)
+        if known is None:
+            return html
+        number = f'<span class="equation-number">({escape(known.number)})</span>'
+        label = escape(self.look.words.formula)
+        link = f'<a class="anchor" href="#{quote(known.id)}" aria-label="{label}">#</a>'
+        return Markup(
+            f'<span class="equation" id="{escape(known.id)}">{html}'
+            f"{number if known.shown else ''}{link}</span>"
+        )
+
+    def reference(self, target: Target) -> str:
+        """What a link without a text says: the number of the formula that it leads to."""
+        if isinstance(target, UrlTarget) and target.url.startswith("#"):
+            name = unquote(target.url[1:])
+            here = (known.number for known in self.equations.values() if known.id == name)
+            number = next(here, "")
+            return f"({number})" if number else ""
+        return self.shown.equations.get(target, "")
 
     def code(self, language: str, text: str) -> Markup:
         """A code block that is only shown."""
@@ -141,6 +176,7 @@ class PageContext:
 def _markup_words(words: Strings) -> markup.Words:
     return markup.Words(
         anchor=words("markup.anchor"),
+        formula=words("markup.formula_anchor"),
         footnotes=words("markup.footnotes"),
         footnote=words("markup.footnote"),
         back=words("markup.back"),
@@ -149,6 +185,16 @@ def _markup_words(words: Strings) -> markup.Words:
         done=words("markup.done"),
         not_done=words("markup.not_done"),
     )
+
+
+def _numbers(document: Document) -> dict[int, int]:
+    """The outputs of each script, counted."""
+    counts: dict[str, int] = {}
+    numbers: dict[int, int] = {}
+    for block in document_blocks(document):
+        if isinstance(block, Recording) and block.script is not None:
+            counts[block.script] = numbers[block.span.start] = counts.get(block.script, 0) + 1
+    return numbers
 
 
 def _joined(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:

@@ -1,6 +1,6 @@
 """Drawing a page: its sheet and its document through the templates.
 
-Entry point: `draw(sheet, document, tools)`.
+Entry points: `draw(sheet, document, tools)`; `draw_whole`, with the document's part alone as well.
 """
 
 from __future__ import annotations
@@ -13,21 +13,29 @@ from coursebuild.render import urls
 from coursebuild.render.article import article, contents
 from coursebuild.render.context import PageContext
 from coursebuild.render.draft import Draft as Draft
-from coursebuild.render.sheet import Highlighted, Plotted, Sheet
+from coursebuild.render.graph import drawings
+from coursebuild.render.listings import numbered
+from coursebuild.render.sheet import Graphed, Highlighted, Plotted, Sheet
 from coursebuild.render.tools import Tools
 
 
 def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
     """The page without its frame; the same values give the same page."""
+    return draw_whole(sheet, document, tools)[0]
+
+
+def draw_whole(sheet: Sheet, document: Document | None, tools: Tools) -> tuple[Draft, Markup]:
+    """The page without its frame, and what it shows of its document."""
+    text = Markup()
     values = {name: _drawn(value, tools) for name, value in sheet.values.items()}
     description = sheet.description
     if document is not None and sheet.shown is not None:
         page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
         values["contents"] = contents(page, document)
-        values["article"] = article(page, document)
+        values["article"] = text = article(page, document)
         if sheet.kind == "page":
             description = _first_sentences(document)
-    return Draft(
+    draft = Draft(
         sheet.path,
         sheet.kind,
         sheet.title,
@@ -37,12 +45,15 @@ def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
         og_type=sheet.og_type,
         indexed=sheet.indexed,
     )
+    return draft, text
 
 
 def _drawn(value: object, tools: Tools) -> object:
     match value:
         case Highlighted():
-            return tools.highlight(value.language, value.text)
+            return numbered(tools.mark(value.language, value.text), value.path)
+        case Graphed():
+            return drawings(value, tools.words)
         case Plotted():
             return tuple(_plots(n, report) for n, report in enumerate(value.reports, 1))
         case _:

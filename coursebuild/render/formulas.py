@@ -1,38 +1,57 @@
 """Formulas in a line of text: where the line may break, and where it must not.
 
-Entry points: `breakable(mathml)`, `glue(html)`.
+Entry points: `breakable(mathml)`, `contained(html, label)`, `glue(html)`.
 
 A browser takes a `math` element for one unbreakable box that the line may break on either side of.
 So
 
-1. a long formula is cut into several elements where Temml marked that it may break: after the
-   relations and operators of its outermost level;
-2. a formula and the punctuation that touches it are held together.
+1. a long formula is cut into several elements where TeX would break it too: after the relations and
+   the binary operators of its outermost level;
+2. a piece that may be wider than a narrow window scrolls inside itself;
+3. a formula and the punctuation that touches it are held together.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from html import escape, unescape
 
 LONG = 20
 """Characters; a shorter formula stays whole."""
+WIDE = 22
+"""Characters; a shorter piece fits the narrowest window."""
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
-_WHOLE = re.compile(r"<math>(.*)</math>", re.DOTALL)
+_WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
+_ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
+_PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
 _TOUCHING = re.compile(r"""((?:<math>.*?</math>)+)([,.;:!?)\]’”"'…%]*)""", re.DOTALL)
 
+_RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
+_BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
+_OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
+
 
 def breakable(mathml: str) -> str:
-    """An inline formula that may break after its outermost rows, if it is long; else as it is."""
+    """An inline formula that may break at its outermost level, if it is long; else as it is."""
     whole = _WHOLE.fullmatch(mathml)
-    if whole is None or len(_TAG.sub("", mathml)) < LONG:
+    if whole is None or _length(mathml) < LONG:
         return mathml
-    rows = _outer_rows(whole[1])
-    if len(rows) < 2 or "".join(rows) != whole[1]:
+    inner = whole[1]
+    rows = _outer_rows(inner)
+    if "".join(rows) != inner:
         return mathml
-    return "".join(f"<math>{row}</math>" for row in rows)
+    if len(rows) == 1:
+        start, end = inner.index(">") + 1, inner.rindex("<")
+        rows = [inner[:start] + piece + inner[end:] for piece in _pieces(inner[start:end])]
+    return "".join(f"<math>{row}</math>" for row in rows) if len(rows) > 1 else mathml
+
+
+def _length(mathml: str) -> int:
+    return len(unescape(_TAG.sub("", _ANNOTATION.sub("", mathml))))
 
 
 def _outer_rows(text: str) -> list[str]:
@@ -44,6 +63,51 @@ def _outer_rows(text: str) -> list[str]:
             rows.append(text[start : match.end()])
             start = match.end()
     return rows
+
+
+def _pieces(row: str) -> list[str]:
+    """The inside of a row, cut after relations and binary operators that no brackets enclose."""
+    pieces: list[str] = []
+    start = depth = 0
+    bars = False
+    operand = False
+    for end, element in _elements(row):
+        sign = unescape(_TAG.sub("", element)).strip() if element.startswith("<mo") else ""
+        if sign in _OPEN and sign:
+            depth += 1
+        elif sign in _CLOSE and sign:
+            depth -= 1
+        elif sign in _BAR and sign:
+            bars = not bars
+        breaks = sign != "" and (sign in _RELATIONS or (operand and sign in _BINARY))
+        if breaks and depth == 0 and not bars and end < len(row):
+            pieces.append(row[start:end])
+            start = end
+        operand = not (sign in _RELATIONS or sign in _BINARY or sign in _OPEN) or not sign
+    return [*pieces, row[start:]]
+
+
+def _elements(row: str) -> Iterator[tuple[int, str]]:
+    """The elements next to each other in a row, each with the offset of its end."""
+    start = depth = 0
+    for tag in _TAG.finditer(row):
+        if tag[0].startswith("</"):
+            depth -= 1
+        elif not tag[0].endswith("/>"):
+            depth += 1
+        if depth == 0:
+            yield tag.end(), row[start : tag.end()]
+            start = tag.end()
+
+
+def contained(html: str, label: str) -> str:
+    """The pieces of an inline formula, the wide ones in boxes that scroll and have this label."""
+    start = f'<span class="formula-inline" tabindex="0" role="group" aria-label="{escape(label)}">'
+
+    def boxed(piece: re.Match[str]) -> str:
+        return f"{start}{piece[0]}</span>" if _length(piece[0]) >= WIDE else piece[0]
+
+    return html if _length(html) < WIDE else _PIECE.sub(boxed, html)
 
 
 def glue(html: str) -> str:

@@ -19,8 +19,10 @@ from markupsafe import Markup, escape
 
 from coursebuild.render import meta, urls
 from coursebuild.render.characters import visible
+from coursebuild.render.direction import direction
 from coursebuild.render.draft import Draft as Draft
 from coursebuild.render.library import Library
+from coursebuild.render.own_pages import own_pages
 from coursebuild.values import dataclass
 
 PAGE_WORDS = (
@@ -31,6 +33,11 @@ PAGE_WORDS = (
     "code.copy",
     "code.copied",
     "code.failed",
+    "offline.changed",
+    "offline.again",
+    "code.mark",
+    "search.open",
+    "search.failed",
 )
 """Interface texts that the page's script shows."""
 
@@ -38,6 +45,11 @@ _LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled"
 _PARTS = {
     "labs": ("data-script=", ("lab.live.", "overlay.", *_LAB_KEYS)),
     "quiz": ("data-quiz=", ("quiz.live.",)),
+    "offline": ("data-keep", ("offline.live.",)),
+    "map": ("data-mark", ("progress.map.",)),
+    "lesson": ('data-progress="lesson"', ("progress.lesson.", "progress.trouble.")),
+    "progress": ('data-progress="overall"', ("progress.live.", "progress.trouble.")),
+    "review": ('data-progress="review"', ("review.live.", "quiz.live.", "progress.trouble.")),
 }
 """What not every page has and the page's script brings to life: a mark by which it is known in a
 body, and the interface texts that it needs; of some, the beginnings of their keys."""
@@ -52,10 +64,21 @@ class Names:
     script: str
     icon: str
     credits: str
+    touch_icon: str
+    offline_script: str
+    """Of the page about what is kept."""
+    reader_script: str
+    """Of the pages about the reader's progress."""
+    quiz_script: str
+    """Of pages with questions."""
+    search_script: str
+    """Loaded when a reader opens the search."""
 
 
-def policy(json_ld: str) -> str:
+def policy(json_ld: str, *, form: bool = False) -> str:
     """The Content-Security-Policy of a page: nothing from elsewhere, no code or style in the page.
+
+    Only a page with a `form` may send one, and only to this site.
 
     Structured data is no code, but is named by its hash, since checkers take it for some.
     """
@@ -70,7 +93,7 @@ def policy(json_ld: str) -> str:
             "worker-src 'self' blob:",
             "object-src 'none'",
             "base-uri 'none'",
-            "form-action 'none'",
+            "form-action 'self'" if form else "form-action 'none'",
         )
     )
 
@@ -82,6 +105,7 @@ class NavLink:
     href: str
     text: str
     current: bool
+    download: bool = False
 
 
 def place_of(library: Library, path: str) -> urls.Place:
@@ -122,12 +146,13 @@ def _own_values(library: Library, draft: Draft) -> dict[str, object]:
     """What the frame of one page shows, and none of another."""
     course = library.course
     return {
-        "policy": policy(draft.json_ld),
+        "policy": policy(draft.json_ld, form=draft.kind == "search"),
         "head_title": meta.head_title(course, draft.title, draft.kind),
         "description": draft.description,
         "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
         "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
         "json_ld": draft.json_ld,
+        "markdown": urls.encode((urls.twin_path(draft.path) or "").rpartition("/")[2]),
     }
 
 
@@ -141,6 +166,7 @@ def _shared_values(
         "kind": draft.kind,
         "body": _HERE,
         "language": course.language or "en",
+        "direction": direction(course.language or "en"),
         "course_key": course.key,
         "root": place.href(urls.HOME).removesuffix(urls.HOME),
         "robots": "" if draft.indexed else "noindex",
@@ -148,15 +174,32 @@ def _shared_values(
         "style": place.href(names.style),
         "theme_script": place.href(names.theme_script),
         "script": place.href(names.script),
+        "quiz_script": place.href(names.quiz_script) if "quiz" in parts else "",
+        "search_script": place.href(names.search_script),
+        "manifest": place.href(urls.MANIFEST),
+        "touch_icon": place.href(names.touch_icon),
+        "own_script": place.href(own) if (own := _own_script(draft, names)) else "",
         "home": place.href(urls.HOME),
         "credits": place.href(names.credits),
         "menu": _navigation(library, place, menu=True),
+        "own": _own_navigation(library, place),
         "more": _navigation(library, place, menu=False),
         "course": course,
         "source": course.repository if "{path}" not in course.repository else "",
         "results": library.results,
         "page_words": _page_words(library, parts),
     }
+
+
+def _own_script(draft: Draft, names: Names) -> str:
+    """The script that only pages of this kind have; empty where there is none."""
+    match draft.kind:
+        case "offline":
+            return names.offline_script
+        case "progress" | "review":
+            return names.reader_script
+        case _:
+            return ""
 
 
 _ALIKE = ("lesson", "stub", "level", "model")
@@ -228,3 +271,11 @@ def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[Nav
     pages = (page for page in library.course.pages if page.menu is menu)
     paths = ((urls.page_path(page), page.title) for page in pages)
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)
+
+
+def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
+    """Links to what the site adds to the pages of the course."""
+    return tuple(
+        NavLink(place.href(own.path), own.title, own.path == place.path, own.download)
+        for own in own_pages(library)
+    )

@@ -7,10 +7,12 @@ puts the live instrument into `data-lab` when it starts, and reads its configura
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from markupsafe import Markup
 
 from coursebuild.model import Lab, LabControl, ModelTarget
+from coursebuild.render.qr import qr_svg
 from coursebuild.render.strings import Strings
 from coursebuild.values import dataclass
 
@@ -43,6 +45,17 @@ class RecordedView:
 
 
 @dataclass(frozen=True, slots=True)
+class PaperView:
+    """What leads from paper to the lab."""
+
+    code: Markup
+    """A QR code of the address."""
+    address: str
+    text: str
+    """The address as one types it."""
+
+
+@dataclass(frozen=True, slots=True)
 class PlotView:
     """A plot: its axes and the lines in it."""
 
@@ -63,15 +76,25 @@ def lab(page: PageContext, block: Lab) -> Markup:
         config=page.place.href(live.config) if live is not None else None,
         script=page.place.href(live.script) if live is not None else None,
         recorded=_recorded(page, block, live.record) if live is not None else None,
+        paper=_paper(page, live.name) if live is not None else None,
         title=block.title or words("lab.untitled"),
         note=page.blocks(block.note),
         model_href=page.href(ModelTarget(block.model)) if block.model is not None else None,
-        start=_start(page, block),
+        start=start_name(page, block),
         stop=number(block.stop_at) if block.stop_at is not None else None,
-        controls=tuple(_control(words, control) for control in block.controls),
-        plots=tuple(_plot(words, block, index) for index in range(len(block.plots))),
-        overlays=tuple(_overlay(words, name) for name in block.toggles),
+        controls=tuple(control_view(words, control) for control in block.controls),
+        plots=tuple(plot_view(words, block, index) for index in range(len(block.plots))),
+        overlays=tuple(overlay_name(words, name) for name in block.toggles),
     )
+
+
+def _paper(page: PageContext, name: str) -> PaperView | None:
+    """The way from paper to a lab; `None` where nobody knows where the site will stand."""
+    if not page.shown.address:
+        return None
+    address = f"{page.shown.address}#{quote(name)}"
+    code = qr_svg(address, page.tools.words("lab.code"))
+    return PaperView(code, address, address.partition("://")[2])
 
 
 def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> RecordedView | None:
@@ -86,7 +109,7 @@ def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> Reco
         words("lab.picture", title=block.title or words("lab.untitled"), t=number(record.time, 4)),
         record.readouts,
         tuple(Markup(svg) for svg in record.plots),
-        words("lab.at", t=_seconds(record.end)),
+        words("lab.at", t=seconds(record.end)),
         words(
             "lab.proven",
             engine=page.shown.engine,
@@ -96,7 +119,8 @@ def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> Reco
     )
 
 
-def _seconds(value: float) -> str:
+def seconds(value: float) -> str:
+    """A time, to the millisecond."""
     return number(round(value, 3))
 
 
@@ -106,7 +130,7 @@ def number(value: float, digits: int | None = None) -> str:
     return text.replace("-", "\u2212")
 
 
-def _start(page: PageContext, block: Lab) -> str | None:
+def start_name(page: PageContext, block: Lab) -> str | None:
     """The name of the keyframe that the lab starts from."""
     if block.key is None or isinstance(block.key, str):
         return block.key
@@ -114,7 +138,8 @@ def _start(page: PageContext, block: Lab) -> str | None:
     return (names[block.key] if 0 <= block.key < len(names) else "") or str(block.key)
 
 
-def _control(words: Strings, control: LabControl) -> ControlView:
+def control_view(words: Strings, control: LabControl) -> ControlView:
+    """A control as a row of words."""
     match control.kind:
         case "slider":
             values, initial = _range(words, control), _initial(control)
@@ -143,7 +168,8 @@ def _range(words: Strings, control: LabControl) -> str:
     return words("lab.step", range=ends, step=number(control.step)) if control.step else ends
 
 
-def _plot(words: Strings, block: Lab, index: int) -> PlotView:
+def plot_view(words: Strings, block: Lab, index: int) -> PlotView:
+    """A plot in words."""
     plot = block.plots[index]
     title = words(
         "lab.plot",
@@ -154,5 +180,6 @@ def _plot(words: Strings, block: Lab, index: int) -> PlotView:
     return PlotView(title, tuple(trace.label for trace in plot.traces), marks)
 
 
-def _overlay(words: Strings, name: str) -> str:
+def overlay_name(words: Strings, name: str) -> str:
+    """What an overlay is called."""
     return words(f"overlay.{name}") if words.has(f"overlay.{name}") else name

@@ -9,7 +9,9 @@ from __future__ import annotations
 from coursebuild.model import Document, Lesson, Status
 from coursebuild.render import meta, urls
 from coursebuild.render.draft import Draft
+from coursebuild.render.graph import around
 from coursebuild.render.library import Library, document_scripts
+from coursebuild.render.owners import owner_links
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.shown import shown
 from coursebuild.values import dataclass
@@ -26,6 +28,8 @@ class LessonLink:
     minutes: int | None
     summary: str
     needs: tuple[LessonLink, ...] = ()
+    asked: str = ""
+    """Its questions, where a list names them; see `asked.asked`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +92,8 @@ def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
         **_common(library, place, lesson),
         "scripts": scripts,
         "scripts_zip": place.href(urls.lesson_zip_path(lesson)) if scripts else None,
+        "notebook": place.href(urls.notebook_path(lesson)),
+        "markdown": place.href(urls.twin_path(place.path) or place.path),
         "edit": edit_address(library, lesson.path),
     }
     return Sheet(
@@ -133,6 +139,8 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "level_href": place.href(urls.level_path(level)),
         "needs": lesson_link(library, place, lesson, needs=True).needs,
         "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
+        "graph": around(library, place, lesson),
+        "referrers": owner_links(library, place, library.references.referrers.get(lesson.id, ())),
         "previous": lesson_link(library, place, order[at - 1]) if at else None,
         "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,
     }

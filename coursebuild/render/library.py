@@ -20,6 +20,7 @@ from coursebuild.model import (
     Lab,
     Lesson,
     Level,
+    Lexicon,
     Link,
     ModelTarget,
     Page,
@@ -29,8 +30,11 @@ from coursebuild.model import (
     document_inlines,
 )
 from coursebuild.model import document_scripts as document_scripts
+from coursebuild.render.asked import AskedBy
+from coursebuild.render.asked import asked as asked_in
 from coursebuild.render.assets import Assets, strings_for, templates_of
 from coursebuild.render.lab_files import PublishedLabs, lab_files
+from coursebuild.render.references import CrossReferences, Mentions, mentions
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
@@ -81,6 +85,9 @@ class Library:
     """The lessons that need a lesson, by its id."""
     uses: Mapping[str, tuple[ModelUse, ...]]
     """Where a model is used, by its name, in the order of the course."""
+    references: CrossReferences
+    asked: AskedBy
+    """The questions of each document, as lists of lessons name them."""
     labs: PublishedLabs
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
@@ -99,14 +106,20 @@ class Library:
         reports: Reports | None = None,
     ) -> Library:
         """Look everything over once, with templates and words, where there are some already."""
+        formulas = dict(results.formulas)
+
+        def said(document: Document) -> Mentions:
+            return mentions(document, course, lexicon_of(document, formulas))
+
         return cls.made(
             course,
             results,
             assets,
             scripts_of=document_scripts,
             models_of=named_models,
+            mentions_of=said,
             labs=lab_files(results.labs, assets),
-            formulas=dict(results.formulas),
+            formulas=formulas,
             verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
             templates=templates,
             words=words,
@@ -122,14 +135,25 @@ class Library:
         *,
         scripts_of: Callable[[Document], tuple[Script, ...]],
         models_of: Callable[[Document], NamedModels],
+        mentions_of: Callable[[Document], Mentions],
         labs: PublishedLabs,
         formulas: Mapping[Formula, str | MathError],
         verdicts: Mapping[tuple[str, int], Verdict],
+        asked_of: Callable[[Document], str] = asked_in,
         templates: Callable[[], Environment] | None = None,
         words: Strings | None = None,
         reports: Reports | None = None,
     ) -> Library:
         """The same from parts that whoever calls remembers; they are not copied."""
+        questions: dict[str, str] = {}
+
+        def said(document: Document) -> Mentions:
+            text = asked_of(document)  # while its blocks are at hand
+            if text:
+                questions[document.source.path] = text
+            return mentions_of(document)
+
+        references = references_of(course, said)
         return cls(
             course=course,
             results=results,
@@ -146,11 +170,17 @@ class Library:
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
             uses=uses_of(course, models_of),
+            references=references,
+            asked=questions,
             labs=labs,
             _formulas=formulas,
             verdicts=verdicts,
             reports=reports or Reports(),
         )
+
+    def lexicon(self, document: Document) -> Lexicon:
+        """What a document, or its skeleton, adds to the glossary and the like."""
+        return lexicon_of(document, self._formulas)
 
     @property
     def tools(self) -> Tools:
@@ -185,6 +215,24 @@ class Library:
 def owners(course: Course) -> tuple[Owner, ...]:
     """Everything of the course that has, or may have, a document."""
     return (*course.lessons, *course.pages)
+
+
+def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) -> Lexicon:
+    """That of a skeleton, or made from a whole document and its formulas."""
+    if document.lexicon is not None:
+        return document.lexicon
+    from coursebuild.render.lexicon import lexicon  # with all that it takes to draw
+
+    return lexicon(document, formulas)
+
+
+def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -> CrossReferences:
+    """What the documents of a course say of each other."""
+    return CrossReferences.of(
+        (owner, mentions_of(owner.document))
+        for owner in owners(course)
+        if owner.document is not None
+    )
 
 
 _MODEL_NAMED = re.compile(

@@ -18,6 +18,7 @@ from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
 from coursebuild.diagnostics import nearest
+from coursebuild.model import linked_lines
 from coursebuild.render import urls
 from coursebuild.results import OutputFile
 from coursebuild.values import dataclass
@@ -135,13 +136,37 @@ def page_references(
 
 
 def all_lead_somewhere(
-    references: Iterable[Reference], files: Container[str], ids: Mapping[str, Container[str]]
+    references: Iterable[Reference], files: Container[str], ids: Mapping[str, Collection[str]]
 ) -> bool:
     """Whether references lead to files and, in pages, to ids; `check_links` says which do not."""
     return all(
-        path in files and (anchor in ("", "top") or path not in ids or anchor in ids[path])
+        path in files and (anchor in ("", "top") or path not in ids or has(ids[path], anchor))
         for path, anchor in references
     )
+
+
+def has(ids: Collection[str], anchor: str) -> bool:
+    """Whether an anchor is among ids, of which those of lines may be `without_lines`."""
+    if anchor in ids:
+        return True
+    lines = linked_lines(anchor)
+    if lines is None:
+        return False
+    others = (other for name in ids if (other := linked_lines(name)) is not None)
+    return any(stem == lines[0] and lines[2] <= last for stem, _, last in others)
+
+
+def without_lines(ids: Iterable[str]) -> frozenset[str]:
+    """Ids with the last line of each listing for all of its lines."""
+    kept: set[str] = set()
+    longest: dict[str, int] = {}
+    for name in ids:
+        lines = linked_lines(name) if ".L" in name else None
+        if lines is None:
+            kept.add(name)
+        else:
+            longest[lines[0]] = max(longest.get(lines[0], 0), lines[2])
+    return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
 
 
 def _target(path: str, url: str, base: _Base) -> Reference | str | None:
@@ -180,7 +205,7 @@ def _problem(
     target, anchor = found
     if target not in files:
         return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
-    if anchor in ("", "top") or target not in pages or anchor in pages[target].ids:
+    if anchor in ("", "top") or target not in pages or has(pages[target].ids, anchor):
         return None
     return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, pages[target].ids))
 

@@ -10,8 +10,9 @@ written here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Protocol, TypeAlias, assert_never
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
+from typing import Literal, Protocol, TypeAlias, assert_never
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -52,9 +53,11 @@ from coursebuild.model import (
     Strong,
     Table,
     Target,
+    Term,
     Text,
     ThematicBreak,
 )
+from coursebuild.render.quantities import in_order, joined, quantities, unit_length
 from coursebuild.values import dataclass, field
 
 OwnBlock: TypeAlias = Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
@@ -68,12 +71,20 @@ class Context(Protocol):
         """The address of a link."""
         ...
 
+    def reference(self, target: Target) -> str:
+        """What a link without a text says; empty where it says nothing."""
+        ...
+
     def url(self, url: str) -> str:
         """The address of an image that is written as `url`."""
         ...
 
-    def math(self, tex: str, display: bool) -> Markup:
-        """A formula, set."""
+    def math(self, tex: str) -> Markup:
+        """A formula in a line of text, set."""
+        ...
+
+    def display(self, tex: str, start: int) -> Markup:
+        """A formula on a line of its own, which begins at an offset of the document."""
         ...
 
     def code(self, language: str, text: str) -> Markup:
@@ -94,6 +105,7 @@ class Words:
     """The words that Markdown's own elements need; `{number}` and `{occurrence}` are filled in."""
 
     anchor: str = "Link to this section"
+    formula: str = "Link to this formula"
     footnotes: str = "Footnotes"
     footnote: str = "Footnote {number}"
     back: str = "Back to reference {number}"
@@ -114,6 +126,8 @@ class Look:
     """Whether tables stand in a box of their own, that can be scrolled."""
     void_end: str = ">"
     """How a tag without content ends."""
+    quantities: Literal["", "ltr", "rtl"] = ""
+    """Whether numbers are kept with their units, and in which direction the text runs."""
 
 
 _LOOK = Look()
@@ -164,7 +178,36 @@ class _Writer:
         return "".join(map(self.block, blocks))
 
     def inlines(self, inlines: Iterable[Inline]) -> str:
-        return "".join(map(self.inline, inlines))
+        if not self.look.quantities:
+            return "".join(map(self.inline, inlines))
+        return "".join(self._with_units(tuple(inlines)))
+
+    def _with_units(self, inlines: tuple[Inline, ...]) -> Iterator[str]:
+        """Inlines, of which formulas and bound numbers are held together with their units."""
+        taken = 0
+        for inline, after in zip_longest(inlines, inlines[1:]):
+            if isinstance(inline, Text):
+                yield self._text(inline.text[taken:])
+                taken = 0
+                continue
+            html = self.inline(inline)
+            number = isinstance(inline, NumberBinding) or (
+                isinstance(inline, Math) and not inline.display
+            )
+            if number and isinstance(after, Text) and (taken := unit_length(after.text)):
+                unit = after.text[:taken].replace(" ", "\u00a0").translate(_ESCAPES)
+                html = (
+                    in_order(Markup(html + unit)) if self.look.quantities == "rtl" else html + unit
+                )
+            yield html
+
+    def _text(self, text: str) -> str:
+        """Text whose quantities are in one line and in order."""
+        text = joined(text)
+        if self.look.quantities == "ltr":
+            return text.translate(_ESCAPES)
+        pieces = ((piece.translate(_ESCAPES), kept) for piece, kept in quantities(text))
+        return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
 
     # -- blocks
 
@@ -189,7 +232,7 @@ class _Writer:
             case ThematicBreak():
                 return f"<hr{self.look.void_end}\n"
             case MathBlock():
-                return f"{self.context.math(block.tex.text, True)}\n"
+                return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
             case Callout() | Io() | Lab() | Mjcf() | PlainCode() | Quiz() | Recording() | Script():
@@ -265,7 +308,12 @@ class _Writer:
             case CodeSpan():
                 return f"<code>{inline.text.translate(_ESCAPES)}</code>"
             case Math():
-                return self.context.math(inline.tex.text, inline.display)
+                if inline.display:
+                    return self.context.display(inline.tex.text, inline.span.start)
+                return self.context.math(inline.tex.text)
+            case Term():
+                name = f' id="{escape(inline.anchor)}"' if self.look.anchors else ""
+                return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
             case Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
             case Strong():
@@ -290,7 +338,10 @@ class _Writer:
     def _link(self, link: Link) -> str:
         title = f' title="{escape(link.title)}"' if link.title else ""
         href = escape(self.context.href(link.target))
-        return f'<a href="{href}"{title}>{self.inlines(link.children)}</a>'
+        inner = self.inlines(link.children) or escape(self.context.reference(link.target))
+        bare = self.look.frames and inner == href  # an address that stands for itself
+        own = ' class="url"' if bare else ""
+        return f'<a href="{href}"{title}{own}>{inner}</a>'
 
     def _image(self, image: Image) -> str:
         title = f' title="{escape(image.title)}"' if image.title else ""
@@ -331,7 +382,8 @@ class _Writer:
         words = self.look.words.back if occurrence == 1 else self.look.words.back_again
         label = escape(words.format(number=number, occurrence=occurrence))
         mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
+        arrow = "↪" if self.look.quantities == "rtl" else "↩"
         return (
             f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
-            f' role="doc-backlink" aria-label="{label}">↩{mark}</a>'
+            f' role="doc-backlink" aria-label="{label}">{arrow}{mark}</a>'
         )

@@ -6,10 +6,11 @@ shows; `home_draft` and so on, the same drawn.
 
 from __future__ import annotations
 
-from coursebuild.model import Document, Lesson, Level, MjcfModel, Page, Status
+from coursebuild.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.render import meta, urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import place_of
+from coursebuild.render.graph import of_level
 from coursebuild.render.labs import number
 from coursebuild.render.lesson import LessonHead, LessonLink, drawn, edit_address, lesson_link
 from coursebuild.render.library import Library, ModelUse
@@ -18,7 +19,7 @@ from coursebuild.render.numerics import numerics_sheet
 from coursebuild.render.sheet import Highlighted, Plotted, Sheet
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,7 @@ def home_sheet(library: Library) -> Sheet:
     written = [lesson for lesson in library.order if lesson.document is not None]
     values = {
         "course": CourseHead(course.title, course.summary),
-        "levels": tuple(_level_view(library, place, level) for level in course.levels),
+        "levels": tuple(level_view(library, place, level) for level in course.levels),
         "start": lesson_link(library, place, written[0]) if written else None,
         "total": len(library.order),
         "written": len(written),
@@ -87,12 +88,13 @@ def level_sheet(library: Library, level: Level) -> Sheet:
     place = urls.Place(urls.level_path(level))
     levels = library.course.levels
     at = next(i for i, other in enumerate(levels) if other.id == level.id)
-    view = _level_view(library, place, level)
+    view = level_view(library, place, level)
     heads = map(LessonHead.of, level.lessons)
     values = {
         "home": place.href(urls.HOME),
         "level": view,
         "entries": tuple(zip(heads, view.lessons, strict=True)),
+        "graph": of_level(library, place, level),
         "previous": _level_link(library, place, levels[at - 1]) if at else None,
         "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
     }
@@ -105,13 +107,20 @@ def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
     return Named(place.href(urls.level_path(level)), level.title, label)
 
 
-def _level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
+def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
+    """A level with its lessons, as seen from a place."""
     return LevelView(
         level.id,
         level.title,
         level.summary,
         place.href(urls.level_path(level)),
-        tuple(lesson_link(library, place, lesson, needs=True) for lesson in level.lessons),
+        tuple(
+            replace(
+                lesson_link(library, place, lesson, needs=True),
+                asked=library.asked.get(lesson.path, ""),
+            )
+            for lesson in level.lessons
+        ),
         sum(lesson.status is not Status.PLANNED for lesson in level.lessons),
     )
 
@@ -131,10 +140,11 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
         "home": place.href(urls.HOME),
         "name": model.name,
         "path": model.source.path,
+        "anchor": listing_anchor(model.source.path),
         "title": title,
         "href": place.href(urls.model_file_path(model.name)),
         "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
-        "code": Highlighted("xml", model.source.text.rstrip()),
+        "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
         "measured": measured_view(library, place, model),
         "plots": Plotted(() if scene is None else scene.scenarios),
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",

@@ -29,6 +29,7 @@ from coursebuild.model import (
     Script,
     Table,
     Target,
+    TermTarget,
     UrlTarget,
 )
 from coursebuild.render.markup import (
@@ -65,6 +66,8 @@ class PlainContext:
                 return f"level:{target.id}"
             case ModelTarget():
                 return f"model:{target.name}"
+            case TermTarget():
+                return f"term:{target.id}"
             case ExampleTarget():
                 return target.path
             case UrlTarget():
@@ -72,14 +75,21 @@ class PlainContext:
             case _:
                 assert_never(target)
 
+    def reference(self, target: Target) -> str:
+        """Nothing."""
+        return ""
+
     def url(self, url: str) -> str:
         """The address as written."""
         return url
 
-    def math(self, tex: str, display: bool) -> Markup:
+    def math(self, tex: str) -> Markup:
         """The TeX between its delimiters."""
-        start, end = (r"\[", r"\]") if display else (r"\(", r"\)")
-        return Markup(f'<span class="math">{start}{escape(tex)}{end}</span>')
+        return Markup(rf'<span class="math">\({escape(tex)}\)</span>')
+
+    def display(self, tex: str, start: int) -> Markup:
+        """The same for a formula on a line of its own."""
+        return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
 
     def code(self, language: str, text: str) -> Markup:
         """The code as text."""

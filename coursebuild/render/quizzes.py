@@ -1,7 +1,7 @@
 """Quizzes as a page shows them before any script runs: all readable, each answer behind a fold.
 
-Entry point: `quiz(page, block)`. The script of the page finds each question by `data-question` and
-its kind by `data-kind`.
+Entry point: `quiz(page, block)`. The page's script finds each question by `data-question`, its key,
+and its kind by `data-kind`; what it grades by stands in further data attributes.
 
 The items of an order question are shown in an order that looks shuffled and depends on nothing but
 their number and the quiz's id, and that is never the right one.
@@ -18,12 +18,16 @@ from markupsafe import Markup, escape
 from coursebuild.model import (
     AnyQuestion,
     ChoiceQuestion,
+    Comparison,
     Heading,
+    Mode,
     NumericQuestion,
     OpenQuestion,
     OrderQuestion,
     OutputQuestion,
     Quiz,
+    Recording,
+    document_blocks,
     plain_text,
 )
 from coursebuild.results import Outcome
@@ -37,10 +41,19 @@ if TYPE_CHECKING:
 class Option:
     """An option of a question, lettered."""
 
+    key: str
     letter: str
     text: Markup
     feedback: Markup
     right: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """An item that is to be put in order."""
+
+    key: str
+    text: Markup
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +62,25 @@ class QuestionView:
 
     kind: str
     """`mcq`, `several`, `predict`, `numeric`, `open`, `output`, `order`."""
+    key: str
+    anchor: str
     number: int
     label: str
     text: Markup
     explain: Markup
     hints: tuple[Markup, ...]
+    data: tuple[tuple[str, str], ...] = ()
+    """Data attributes that the page's script grades by."""
     options: tuple[Option, ...] = ()
+    several: bool = False
+    """Whether all right options must be chosen."""
     simulation: Markup = Markup()
     answer: str = ""
     """The number, or the output's line."""
     tolerance: str = ""
     unit: Markup = Markup()
     reference: Markup = Markup()
-    items: tuple[Markup, ...] = ()
+    items: tuple[Item, ...] = ()
     """In the right order."""
     order: tuple[int, ...] = ()
     """Indices into `items`, as they are shown."""
@@ -77,14 +96,23 @@ def quiz(page: PageContext, block: Quiz) -> Markup:
         _question(page, block, question, number)
         for number, question in enumerate(block.questions, 1)
     )
-    headings = (b for b in page.document.blocks if isinstance(b, Heading))
+    headings = [b for b in document_blocks(page.document) if isinstance(b, Heading)]
     said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
-    return page.template("blocks/quiz.html", quiz=block, questions=questions, titled=not said)
+    return page.template(
+        "blocks/quiz.html",
+        quiz=block,
+        questions=questions,
+        titled=bool(block.title) and not said,
+        # A heading of the same id stands for the quiz that it is above.
+        anchored=all(heading.anchor != block.id for heading in headings),
+    )
 
 
 def _question(page: PageContext, block: Quiz, question: AnyQuestion, number: int) -> QuestionView:
     view = QuestionView(
         kind="",
+        key=question.key,
+        anchor=block.anchor(question.key),
         number=number,
         label=question.label,
         text=page.blocks(question.text),
@@ -94,40 +122,89 @@ def _question(page: PageContext, block: Quiz, question: AnyQuestion, number: int
     match question:
         case ChoiceQuestion():
             kind = "predict" if question.predict else "several" if question.several else "mcq"
-            simulation = page.block(question.sim) if question.sim is not None else Markup()
-            return replace(view, kind=kind, options=_options(page, question), simulation=simulation)
-        case NumericQuestion():
-            tolerance = f"{question.tolerance:.3g}"
+            options = _options(page, question)
             return replace(
                 view,
-                kind="numeric",
-                answer=question.answer_text,
-                tolerance=tolerance,
-                unit=unit_html(question.unit),
+                kind=kind,
+                data=(("answer", " ".join(option.key for option in options if option.right)),),
+                options=options,
+                several=question.several,
+                simulation=page.block(question.sim) if question.sim is not None else Markup(),
             )
+        case NumericQuestion():
+            return _numeric(view, question)
         case OpenQuestion():
             return replace(view, kind="open", reference=page.blocks(question.reference))
         case OutputQuestion():
-            line = output_line(page, question.script, question.line)
-            return replace(
-                view,
-                kind="output",
-                answer=line or "",
-                known=line is not None,
-                script=question.script,
-                line=question.line,
-            )
+            return _output(page, view, question)
         case OrderQuestion():
-            items = tuple(page.inlines(item) for item in question.items)
+            items = tuple(
+                Item(key, page.inlines(item))
+                for key, item in zip(question.item_keys, question.items, strict=True)
+            )
             order = shuffle(len(items), f"{block.id}/{number}")
-            return replace(view, kind="order", items=items, order=order)
+            data = (("answer", " ".join(question.item_keys)),)
+            return replace(view, kind="order", data=data, items=items, order=order)
         case _:
             assert_never(question)
+
+
+def _numeric(view: QuestionView, question: NumericQuestion) -> QuestionView:
+    data = (
+        ("answer", question.answer_text),
+        ("tolerance", repr(question.tolerance)),
+        ("unit", question.unit),
+    )
+    return replace(
+        view,
+        kind="numeric",
+        data=data,
+        answer=question.answer_text,
+        tolerance=f"{question.tolerance:.3g}",
+        unit=unit_html(question.unit),
+    )
+
+
+def _output(page: PageContext, view: QuestionView, question: OutputQuestion) -> QuestionView:
+    line = output_line(page, question.script, question.line)
+    data = (("answer", line), ("compare", _compared(page, question.script))) if line else ()
+    return replace(
+        view,
+        kind="output",
+        data=data,
+        answer=line or "",
+        known=line is not None,
+        script=question.script,
+        line=question.line,
+    )
+
+
+def _compared(page: PageContext, script: str) -> str:
+    """How the numbers in the output of a script are compared, for the page's script."""
+    for block in document_blocks(page.document):
+        if isinstance(block, Recording) and block.script == script:
+            verdict = page.shown.verdicts.get(block.span.start)
+            if verdict is not None:
+                return _rule(verdict.comparison)
+    return _rule(Comparison(Mode.DIGITS))
+
+
+def _rule(comparison: Comparison) -> str:
+    match comparison.mode:
+        case Mode.EXACT:
+            return "exact"
+        case Mode.DIGITS | Mode.VOLATILE:
+            return "digits"
+        case Mode.TOLERANCE:
+            return f"rtol={float(comparison.rtol)!r} atol={float(comparison.atol)!r}"
+        case _:
+            assert_never(comparison.mode)
 
 
 def _options(page: PageContext, question: ChoiceQuestion) -> tuple[Option, ...]:
     return tuple(
         Option(
+            choice.key,
             letter(index),
             page.inlines(choice.text),
             page.blocks(choice.feedback),

@@ -11,7 +11,7 @@ from coursebuild.render import formulas, styles
 from coursebuild.render.characters import visible
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import parts_of
-from coursebuild.render.links import Reference, page_references
+from coursebuild.render.links import Reference, page_references, without_lines
 from coursebuild.render.shared import PageFacts, page_facts
 from coursebuild.values import dataclass, replace
 
@@ -30,9 +30,11 @@ class PageRecord:
     declarations: tuple[str, ...]
     """Styles that were written in its elements, sorted."""
     ids: tuple[str, ...]
-    """Anchors, sorted."""
+    """Anchors, sorted; see `links.without_lines`."""
     references: tuple[Reference, ...]
     """Where its links lead, sorted, each once."""
+    search: tuple[str, str] | None = None
+    """Name and digest of what the page is found by; see `Searched`."""
 
     @property
     def facts(self) -> PageFacts:
@@ -56,7 +58,7 @@ def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
         text="".join(sorted(facts.text)),
         mathematics="".join(sorted(facts.mathematics)),
         declarations=tuple(sorted(declarations)),
-        ids=tuple(sorted(ids)),
+        ids=tuple(sorted(without_lines(ids))),
         references=tuple(sorted(references)),
     )
     return found, body

@@ -94,6 +94,8 @@ class Shown:
     python: str = ""
     hrefs: Mapping[Target, str] = field(default_factory=dict)
     """Addresses of links, as seen from the page."""
+    equations: Mapping[Target, str] = field(default_factory=dict)
+    """What links to formulas of other pages say, where they have no text."""
     callouts: Mapping[str, ShownCallout] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""
@@ -101,14 +103,18 @@ class Shown:
     labs: Mapping[int, ShownLab] = field(default_factory=dict)
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
+    address: str = ""
+    """The page's full address; empty where nobody knows where the site will stand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Highlighted:
-    """Code whose tokens are marked when the page is drawn."""
+    """A file whose tokens are marked when the page is drawn."""
 
     language: str
     text: str
+    path: str
+    """By which its lines are linked to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +122,30 @@ class Plotted:
     """Work–precision plots, drawn when the page is: two of each, for wide and narrow screens."""
 
     reports: tuple[ScenarioReport, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GraphNode:
+    """A lesson in a drawing of lessons."""
+
+    id: str
+    title: str
+    href: str
+    status: str
+    current: bool
+    """Whether it is the lesson of the page."""
+    outside: bool
+    """Whether it is of another level than the page's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Graphed:
+    """Which lessons build on which, drawn when the page is: for wide and narrow screens."""
+
+    nodes: tuple[GraphNode, ...]
+    """In the order of the course."""
+    edges: tuple[tuple[str, str], ...]
+    """Ids: what is needed, and what needs it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +160,7 @@ class Sheet:
     description: str
     template: str
     values: Mapping[str, object]
-    """For the template; `Highlighted` and `Plotted` among them are drawn first."""
+    """For the template; `Highlighted`, `Plotted` and `Graphed` among them are drawn first."""
     json_ld: Markup = Markup()
     og_type: str = "website"
     indexed: bool = True

@@ -24,6 +24,7 @@ from coursebuild.model import (
     Recording,
     Script,
     Target,
+    TermTarget,
     UrlTarget,
     block_inlines,
     document_blocks,
@@ -35,6 +36,7 @@ from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
+from coursebuild.render.references import owner_path
 from coursebuild.render.sheet import (
     Shown,
     ShownCallout,
@@ -58,11 +60,13 @@ def shown(library: Library, place: urls.Place, document: Document) -> Shown:
         engine=library.results.engine,
         python=library.results.python,
         hrefs=page.hrefs,
+        equations=page.equations,
         callouts=page.callouts,
         runs=page.runs(),
         verdicts=page.verdicts,
         labs=page.labs,
         keyframes=page.keyframes,
+        address=urls.absolute(library.course, place.path),
     )
 
 
@@ -74,6 +78,7 @@ class _Page:
         self.place = place
         self.path = document.source.path
         self.hrefs: dict[Target, str] = {}
+        self.equations: dict[Target, str] = {}
         self.callouts: dict[str, ShownCallout] = {}
         self.verdicts: dict[int, ShownVerdict] = {}
         self.labs: dict[int, ShownLab] = {}
@@ -124,6 +129,9 @@ class _Page:
     def _link(self, target: Target) -> None:
         if target not in self.hrefs:
             self.hrefs[target] = address(self.library, self.place, self.path, target)
+            name = equation_name(self.library, self.path, target)
+            if name:
+                self.equations[target] = name
 
     def runs(self) -> dict[str, ShownRun]:
         """What is shown of the scripts that ran."""
@@ -176,10 +184,34 @@ def address(library: Library, place: urls.Place, path: str, target: Target) -> s
             return place.href(urls.page_path(library.pages[target.id]), target.anchor)
         case ExampleTarget():
             return place.href(target.path)
+        case TermTarget():
+            found = library.references.terms[target.id]
+            return place.href(owner_path(found.owner), f"term:{target.id}")
         case UrlTarget():
             return file_address(place, path, target.url)
         case _:
             assert_never(target)
+
+
+def equation_name(library: Library, path: str, target: Target) -> str:
+    """How another page calls a formula with a number; empty where a target is none."""
+    target = resolve(target, library.course, path)
+    if not isinstance(target, LessonTarget | PageTarget) or not target.anchor:
+        return ""
+    if not target.anchor.startswith("eq:"):
+        return ""
+    lesson = isinstance(target, LessonTarget)
+    owner = library.lessons[target.id] if lesson else library.pages[target.id]
+    if owner.document is None:
+        return ""
+    number = library.lexicon(owner.document).numbers.get(target.anchor)
+    if number is None:
+        return ""
+    if owner.document.source.path == path:
+        return f"({number})"
+    if lesson:
+        return library.words("equation.of_lesson", number=number, id=owner.id)
+    return library.words("equation.of_page", number=number, title=owner.title)
 
 
 def file_address(place: urls.Place, path: str, url: str) -> str:

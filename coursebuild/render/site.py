@@ -11,14 +11,21 @@ Entry point: `render_site(course, results, assets, options)`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.render import fonts, lesson, meta, pages, urls, zips
 from coursebuild.render.assets import Assets
-from coursebuild.render.frame import Draft, frame
+from coursebuild.render.characters import visible
+from coursebuild.render.exports.files import Around, Exports, OnDemand
+from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render.glossary import glossary_draft
 from coursebuild.render.library import Library
+from coursebuild.render.offline import facts_of, file_list, offline_draft, offline_files
+from coursebuild.render.reader import progress_draft, review_draft
+from coursebuild.render.search.sheet import search_sheet
+from coursebuild.render.search.whole import site_search
 from coursebuild.render.shared import (
     PageFacts,
     common_characters,
@@ -26,6 +33,7 @@ from coursebuild.render.shared import (
     settled,
     shared_files,
 )
+from coursebuild.render.symbol_index import symbols_draft
 from coursebuild.results import OutputFile, Results
 from coursebuild.values import dataclass, field
 
@@ -52,7 +60,8 @@ def render_site(
     options = options or SiteOptions()
     library = Library.of(course, results, assets, reports=options.reports)
     drafts, facts = [], []
-    for draft, declarations in map(settled, _drafts(library)):
+    drawn = tuple(_drafts(library))
+    for draft, declarations in map(settled, drawn):
         drafts.append(draft)
         facts.append(page_facts(draft, declarations))
     shared, names = shared_files(assets, options.subset, all_facts(library, facts))
@@ -61,6 +70,11 @@ def render_site(
     files += library.labs.files
     files += _downloads(library, options)
     files += _machine_files(course, drafts)
+    files += site_search(library, drawn)
+    files += offline_files(course, assets)
+    files += _exports(library, assets, options, drafts, facts, names)
+    listed = file_list(names, "")
+    files.append(OutputFile(listed.path, listed.make(facts_of(files))))
     return tuple(sorted(files, key=lambda file: file.path))
 
 
@@ -77,11 +91,20 @@ def _drafts(library: Library) -> Iterator[Draft]:
             yield lesson.lesson_draft(library, entry, entry.document)
     for model in course.models:
         yield pages.model_draft(library, model)
+    if library.references.terms:
+        yield glossary_draft(library)
+    if library.references.symbols:
+        yield symbols_draft(library)
     if library.reports.cases:
         yield pages.numerics_draft(library)
     for page in course.pages:
         if page.document is not None:
             yield pages.page_draft(library, page, page.document)
+    yield progress_draft(library)
+    if library.asked:
+        yield review_draft(library)
+    yield offline_draft(library)
+    yield lesson.drawn(library, search_sheet(library))
     yield pages.not_found_draft(library)
 
 
@@ -114,6 +137,32 @@ def _downloads(library: Library, options: SiteOptions) -> Iterator[OutputFile]:
             yield archive
     for file in options.files:
         yield OutputFile(urls.file_path(file.path), file.data)
+
+
+def _exports(
+    library: Library,
+    assets: Assets,
+    options: SiteOptions,
+    drafts: Sequence[Draft],
+    facts: Sequence[PageFacts],
+    names: Names,
+) -> Iterator[OutputFile]:
+    """What the site gives away besides its pages."""
+    bodies = {draft.path: visible(str(draft.body)) for draft in drafts}
+    pictures = {file.path: file.data for file in library.labs.files}
+    pictures |= {urls.file_path(file.path): file.data for file in options.files}
+    around = Around(
+        style=assets.template("exports/epub.css"),
+        picture=pictures.__getitem__,
+        pictures="",
+        archives=zips.lesson_archives(library, options.around),
+        imports=options.around.imports,
+        declarations=frozenset[str]().union(*(one.declarations for one in facts)),
+        taken=frozenset(urls.file_path(file.path) for file in options.files),
+    )
+    source = OnDemand(library, tuple(bodies), bodies.__getitem__)
+    for file in Exports(library, source, around).files(names):
+        yield file if isinstance(file, OutputFile) else OutputFile(file.path, file.make())
 
 
 def _machine_files(course: Course, drafts: Iterable[Draft]) -> Iterator[OutputFile]:

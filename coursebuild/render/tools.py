@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from markupsafe import Markup
 
+from coursebuild.render.direction import direction
+from coursebuild.render.quantities import text_html
 from coursebuild.render.strings import Strings
 from coursebuild.results import Formula, MathError
 from coursebuild.values import dataclass, field
@@ -46,9 +48,20 @@ class Tools:
     """What templates write around their only value, as far as it is known."""
 
     def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template, without its last line end; it sees `t`, the interface's words."""
-        text = self.templates().get_template(template).render(t=self.words, **values)
+        """A filled-in template, without its last line end.
+
+        It sees `t`, the interface's words, and `authored`, see `text`.
+        """
+        text = (
+            self.templates()
+            .get_template(template)
+            .render(t=self.words, authored=self.text, **values)
+        )
         return Markup(text.rstrip("\n"))
+
+    def text(self, text: str) -> Markup:
+        """Text of an author that is not Markdown, with its quantities kept together."""
+        return text_html(text, direction(self.words.language))
 
     def enclose(self, template: str, name: str, html: Markup) -> Markup:
         """The same for a template that writes one value, once and as it is, whatever it may be."""

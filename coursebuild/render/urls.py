@@ -21,10 +21,26 @@ from coursebuild.values import dataclass
 HOME = "index.html"
 NOT_FOUND = "404.html"
 EXAMPLES_ZIP = "examples.zip"
+PROGRESS = "progress/index.html"
+REVIEW = "review/index.html"
 NUMERICS = "numerics/index.html"
 """In a folder that no page of a course can have."""
+SEARCH = "search/index.html"
+SEARCH_INDEX = "search/index.js"
+"""The one file of the search's index whose name is always the same."""
+GLOSSARY = "glossary/index.html"
+SYMBOLS = "symbols/index.html"
+COURSE_PAGE = "course/index.html"
+"""The whole course to be printed, in a folder of the same kind."""
+EPUB = "course.epub"
 SITEMAP = "sitemap.xml"
 ROBOTS = "robots.txt"
+OFFLINE = "offline/index.html"
+MANIFEST = "manifest.webmanifest"
+WORKER = "service-worker.js"
+"""In the root, since a worker serves the folder that it lies in."""
+FILES = "files.json"
+"""The list of what the worker may keep."""
 
 
 def lesson_path(lesson: Lesson) -> str:
@@ -35,6 +51,22 @@ def lesson_path(lesson: Lesson) -> str:
 def lesson_zip_path(lesson: Lesson) -> str:
     """`lessons/4.2-mass-and-inertia.zip`: the scripts of one lesson."""
     return f"lessons/{lesson.id}-{lesson.slug}.zip"
+
+
+def notebook_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.ipynb`: the lesson as a Jupyter notebook."""
+    return f"lessons/{lesson.id}-{lesson.slug}.ipynb"
+
+
+_WITHOUT_TWIN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
+"""Pages that say nothing but what a script fills in."""
+
+
+def twin_path(page: str) -> str | None:
+    """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
+    if page in _WITHOUT_TWIN or page.startswith("course/"):
+        return None
+    return f"{page.removesuffix('.html')}.md"
 
 
 def level_path(level: Level) -> str:

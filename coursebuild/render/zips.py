@@ -75,7 +75,7 @@ class Archive:
 
     def packed(self) -> bytes:
         """Its bytes."""
-        return _zip(self.files)
+        return pack(self.files)
 
 
 def archives(library: Library, around: Surroundings) -> Iterator[Callable[[], Archive | None]]:
@@ -112,6 +112,21 @@ def lesson_archive(
     needed = _with_siblings(by_module, around, scripts)
     files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
     return Archive(urls.lesson_zip_path(lesson), files)
+
+
+def lesson_archives(
+    library: Library, around: Surroundings
+) -> dict[str, tuple[str, Callable[[], Archive | None]]]:
+    """Those of the lessons that have scripts, by site path, each with an empty key."""
+    by_module = _by_module(library)
+    return {
+        urls.lesson_zip_path(lesson): (
+            "",
+            functools.partial(lesson_archive, library, around, lesson, by_module),
+        )
+        for lesson in library.order
+        if lesson.document is not None and document_scripts(lesson.document)
+    }
 
 
 def course_zip(library: Library, around: Surroundings) -> OutputFile:
@@ -234,7 +249,8 @@ def _slug(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "course"
 
 
-def _zip(files: Mapping[str, bytes]) -> bytes:
+def pack(files: Mapping[str, bytes]) -> bytes:
+    """An archive of these files, by path."""
     import io
     import zipfile
 

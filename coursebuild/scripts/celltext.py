@@ -26,6 +26,7 @@ from coursebuild.model import (
     SoftBreak,
     Strikethrough,
     Strong,
+    Term,
     Text,
 )
 from coursebuild.scripts.traced import Piece, Traced, filtered
@@ -68,7 +69,7 @@ def _stretches(inlines: Iterable[Inline]) -> Iterator[tuple[str, Span]]:
                 yield inline.text, inline.text_span
             case Math():
                 yield inline.tex.text, inline.tex.span()
-            case Emphasis() | Strong() | Strikethrough() | Link():
+            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
                 yield from _stretches(inline.children)
             case Image():
                 yield inline.alt, inline.span

@@ -6,6 +6,7 @@ Entry point: `parse_document`. It never raises, whatever the text:
 2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own
    modules.
 3. Footnotes are read last, in the order of their numbers.
+4. What stands where it must not is found in the whole (`places`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import re
 from coursebuild.diagnostics import Parsed, diagnose, sort_diagnostics
 from coursebuild.model import Document
 from coursebuild.source import Excerpt, Source
+from coursebuild.syntax.places import misplaced
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import whole
 from coursebuild.syntax.tree import TextReader
@@ -37,8 +39,9 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     base = _without_front_matter(whole(source), session)
     reader = TextReader(base, session, session.definitions, nested=False)
     blocks = reader.read()
-    footnotes = session.notes.finish()
-    return Parsed(Document(source, blocks, footnotes), sort_diagnostics(session.diagnostics))
+    document = Document(source, blocks, session.notes.finish())
+    session.diagnostics += misplaced(document)
+    return Parsed(document, sort_diagnostics(session.diagnostics))
 
 
 def _without_front_matter(text: Excerpt, session: Session) -> Excerpt:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from unicodedata import normalize
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Image, Inline, plain_text, walk_inlines
@@ -70,7 +71,16 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
 
 def slug(text: str) -> str:
     """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
-    return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-") or "section"
+    return _words(text) or "section"
+
+
+def _words(text: str) -> str:
+    return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-")
+
+
+def term_id(name: str) -> str:
+    """The id of a term, by which links call it; empty for a name without letters and digits."""
+    return _words(normalize("NFC", name))
 
 
 @dataclass(slots=True)

@@ -1,8 +1,8 @@
 """The inline parser: markdown-it's rules, chosen by the first character of a piece of text.
 
-Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes and
-bound numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks are
-text.
+Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes, terms
+and bound numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks
+are text.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from markdown_it import MarkdownIt
+from markdown_it.helpers import parseLinkLabel
 from markdown_it.parser_inline import ParserInline
 from markdown_it.rules_inline import (
     StateInline,
@@ -28,6 +29,7 @@ from markdown_it.rules_inline import (
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
+from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.math import math_inline
 from coursebuild.syntax.spans import InlineState, Placed
 
@@ -99,6 +101,33 @@ def _footnote_reference(state: StateInline, silent: bool) -> bool:
     return True
 
 
+def _term(state: StateInline, silent: bool) -> bool:
+    """`[text]{term}`: tokens `term_open` and `term_close`, the braces where `map` says.
+
+    Who passes over it sees brackets, so that a term may stand in a link.
+    """
+    if silent:
+        return False
+    assert isinstance(state, InlineState)
+    if state.last_braced is None:
+        state.last_braced = state.src.rfind("]{")
+    if state.pos > state.last_braced:
+        return False
+    start, limit = state.pos, state.posMax
+    end = parseLinkLabel(state, start)
+    braces = Braces.of_term(state.src, end + 1, limit) if end >= 0 else None
+    if braces is None:
+        return False
+    state.pos, state.posMax = start + 1, end
+    state.push("term_open", "dfn", 1)
+    state.md.inline.tokenize(state)
+    token = state.push("term_close", "dfn", -1)
+    token.map = [braces.start, braces.end]
+    token.info = "" if braces.closed else "unclosed"
+    state.pos, state.posMax = braces.end, limit
+    return True
+
+
 def _link(state: StateInline, silent: bool) -> bool:
     """A link or image, unless no bracket closes after this one."""
     assert isinstance(state, InlineState)
@@ -125,7 +154,7 @@ _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "*": (_emphasis,),
     "_": (_emphasis,),
     "~": (_emphasis,),
-    "[": (_link, _footnote_reference),
+    "[": (_term, _link, _footnote_reference),
     "]": (),
     "!": (_link,),
     "<": (autolink, html_inline),
@@ -220,7 +249,7 @@ def _place_inline(state: InlineState, before: int, at: int) -> None:
             opens = token.type == "link_open"
             token.start, token.end = (at, at + 1) if opens else (after - 1, after)
             cursor = at + 1
-        elif token.type == "link_open":
+        elif token.type in ("link_open", "term_open"):
             token.start, token.end = at, at + 1
         elif token.type != "text":
             token.end = after

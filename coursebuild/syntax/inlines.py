@@ -1,25 +1,24 @@
 """Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
 
 Entry point: `InlineReader.read`. One pass over the flat tokens with a stack of open emphasis,
-strong, strikethrough and links:
+strong, strikethrough, links and terms:
 
 1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
    and mentions (`mention`).
 2. An opening token puts a frame on the stack, its closing token makes the node from what was
    gathered since.
-3. Mistakes are reported on the way: bindings, schemes, images without text, footnotes that are not
-   written, open formulas.
+3. Mistakes are reported on the way: attributes, schemes, images without text, footnotes that are
+   not written, open formulas.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
 
-from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.diagnostics import diagnose
 from coursebuild.model import (
     CodeSpan,
     Emphasis,
@@ -33,14 +32,18 @@ from coursebuild.model import (
     RawInline,
     Strikethrough,
     Strong,
+    Term,
+    plain_text,
 )
 from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
 from coursebuild.syntax.block_parser import Definitions
-from coursebuild.syntax.footnotes import Notes
+from coursebuild.syntax.headings import term_id
 from coursebuild.syntax.html import Balance, tags
 from coursebuild.syntax.inline_parser import may_be_marked
 from coursebuild.syntax.markdown import definition_label, inline_tokens
 from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
+from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import Placed, Placer, locate
 from coursebuild.syntax.targets import check_scheme, classify
 from coursebuild.values import dataclass, field
@@ -67,16 +70,16 @@ class InlineReader:
         self,
         base: Excerpt,
         definitions: Definitions,
-        notes: Notes,
+        session: Session,
         balance: Balance,
-        report: Callable[[Diagnostic], None],
     ) -> None:
         self.base = base
         self.definitions = definitions
         self.environment = definitions.environment()
-        self.notes = notes
+        self.notes = session.notes
+        self.anchors = session.anchors
         self.balance = balance
-        self.report = report
+        self.report = session.report
 
     def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
         """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
@@ -143,10 +146,10 @@ class _Pass:
     def _open(self, token: Placed) -> None:
         self._flush()
         is_link = token.type == "link_open"
-        flat = len(self.stack) > MAX_DEPTH and not is_link
+        flat = len(self.stack) > MAX_DEPTH and not is_link and token.type != "term_open"
         self.stack.append(_Frame(token, self.stack[-1].nodes if flat else []))
         self.reader.balance.enter()
-        self.links += is_link
+        self.links += is_link or token.type == "term_open"
 
     def _close(self, token: Placed) -> None:
         self._flush()
@@ -161,6 +164,10 @@ class _Pass:
             self.links -= 1
             link = self._link(opened, token, children)
             into.extend(children if link is None else (link,))
+        elif token.type == "term_close":
+            self.links -= 1
+            term = self._term(opened, token, children)
+            into.extend(children if term is None else (term,))
         elif token.type == "strong_close":
             into.append(Strong(self.placer.span(opened.start - 1, token.end + 1), children))
         else:
@@ -170,6 +177,20 @@ class _Pass:
                 if token.type == "em_close"
                 else Strikethrough(span, children)
             )
+
+    def _term(self, opened: Placed, closed: Placed, children: tuple[Inline, ...]) -> Term | None:
+        assert closed.map is not None
+        span = self.placer.span(opened.start, closed.end)
+        report = self.reader.report
+        braces = Braces(closed.map[0], closed.map[1], not closed.info)
+        given = read_term(self.content, braces, report)
+        if given is None:
+            return None
+        name = given or folded(plain_text(children))
+        if not term_id(name):
+            report(diagnose("term-attribute", span, "the term has no letters and no digits"))
+            return None
+        return Term(span, children, name, term_id(name), bool(given))
 
     def _link(self, opened: Placed, closed: Placed, children: tuple[Inline, ...]) -> Link | None:
         url = str(opened.attrs["href"])
@@ -243,7 +264,16 @@ class _Pass:
         assert token.map is not None
         if not token.content.strip():
             self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
-        return Math(span, self.content.slice(*token.map), token.info == "display")
+        tex, display = self.content.slice(*token.map), token.info == "display"
+        braces, report = token.meta.get("braces"), self.reader.report
+        if braces is None:
+            return Math(span, tex, display)
+        if not display:
+            return Math(span, tex, display, None, read_meaning(self.content, braces, report))
+        label = read_label(self.content, braces, report)
+        if label is not None:
+            self.reader.anchors.take(label.id, label.span)
+        return Math(span, tex, display, label)
 
     def _number(self, token: Placed, span: Span) -> CodeSpan | NumberBinding:
         assert token.map is not None

@@ -6,8 +6,8 @@ for HTML in quiz texts).
 A `$` opens a formula when something other than white space follows; the next `$` that no backslash
 escapes must close it, with something other than white space before it and no digit after it. So
 "costs $5 and $6" holds no formula. Code spans bind tighter than formulas, formulas tighter than
-emphasis and links. A block of math ends at a `$$` with nothing after it; an empty line before that
-means that it was never closed.
+emphasis and links. A block of math ends at a `$$` with nothing but a label after it; an empty line
+before that means that it was never closed.
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ from typing import NamedTuple
 from markdown_it.rules_block import StateBlock
 from markdown_it.rules_inline import StateInline
 
+from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.spans import BlockState, InlineState, Placed
 
 _STOP = re.compile(r"\\[\s\S]|`+|\$+")
 _BLOCK_STOP = re.compile(r"\\[\s\S]|\$+")
 _BACKTICKS = re.compile(r"`+")
 _DOLLARS = re.compile(r"\$+")
+_LABEL = re.compile(r"\{#[^{}$]*\}?")
 _SPACE = " \t\n"
 _DIGITS = "0123456789"
 
@@ -70,7 +72,7 @@ def find_formula(
 def math_inline(state: StateInline, silent: bool) -> bool:
     """The inline rule: a token `math`, or `math_unclosed` for a `$$` without end.
 
-    The TeX stands where `map` says.
+    The TeX stands where `map` says; `meta` has the braces after the formula that are its own.
     """
     assert isinstance(state, InlineState)
     at = state.pos
@@ -98,6 +100,13 @@ def math_inline(state: StateInline, silent: bool) -> bool:
         token.map = [formula.start, formula.end]
         token.info = "display" if formula.display else ""
     state.pos = formula.after
+    if "{" in state.src[formula.after : formula.after + 4]:
+        find = Braces.of_label if formula.display else Braces.of_symbol
+        braces = find(state.src, formula.after, state.posMax)
+        if braces is not None:
+            state.pos = braces.end
+            if not silent:
+                token.meta["braces"] = braces
     return True
 
 
@@ -112,7 +121,8 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
     while True:
         close = _closing(state.src, at, state.eMarks[line])
         if close is not None:
-            if state.src[close + 2 : state.eMarks[line]].strip(" \t"):
+            rest = state.src[close + 2 : state.eMarks[line]].strip(" \t")
+            if rest and not _LABEL.fullmatch(rest):
                 return False
             closed = True
             line += 1

@@ -5,7 +5,9 @@ Entry point: `parse_quiz`.
 1. The JSON is read into nodes, and these into the declared fields.
 2. Each question whose own fields are right is checked for what no type can say: an answer that is
    one of the options, as many feedbacks as options, a tolerance where the answer is 0.
-3. The Markdown in it is parsed, and all of it becomes a `Quiz`.
+3. The Markdown in it is parsed, and all of it becomes a `Quiz`. One with mistakes becomes a quiz of
+   those questions that are right, so that what is wrong in them beside (a formula, a link, a script
+   that no lesson has) is told in the same run.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from coursebuild.syntax.lab import sim_lab
 from coursebuild.syntax.lab_checks import check_lab
 from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.syntax.prose import Prose
+from coursebuild.syntax.question_keys import Keys
 from coursebuild.syntax.quiz_schema import (
     AnyFields,
     MultipleChoice,
@@ -44,13 +47,17 @@ from coursebuild.syntax.quiz_schema import (
 from coursebuild.syntax.relations import repeated
 from coursebuild.syntax.texts import TextParser
 from coursebuild.syntax.wording import JSON
+from coursebuild.values import replace
 
 TOLERANCE = 0.02
 """Of the answer's size, where a numeric question gives no tolerance."""
 
 
 def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:
-    """The quiz of a fence; `span` is all of it and `body` the text inside. Never raises."""
+    """The quiz of a fence; `span` is all of it and `body` the text inside. Never raises.
+
+    It can be there along with diagnostics, and is then not to be published.
+    """
     parsed = parse_json(body, span.first_line())
     node = parsed.value
     if node is None:
@@ -58,18 +65,67 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
     decoding = decode(node, QuizFile, "the quiz", JSON)
     prose = Prose.read(decoding.texts, texts)
     found: list[Diagnostic] = [*parsed.diagnostics, *decoding.diagnostics, *prose.diagnostics]
-    questions: list[AnyQuestion] = []
-    for question in node.objects("questions") if isinstance(node, ObjectNode) else ():
-        found += _check(question, decoding)
-        built = _question(question, decoding, prose)
-        questions += [built] if built is not None else []
-    fields = decoding.value
-    if found or fields is None or not isinstance(node, ObjectNode):
+    if not isinstance(node, ObjectNode):
         return Parsed(None, sort_diagnostics(found))
-    return Parsed(Quiz(span, fields.id, node.place("id"), fields.title, tuple(questions)))
+    nodes = node.objects("questions")
+    found += _check_ids(nodes)
+    keys = _keys(nodes, decoding)
+    questions: list[AnyQuestion] = []
+    for question in nodes:
+        found += _check(question, decoding)
+    for question in nodes:
+        # Where its JSON is wrong, nobody knows what its texts were meant to be.
+        garbled = any(question.span.contains(d.span) for d in parsed.diagnostics)
+        built = _question(question, keys.get(question, ""), decoding, prose)
+        questions += [_sound(built, found)] if built is not None and not garbled else []
+    fields = decoding.value
+    id, title = (fields.id, fields.title) if fields is not None else (_id(node, found), "")
+    present = tuple(question.key for question in questions)
+    quiz = Quiz(span, id, node.place("id"), title, tuple(questions), present)
+    return Parsed(quiz, sort_diagnostics(found))
+
+
+def _id(node: ObjectNode, found: list[Diagnostic]) -> str:
+    """The id of a quiz with mistakes; empty where the id is one of them."""
+    given = node.get("id")
+    wrong = any(given is not None and d.span == given.mark for d in found)
+    return given.value if isinstance(given, StringNode) and not wrong else ""
+
+
+def _sound(question: AnyQuestion, found: list[Diagnostic]) -> AnyQuestion:
+    """A question without its simulation where that has mistakes: it would be tried with them."""
+    if not isinstance(question, ChoiceQuestion) or question.sim is None:
+        return question
+    wrong = any(question.sim.span.contains(diagnostic.span) for diagnostic in found)
+    return replace(question, sim=None) if wrong else question
+
+
+def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[ObjectNode, str]:
+    """The key of each question: its id, or that of its text, which must not be another's id."""
+    fields = {node: decoding.structs.get(node) for node in nodes}
+    given = {n: f.id for n, f in fields.items() if isinstance(f, AnyFields) and f.id is not None}
+    keys = Keys(set(given.values()))
+    return {
+        node: given[node] if node in given else keys.of(_kind(node), known.q)
+        for node, known in fields.items()
+        if isinstance(known, AnyFields)
+    }
+
+
+def _kind(node: ObjectNode) -> str:
+    kind = node.get("kind")
+    return kind.value if isinstance(kind, StringNode) else ""
 
 
 # ---------------------------------------------------------------------------------------- checks
+
+
+def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
+    given = [node.get("id") for node in nodes]
+    named = [(id.value, id.span) for id in given if isinstance(id, StringNode)]
+    help = "a learner's answer hangs on it; give each question its own, or none"
+    message = "the question id `{}` is used twice in this quiz"
+    yield from repeated(named, "question-id-repeated", message, help=help)
 
 
 def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
@@ -121,12 +177,14 @@ def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagn
 # ------------------------------------------------------------------------------------- questions
 
 
-def _question(node: ObjectNode, decoding: Decoding[QuizFile], prose: Prose) -> AnyQuestion | None:
+def _question(
+    node: ObjectNode, key: str, decoding: Decoding[QuizFile], prose: Prose
+) -> AnyQuestion | None:
     fields = decoding.structs.get(node)
     if not isinstance(fields, AnyFields):
         return None
     text, explain = prose.blocks(node.get("q")), prose.blocks(node.get("explain"))
-    common = (node.span, fields.label, text, explain, prose.each_blocks(node.get("hints")))
+    common = (node.span, key, fields.label, text, explain, prose.each_blocks(node.get("hints")))
     match fields:
         case MultipleChoice() | Predict():
             several = isinstance(fields.answer, tuple)
@@ -135,7 +193,7 @@ def _question(node: ObjectNode, decoding: Decoding[QuizFile], prose: Prose) -> A
             lab = None
             if isinstance(sim, ObjectNode):
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
-            options = _choices(node, prose)
+            options = _choices(node, fields.options, prose)
             predict = isinstance(fields, Predict)
             return ChoiceQuestion(*common, options, tuple(sorted(answers)), several, lab, predict)
         case Numeric():
@@ -149,17 +207,19 @@ def _question(node: ObjectNode, decoding: Decoding[QuizFile], prose: Prose) -> A
             script, line = node.place("of"), node.place("line")
             return OutputQuestion(*common, fields.of, script, fields.line, line)
         case Order():
-            return OrderQuestion(*common, prose.each_inlines(node.get("items")))
+            keys = Keys().each("item", fields.items)
+            return OrderQuestion(*common, prose.each_inlines(node.get("items")), keys)
         case _:
             assert_never(fields)
 
 
-def _choices(node: ObjectNode, prose: Prose) -> tuple[Choice, ...]:
+def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Choice, ...]:
     options = node.get("options")
     items = options.items if isinstance(options, ArrayNode) else ()
     feedback = prose.each_blocks(node.get("feedback"))
     padded = feedback + ((),) * (len(items) - len(feedback))
+    keys = Keys().each("option", texts)
     return tuple(
-        Choice(item.span, prose.inlines(item), text)
-        for item, text in zip(items, padded, strict=False)
+        Choice(item.span, key, prose.inlines(item), text)
+        for item, key, text in zip(items, keys, padded, strict=False)
     )

@@ -20,10 +20,26 @@ Options: TypeAlias = Annotated[tuple[Inlines, ...], Meta(min_length=2)]
 Answer: TypeAlias = Index | Annotated[tuple[Index, ...], Meta(min_length=1)]
 
 
+QuestionId: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[a-z0-9][a-z0-9-]*$",
+        extra={"expects": "lower-case letters, digits and `-`, with a letter or digit first"},
+    ),
+]
+
+
 class Common(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What every question has."""
 
     q: Annotated[Blocks, Meta(description="the question")]
+    id: Annotated[
+        QuestionId | None,
+        Meta(
+            description="unique in the quiz, and stable; without it a learner's answer is kept"
+            " under the text of `q`"
+        ),
+    ] = None
     label: Annotated[str, Meta(description="a short name, shown instead of the number")] = ""
     explain: Annotated[OptionalBlocks, Meta(description="shown with the answer")] = ""
     hints: Annotated[tuple[Blocks, ...], Meta(description="revealed one by one")] = ()

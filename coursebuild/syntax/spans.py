@@ -103,6 +103,8 @@ class InlineState(StateInline):
         self.mark = 0
         self.last_bracket: int | None = None
         """Where the last `]` stands, once somebody asked."""
+        self.last_braced: int | None = None
+        """Where the last `]{` stands, once somebody asked."""
         self.last_runs: dict[int, int] | None = None
         """Where the last run of each number of backticks begins, once somebody asked."""
 

@@ -15,14 +15,16 @@ from coursebuild.model import (
     ModelTarget,
     PageTarget,
     Target,
+    TermTarget,
     UrlTarget,
 )
 from coursebuild.source import Span
+from coursebuild.syntax.headings import term_id
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
 _PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
-_OURS = ("lesson", "model", "page")
+_OURS = ("lesson", "model", "page", "term")
 
 
 def classify(url: str) -> Target:
@@ -36,6 +38,8 @@ def classify(url: str) -> Target:
             return LessonTarget(unquote(name), place)
         if scheme == "page":
             return PageTarget(unquote(name), place)
+        if scheme == "term":
+            return TermTarget(term_id(unquote(url[len(scheme) + 1 :])))
         return ModelTarget(unquote(url[len(scheme) + 1 :]))
     if url.startswith("examples/"):
         return ExampleTarget(unquote(url))
@@ -55,7 +59,8 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
             "link-scheme",
             span,
             f"`{scheme}:` must not stand in a page",
-            help="link to an address with `https:`, to a file, or by `lesson:`, `page:`, `model:`",
+            help="link to an address with `https:`, to a file, or by "
+            "`lesson:`, `page:`, `model:`, `term:`",
         )
     near = nearest(scheme, _OURS, cutoff=0.75)
     if near is None:

@@ -24,6 +24,7 @@ from coursebuild.model import (
     HtmlBlock,
     HtmlFlow,
     Inline,
+    Label,
     ListBlock,
     ListItem,
     Math,
@@ -36,6 +37,7 @@ from coursebuild.model import (
     plain_text,
 )
 from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.attributes import Braces, read_label
 from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.callout import Head, read_head, resolve
 from coursebuild.syntax.dispatch import fence_block
@@ -71,7 +73,7 @@ class TextReader:
         self.texts = Texts(session)
         self.tokens = block_tokens(base, definitions)
         self.at = 0
-        self.inlines = InlineReader(base, definitions, session.notes, self.balance, session.report)
+        self.inlines = InlineReader(base, definitions, session, self.balance)
         self._prepare()
 
     def _prepare(self) -> None:
@@ -224,7 +226,15 @@ class TextReader:
             self.session.report(wrong)
         elif not tex.text:
             self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
-        return MathBlock(self._span(token), tex)
+        return MathBlock(self._span(token), tex, self._label(text, end + 2))
+
+    def _label(self, text: Excerpt, at: int) -> Label | None:
+        """The label of the formula that ends before an offset."""
+        braces = Braces.of_label(text.text, at, len(text.text))
+        label = read_label(text, braces, self.session.report) if braces is not None else None
+        if label is not None:
+            self.session.anchors.take(label.id, label.span)
+        return label
 
     # -- containers
 
@@ -348,8 +358,7 @@ class Texts:
 
     def _inlines(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
         balance = Balance(self._session.report)
-        links, notes = self._definitions(), self._session.notes
-        inlines = InlineReader(base, links, notes, balance, self._session.report).read(content)
+        inlines = InlineReader(base, self._definitions(), self._session, balance).read(content)
         balance.finish()
         return inlines
 

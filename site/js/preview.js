@@ -11,6 +11,7 @@ import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
 import { holdPlace } from './preview/place.js'
 import { Twin } from './preview/twin.js'
+import { dismissWorkers } from './preview/workers.js'
 
 const own = document.currentScript
 const page = own.dataset.page
@@ -72,6 +73,8 @@ async function accept(id) {
     return 'the preview does not answer'
   }
 }
+
+dismissWorkers(navigator).catch(() => {}) // a browser may keep them from pages
 
 connect(page, {
   hello(told) {

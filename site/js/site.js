@@ -3,31 +3,54 @@
 import { addCopyButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
 import { leaveLabs, loadLabs } from './page/labs.js'
+import { keepOffline } from './page/offline.js'
+import { addLineNumbers, followLines } from './page/lines.js'
+import { placeNotes } from './page/notes.js'
 import { openForPrint } from './page/print.js'
 import { markScrolling } from './page/scroll.js'
+import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
+import { addSearch } from './page/search.js'
 import { addThemeSwitch } from './page/theme.js'
 import { readWords } from './page/words.js'
+import { showProgress } from './progress/index.js'
+import { settleAnswers } from './progress/settle.js'
+import { openProgress } from './progress/store.js'
 
 let table = readWords(document)
 const words = (key) => table(key)
+const progress = openProgress(document.documentElement.dataset.course ?? '')
 
 function improve(part) {
   addCopyButtons(part, words)
   markScrolling(part)
+  addLineNumbers(part, words) // after it: the numbers stay in reach of the keyboard
   loadLabs(part, words)
+  mountQuizzes(part, words, progress)
 }
 
 addThemeSwitch(document, words)
+addSearch(document, words)
+settleAnswers(document, progress)
 improve(document)
+let leaveProgress = showProgress(document, words, progress, improve)
 let leaveContents = followContents(document)
+let leaveNotes = placeNotes(document)
 openForPrint(window)
+keepOffline(window, words)
+followLines(window)
 
 // In a preview, parts of the page are replaced while it is open.
 document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }) => {
   table = readWords(document)
   removed.forEach(leaveLabs)
+  removed.forEach(leaveQuizzes)
   if (!document.querySelector('.theme')) addThemeSwitch(document, words)
+  addSearch(document, words)
   added.forEach(improve)
   leaveContents()
   leaveContents = followContents(document)
+  leaveNotes()
+  leaveNotes = placeNotes(document)
+  leaveProgress()
+  leaveProgress = showProgress(document, words, progress, improve)
 })

@@ -17,7 +17,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
 
 from coursekit import Folder
+from hostkit import Host
 from labcourse import LESSON, PENDULUM, TWIN, ZOO
+from standardkit import Site, build_both, shared_folder
 
 ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
@@ -75,3 +77,16 @@ def context(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
     """A window of a desk's size."""
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
         yield context
+
+
+@pytest.fixture(scope="session")
+def sites(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[dict[str, Site]]:
+    """The course of this repository, and one with every construct; each on a host."""
+    roots = build_both(shared_folder(tmp_path_factory), stores)
+    bases = {"real": "/mujoco-course/", "full": "/constructs/"}  # the paths of their base addresses
+    found = {
+        name: Site(name, root, Host(root / "public", bases[name])) for name, root in roots.items()
+    }
+    yield found
+    for site in found.values():
+        site.host.stop()

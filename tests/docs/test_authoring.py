@@ -243,7 +243,7 @@ def test_every_rule_on_the_page_exists() -> None:
 
 
 COMMANDS = [
-    *("build", "check", "update", "extract", "serve", "explain"),
+    *("build", "check", "update", "extract", "serve", "export", "explain"),
     *("bench", "stability", "diet", "schema"),
 ]
 

@@ -145,8 +145,7 @@ def test_prose_draws_its_page(course: Course) -> None:
 @pytest.mark.parametrize(
     "edit",
     [
-        ("## First", "## First\n\n## Second"),
-        ("$x_2$", "$y$"),
+        ("[^n]: A note.", "[^n]: A note.\n\n## Second"),
         ("print(2)", "print(22)"),
         ("A note.", "Another note."),
         ("Remark", "Other"),
@@ -159,10 +158,53 @@ def test_what_only_the_page_shows_draws_only_the_page(
     assert drawn(course.folder) == {lesson("1.2")}
 
 
+@pytest.mark.parametrize(
+    "edit", [("$x_2$", "$y$"), ("$x_2$", '$x_2${symbol="place"}'), ("First", "Second")]
+)
+def test_a_symbol_draws_the_index_as_well(course: Course, edit: tuple[str, str]) -> None:
+    course.edit("1.2", *edit)
+    assert drawn(course.folder) == {lesson("1.2"), "symbols/index.html"}
+
+
+def test_a_link_draws_the_lesson_that_it_leads_to(course: Course) -> None:
+    course.edit("1.3", "Prose", "See [this](lesson:1.1). Prose")
+    assert drawn(course.folder) == {lesson("1.3"), lesson("1.1")}
+    course.edit("1.3", "See [this]", "Look at [this](lesson:1.1) or [that]")
+    assert drawn(course.folder) == {lesson("1.3")}, "who refers to it is as it was"
+    course.write("1.3", LESSON.format(n=3, next="2.1", script=NORUN.format(n=3)))
+    assert drawn(course.folder) == set(), "what was there before is known"
+
+
+def test_a_term_draws_the_glossary_and_who_uses_it(course: Course) -> None:
+    glossary = "glossary/index.html"
+    course.edit("1.1", "Prose", "A [thing]{term} is one.\n\nProse")
+    # The index of symbols leads to the glossary, which was not there.
+    assert drawn(course.folder) == {lesson("1.1"), glossary, "symbols/index.html"}
+    course.edit("1.2", "Prose", "See [it](term:thing). Prose")
+    assert drawn(course.folder) == {lesson("1.2"), glossary}
+    course.edit("1.1", "Prose", "Other prose")
+    assert drawn(course.folder) == {lesson("1.1")}
+    course.edit("1.1", "is one", "is none")
+    assert drawn(course.folder) == {lesson("1.1"), glossary}
+    course.edit("1.1", "[thing]{term}", "thing")
+    course.edit("1.3", "Prose", "A [thing]{term} is one.\n\nProse")
+    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2"), lesson("1.3"), glossary}
+
+
+def test_the_number_of_a_formula_draws_who_refers_to_it(course: Course) -> None:
+    course.edit("1.1", "= 1\n$$", "= 1\n$$ {#eq:one}")
+    course.edit("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose")
+    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2")}
+    course.edit("1.1", "Prose", "$$\nE = 1\n$$ {#eq:zero}\n\nProse")
+    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2")}
+    course.edit("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}")
+    assert drawn(course.folder) == {lesson("1.1")}
+
+
 def test_a_title_draws_all_that_name_it(course: Course) -> None:
     course.titles["1.2"] = "New title"
     course.save()
-    around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3")}
+    around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), "symbols/index.html"}
     # Lesson 2.1 needs it, which the level of that one says too.
     assert drawn(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
 
@@ -210,7 +252,16 @@ def test_the_name_of_the_course_draws_what_tells_it_and_frames_all(course: Cours
 def test_a_damaged_store_is_made_again(course: Course) -> None:
     assert course.folder.main("build", "--quiet").status == 0
     before = course.folder.tree("public")
-    for kind in ("outlines", "pages", "site", "mathml", "templates", "shared", "shared-data"):
+    for kind in (
+        "outlines",
+        "pages",
+        "site",
+        "mathml",
+        "templates",
+        "shared",
+        "shared-data",
+        "search",
+    ):
         for path in (course.folder.root / ".coursebuild" / kind).iterdir():
             path.write_bytes(path.read_bytes()[:-7] + b"garbage")
     course.edit("1.1", "Prose", "Pros")
@@ -286,6 +337,21 @@ def turn(course: Course, id: str, text: str) -> None:
     course.ids.reverse()
 
 
+def term(course: Course, id: str, text: str) -> None:
+    """A term is defined in a lesson, or no more; others link to the lesson where it was."""
+    path = course.folder.root / course.path(id)
+    name = f"[w{id}]{{term}}"
+    if name in path.read_text(encoding="utf-8"):
+        course.edit(id, name, f"[no term](lesson:{id})")
+    else:
+        course.edit(id, "Prose", f"A {name} is {text}: $q_{{{id}}}$. Prose")
+
+
+def label(course: Course, id: str, text: str) -> None:
+    """A formula gets a label, and is referred to, if it has none."""
+    course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
+
+
 def model(course: Course, id: str, text: str) -> None:
     course.folder.write("models/box.xml", f"<mujoco><!--{text.replace('-', '')}--></mujoco>\n")
 
@@ -304,7 +370,8 @@ def breakage(course: Course, id: str, text: str) -> None:
 
 
 EDITS: list[Callable[[Course, str, str], None]] = [
-    *(prose, heading, retitle, script, plan, remove, turn, model, page, picture, breakage)
+    *(prose, heading, retitle, script, plan, remove, turn, model, page, picture, breakage),
+    *(term, label),
 ]
 WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b>"]
 

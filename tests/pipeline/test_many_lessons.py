@@ -123,7 +123,7 @@ def test_outlines_come_from_one_file_and_from_many(tmp_path: Path, stores: Path)
             }
         return {path: data for path, data in clean.items() if made.get(path) != data}
 
-    marker = {".coursebuild-site"}
+    marker = {".coursebuild-site", "files.json"}
     shutil.rmtree(kept / "outlines")
     assert again().keys() == marker  # only what publishing adds
     assert not (kept / "outlines").exists(), "nothing was read again"

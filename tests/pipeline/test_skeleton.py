@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,15 @@ from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.outlines import Outline, packed, unpacked
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import PublishedLabs
-from coursebuild.render.library import Library, document_scripts, named_models, place
+from coursebuild.render.lexicon import lexicon
+from coursebuild.render.library import (
+    Library,
+    document_scripts,
+    lexicon_of,
+    named_models,
+    place,
+)
+from coursebuild.render.references import mentions
 from coursebuild.render.sheet import fingerprint
 from coursebuild.render.shown import shown
 from coursebuild.render.urls import Place
@@ -60,6 +69,9 @@ PARTS = [
     "## Heading {#here}\n\n",
     "# Top [a](lesson:1.2#there) $x$\n\n",
     "Prose with *[a link](lesson:1.2#here)*, ![p](p.png), <b id=b>html</b>, `12.5`{out} more.\n\n",
+    "The [thing]{term} is *a [b](lesson:1.1)*; see [it](term:thing), [no](term:nothing).\n\n",
+    "$$a$$ {#eq:a}\n\nBy [](#eq:a) and [](lesson:1.2#eq:a), $$b$$ [x](lesson:1.1#eq:gone).\n\n",
+    "## A [title]{term}\n\n> The [thing]{term=other} is\n>\n> $$c$$\n\n",
     "See lesson 1.2 and Level 1, [x](page:about#here) and [y](examples/a.py), [z](model:box).\n\n",
     "[^n] and [^n] again\n\n[^n]: A note: [l](#nowhere), $y$, `1.5`{out=examples/a.py}\n\n",
     '<div id="raw">\n<a href="#gone">x</a>\n</div>\n\n',
@@ -102,14 +114,13 @@ def document(path: str, text: str) -> Document:
 
 def again(document: Document) -> Document:
     """The skeleton as it comes from the store."""
-    found = unpacked(packed(Outline(skeleton(document), (), {}, True)), document.source)
+    bare = replace(skeleton(document), lexicon=lexicon(document, {}))
+    found = unpacked(packed(Outline(bare, (), {}, True)), document.source)
     assert found is not None
     return found.skeleton
 
 
 def with_documents(course: Course, documents: object) -> Course:
-    from dataclasses import replace
-
     given = list(documents)  # type: ignore[call-overload]
     lessons = tuple(
         replace(lesson, document=one)
@@ -138,6 +149,7 @@ def told(course: Course) -> list[object]:
         assets(),
         scripts_of=document_scripts,
         models_of=named_models,
+        mentions_of=lambda document: mentions(document, course, lexicon_of(document, {})),
         labs=PublishedLabs({}, ()),
         formulas={},
         verdicts={place(verdict.recording): verdict for verdict in verdicts},
@@ -152,7 +164,17 @@ def told(course: Course) -> list[object]:
         script_findings(course, extracted.value, runs, verdicts),
         check_output_lines(course, runs),
         [(n, [(u.owner.id, u.by_lab, u.by_script) for u in us]) for n, us in library.uses.items()],
+        said(library),
         [shown_or_not(library, here, document) for document in course.documents],
+    ]
+
+
+def said(library: Library) -> list[object]:
+    """What documents say of each other."""
+    found = library.references
+    return [
+        {id: [owner.id for owner in owners] for id, owners in found.referrers.items()},
+        [(t.term, t.owner.id, [owner.id for owner in t.used]) for t in found.terms.values()],
     ]
 
 

@@ -27,14 +27,16 @@ two
 """
 
 BAR = (
-    '<figure class="script" data-script="examples/a.py">\n'
-    '<figcaption class="bar"><span class="bar-name">examples/a.py</span>'
+    '<figure class="script" id="a.py" data-script="examples/a.py">\n'
+    '<figcaption class="bar"><span class="bar-name">examples/a.py '
+    '<a class="anchor" href="#a.py" aria-label="Link to this listing">#</a></span>'
     '<span class="bar-tools" data-copy><a href="../examples/a.py" download>Download</a></span>'
     "</figcaption>\n"
 )
 CODE = (
-    '<pre tabindex="0" role="group" aria-label="Script examples/a.py">'
-    '<code class="language-python">print(<span class="s">"&lt;one&gt;"</span>)\n</code></pre>\n'
+    '<pre data-first="1" tabindex="0" role="group" aria-label="Script examples/a.py">'
+    '<code class="language-python"><span id="a.L1">print(<span class="s">"&lt;one&gt;"</span>)'
+    "</span>\n</code></pre>\n"
 )
 RUN = (
     '<p class="run"><span class="run-label">Run it yourself</span> '
@@ -48,8 +50,9 @@ def receipt(html: str) -> str:
 
 def test_a_script_and_its_output_are_one_object(make: Make) -> None:
     assert make(SCRIPT + OUTPUT).html() == (
-        BAR + CODE + RUN + '<div class="output">\n'
-        '<p class="output-caption">Output, in order:</p>\n'
+        BAR + CODE + RUN + '<div class="output" id="a.out">\n'
+        '<p class="output-caption">Output, in order: '
+        '<a class="anchor" href="#a.out" aria-label="Link to this output">#</a></p>\n'
         '<pre tabindex="0" role="group" aria-label="Output of examples/a.py">'
         "<samp>one  &lt;1&gt;\ntwo\n</samp></pre>\n"
         '<p class="receipt verified">Verified with MuJoCo 3.14.0, Python 3.11.7: '
@@ -72,7 +75,7 @@ def test_an_output_apart_from_its_script_names_it(make: Make) -> None:
         '<figure class="script script-output" data-script="examples/a.py">\n'
         '<figcaption class="bar"><span class="bar-name">Output of examples/a.py</span>'
         "</figcaption>\n"
-        '<div class="output">\n'
+        '<div class="output" id="a.out">\n'
     ) in html
 
 
@@ -154,7 +157,8 @@ def test_arguments_and_requirements_stand_in_the_command_line(make: Make) -> Non
 
 def test_a_table_output_stays_a_table(make: Make) -> None:
     html = make(f"{SCRIPT}\nOutput:\n\n| a | b |\n| --- | ---: |\n| one | 1 |\n").html()
-    assert '<div class="output">\n<p class="output-caption">Output:</p>\n<div class="table"' in html
+    assert '<a class="anchor" href="#a.out"' in html
+    assert '>#</a></p>\n<div class="table"' in html
     assert '<td class="align-right">1</td>' in html
     assert "<samp>" not in html
 

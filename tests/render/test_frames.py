@@ -14,7 +14,18 @@ from coursebuild.render.frame import Frames, Names, frame_around
 from coursebuild.render.library import Library
 
 Make = Callable[..., Any]
-NAMES = Names("assets/s.css", "assets/t.js", "assets/p.js", "assets/i.svg", "assets/c.txt")
+NAMES = Names(
+    style="assets/s.css",
+    theme_script="assets/t.js",
+    script="assets/p.js",
+    icon="assets/i.svg",
+    credits="assets/c.txt",
+    touch_icon="assets/i.png",
+    offline_script="assets/o.js",
+    reader_script="assets/r.js",
+    quiz_script="assets/q.js",
+    search_script="assets/f.js",
+)
 HOSTILE = 'a "b" <c> & \x07 d\'s \ue000title\ue001 — é'
 
 

@@ -34,8 +34,14 @@ class Page(PlainContext):
     def url(self, url: str) -> str:
         return f"/files/{url}"
 
-    def math(self, tex: str, display: bool) -> Markup:
-        return Markup("<math{}>{}</math>").format(Markup(" display") if display else "", tex)
+    def math(self, tex: str) -> Markup:
+        return Markup("<math>{}</math>").format(tex)
+
+    def display(self, tex: str, start: int) -> Markup:
+        return Markup("<math display>{}</math>").format(tex)
+
+    def reference(self, target: Target) -> str:
+        return "<ref>"
 
     def code(self, language: str, text: str) -> Markup:
         return Markup("<x-code lang='{}'>{}</x-code>\n").format(language, text)

@@ -11,6 +11,7 @@ import pytest
 
 from coursebuild.render.quizzes import letter, shuffle, unit_html
 from coursebuild.results import Outcome, ScriptRun
+from coursebuild.syntax.question_keys import text_key
 
 Make = Callable[..., Any]
 
@@ -27,22 +28,36 @@ def test_multiple_choice(make: Make) -> None:
         "kind": "mcq", "q": "Which *one*?", "options": ["A < B", "$x$"], "answer": 1,
         "explain": "<p>Because.</p>", "feedback": ["No.", "Yes."], "hints": ["Look."],
     }  # fmt: skip
+    key, a, b = text_key("mcq", "Which *one*?"), *(text_key("option", o) for o in ("A < B", "$x$"))
     assert make(quiz(question)).html() == (
         '<section class="quiz" id="0.1-check" data-quiz="0.1-check" aria-label="Check">\n'
         '<p class="quiz-title">Check</p>\n<ol class="questions">\n'
-        '<li class="question" data-question="1" data-kind="mcq">\n'
-        "<p>Which <em>one</em>?</p>\n"
-        '<ol class="options">\n<li>A &lt; B</li>\n'
-        '<li><math class="inline"><mi>x</mi></math></li>\n</ol>\n'
+        f'<li class="question" id="0.1-check.{key}" data-question="{key}" data-number="1"'
+        f' data-kind="mcq" data-answer="{b}">\n'
+        '<div class="question-text">\n<p>Which <em>one</em>?</p>\n</div>\n'
+        f'<ol class="options">\n<li data-key="{a}">A &lt; B</li>\n'
+        f'<li data-key="{b}"><math class="inline"><mi>x</mi></math></li>\n</ol>\n'
         '<details class="hint">\n<summary>Hint 1</summary>\n<p>Look.</p>\n</details>\n'
-        '<details class="answer">\n<summary>Answer</summary>\n'
-        '<p class="key"><strong>B.</strong> <math class="inline"><mi>x</mi></math></p>\n'
-        "<p>Because.</p>\n"
-        '<div class="feedback">\n<p class="feedback-label">If you chose A</p>\n<p>No.</p>\n'
-        '</div>\n<div class="feedback">\n<p class="feedback-label">If you chose B</p>\n'
-        "<p>Yes.</p>\n</div>\n"
+        '<details class="answer">\n<summary>Answer</summary>\n<div class="solution">\n'
+        '<p class="key"><strong>B.</strong> <math class="inline"><mi>x</mi></math></p>\n</div>\n'
+        '<div class="explain">\n<p>Because.</p>\n</div>\n'
+        f'<div class="feedback" data-key="{a}">\n<p class="feedback-label">If you chose A</p>\n'
+        f'<p>No.</p>\n</div>\n<div class="feedback" data-key="{b}">\n'
+        '<p class="feedback-label">If you chose B</p>\n<p>Yes.</p>\n</div>\n'
         "</details>\n</li>\n</ol>\n</section>\n"
     )  # fmt: skip
+
+
+def test_a_question_goes_by_its_id(make: Make) -> None:
+    question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
+    html = make(quiz(question)).html()
+    assert 'id="0.1-check.why" data-question="why" data-number="1" data-kind="open">' in html
+
+
+def test_a_link_to_a_question(make: Make) -> None:
+    question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
+    html = make("See [it](#0.1-check.why).\n\n" + quiz(question)).html()
+    assert '<a href="#0.1-check.why">it</a>' in html
 
 
 def test_choose_all(make: Make) -> None:
@@ -58,7 +73,9 @@ def test_numbers_have_unit_and_tolerance(make: Make) -> None:
     question = {"kind": "numeric", "q": "How much?", "answer": 0.08, "tol": 0.0001,
                 "unit": "kg m^2", "explain": "So."}  # fmt: skip
     html = make(quiz(question)).html()
-    assert '<p class="question-how">Give the answer in kg m<sup>2</sup></p>' in html
+    assert 'data-answer="0.08" data-tolerance="0.0001" data-unit="kg m^2">' in html
+    how = 'Give the answer in <span class="unit">kg m<sup>2</sup></span>'
+    assert f'<p class="question-how">{how}</p>' in html
     assert (
         '<p class="key"><strong>0.08 kg m<sup>2</sup></strong> '
         '<span class="tolerance">within 0.0001 kg m<sup>2</sup></span></p>'
@@ -90,13 +107,39 @@ def test_the_key_of_an_output_question_is_what_the_script_printed(make: Make) ->
     html = make(output_question(2)).html()
     assert "What does examples/a.py print in line 2 of its output?" in html
     assert "<samp>two</samp></pre>" in html
+    assert 'data-answer="two" data-compare="digits">' in html
+
+
+@pytest.mark.parametrize(
+    ("how", "rule"),
+    [
+        ("exact", "exact"),
+        ("digits", "digits"),
+        ("rtol=1e-6 atol=1e-12", "rtol=1e-06 atol=1e-12"),
+        ("volatile", "digits"),
+    ],
+)
+def test_an_output_question_is_graded_as_its_recording_is_compared(
+    make: Make, how: str, rule: str
+) -> None:
+    recorded = f"Output:\n\n```text {how}\none\ntwo\n```\n\n"
+    html = make(output_question(2).replace("```quiz", f"{recorded}```quiz")).html()
+    assert f'data-answer="two" data-compare="{rule}">' in html
+
+
+def test_what_a_script_prints_stays_inside_its_attribute(make: Make) -> None:
+    line = '"><script>alert(1)</script> &amp; \u202e'
+    run = ScriptRun("examples/a.py", Outcome.OK, 0, f"one\n{line}\n", "", 0.0)
+    html = make(output_question(2), runs={"examples/a.py": run}).html()
+    assert "<script>" not in html
+    assert 'data-answer="&#34;&gt;&lt;script&gt;alert(1)&lt;/script&gt; &amp;amp; ' in html
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SKIPPED, Outcome.FAILED])
 def test_without_a_run_there_is_no_key(make: Make, outcome: Outcome) -> None:
     run = ScriptRun("examples/a.py", outcome, 1, "one\ntwo\n", "", 0.0)
     html = make(output_question(2), runs={"examples/a.py": run}).html()
-    assert "<samp>" not in html
+    assert "<samp>" not in html and "data-answer" not in html
     assert "The answer is not known" in html
 
 
@@ -105,7 +148,10 @@ def test_items_are_shown_shuffled_and_solved_in_order(make: Make) -> None:
     html = make(quiz({"kind": "order", "q": "Sort.", "items": items, "explain": "E."})).html()
     shown, solved = html.split("The right order")
     assert re.findall(r"<li>(\w+)</li>", solved) == items
-    mixed = re.findall(r"<li>(\w+)</li>", shown)
+    assert f'data-answer="{" ".join(text_key("item", item) for item in items)}"' in html
+    keyed = re.findall(r'<li data-key="(\w+)">(\w+)</li>', shown)
+    assert all(key == text_key("item", item) for key, item in keyed)
+    mixed = [item for _, item in keyed]
     assert sorted(mixed) == sorted(items) != mixed or mixed != items
     assert mixed != items
 
@@ -114,6 +160,27 @@ def test_a_title_that_a_heading_says_is_not_said_twice(make: Make) -> None:
     question = {"kind": "open", "q": "Why?", "reference": "So."}
     html = make("## Check\n\n" + quiz(question)).html()
     assert 'aria-label="Check">\n<ol class="questions">' in html
+
+
+def test_a_heading_that_has_the_quizs_id_keeps_it(make: Make) -> None:
+    question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
+    html = make("## Check\n\nSee [it](#check).\n\n" + quiz(question, id="check")).html()
+    assert html.count('id="check"') == 1
+    assert '<section class="quiz" data-quiz="check"' in html
+    assert 'id="check.why"' in html
+
+
+def test_a_quiz_without_a_title_has_a_name_all_the_same(make: Make) -> None:
+    html = make(quiz({"kind": "open", "q": "Why?", "reference": "So."}, title="")).html()
+    assert 'aria-label="Questions">\n<ol class="questions">' in html
+
+
+def test_a_prediction_of_several(make: Make) -> None:
+    question = {"kind": "predict", "q": "Q", "options": ["a", "b", "c"], "answer": [0, 2]}
+    html = make(quiz(question)).html()
+    keys = " ".join(text_key("option", option) for option in ("a", "c"))
+    assert f'data-kind="predict" data-answer="{keys}" data-several>' in html
+    assert "Decide first, then open. Choose all that are right." in html
 
 
 def test_questions_work_without_any_form_control(make: Make) -> None:

@@ -24,6 +24,7 @@ from coursebuild.effects.store import Store
 from coursebuild.pipeline.build import build
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.packages import export
 from coursebuild.pipeline.update import update
 from coursebuild.report import Style, diagnostic_text
 from coursebuild.report.catalogue import Example, ExampleFile, catalogue_page
@@ -76,6 +77,8 @@ def told_by(case: Case, root: Path) -> str:
             report = update(options)
         case "build":
             report = build(options, Path("public"))
+        case "export qti":
+            report = export(options, "qti", Path("quizzes.zip"))
         case other:
             raise ValueError(f"no command {other!r}")
     text = "\n\n".join(diagnostic_text(d, Style()) for d in report.diagnostics)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, field
 
@@ -189,7 +190,6 @@ def test_an_escaped_text_points_into_the_lesson() -> None:
     assert [(d.rule, d.span.text, d.span.line, d.span.column) for d in parsed.diagnostics] == [
         ("math-syntax", "BAD", 4, 34)
     ]
-    assert parsed.value is None
 
 
 QUESTION = '{"id": "x", "questions": [\n%s]}'
@@ -281,11 +281,21 @@ MCQ = '{"kind": "mcq", "q": "Q", "options": ["a", "b"], %s}'
          "4:74-75 field-missing: `model` or `xml` is missing"),
         (QUESTION % '{"kind": "open", "q": "Q", "q": "P", "reference": "R"}',
          "4:28-31 field-repeated: `q` is given twice"),
+        # ids of questions
+        (QUESTION % '{"kind": "open", "id": "Why", "q": "Q", "reference": "R"}',
+         "4:24-29 field-value: `id` cannot be `Why`"
+         " [expected: lower-case letters, digits and `-`, with a letter or digit first]"),
+        (QUESTION % '{"kind": "open", "id": 1, "q": "Q", "reference": "R"}',
+         "4:24-25 field-type: `id` must be a string, not the number 1"
+         ' [put it between quotes: `"1"`]'),
+        (QUESTION % '{"kind": "open", "id": "a", "q": "Q", "reference": "R"},'
+         '\n{"kind": "order", "id": "a", "q": "P", "items": ["b", "c"]}',
+         "5:25-28 question-id-repeated: the question id `a` is used twice in this quiz"
+         " [a learner's answer hangs on it; give each question its own, or none]"),
     ],
 )  # fmt: skip
 def test_what_an_author_is_told(body: str, expected: str) -> None:
     assert told(body) == [expected]
-    assert parse(body).value is None
 
 
 def test_everything_wrong_is_told_in_one_run_in_order() -> None:
@@ -312,6 +322,70 @@ def test_everything_wrong_is_told_in_one_run_in_order() -> None:
         "10:43-45 json-syntax: `01` is not a number of JSON",
         "10:45-46 json-syntax: a comma before `}`",
     ]
+
+
+def keys(*questions: str) -> list[str]:
+    quiz = parse('{"id": "x", "questions": [' + ",".join(questions) + "]}").value
+    assert quiz is not None
+    assert quiz.keys == tuple(question.key for question in quiz.questions)
+    return list(quiz.keys)
+
+
+WHY = '{"kind": "open", "q": "Why is it?", "reference": "R"}'
+
+
+def test_the_key_of_a_question_is_its_id_or_comes_from_its_kind_and_text() -> None:
+    hashed = hashlib.sha256(b"open\nWhy is it?").hexdigest()[:8]
+    assert keys(WHY) == [hashed]
+    assert keys(WHY.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [hashed]
+    assert keys(WHY.replace('"open"', '"open", "id": "own"')) == ["own"]
+    assert keys(WHY.replace("Why", "How")) != [hashed]
+    output = WHY.replace("open", "output").replace('"reference": "R"', '"of": "a.py", "line": 1')
+    assert keys(output) != [hashed]
+    # Others of the quiz are no matter, wherever they stand.
+    assert keys(MCQ % '"answer": 0', WHY)[1] == keys(WHY, MCQ % '"answer": 1')[0] == hashed
+
+
+def test_keys_of_a_quiz_are_never_the_same() -> None:
+    hashed = keys(WHY)[0]
+    taken = WHY.replace('"open"', f'"open", "id": "{hashed}-2"')
+    assert keys(WHY, WHY, WHY, taken) == [hashed, f"{hashed}-3", f"{hashed}-4", f"{hashed}-2"]
+
+
+def test_options_and_items_have_keys_of_their_texts_alone() -> None:
+    def options(*texts: str) -> tuple[str, ...]:
+        listed = json.dumps(texts)
+        one = f'{{"kind": "mcq", "q": "Q", "options": {listed}, "answer": 0}}'
+        two = f'{{"kind": "order", "q": "Q", "items": {listed}}}'
+        quiz = parse('{"id": "x", "questions": [' + one + "," + two + "]}").value
+        assert quiz is not None
+        choice, order = quiz.questions
+        assert isinstance(choice, ChoiceQuestion) and isinstance(order, OrderQuestion)
+        keys = [option.key for option in choice.options]
+        assert len({*keys, *order.item_keys}) == 2 * len(texts)
+        return (*keys, *order.item_keys)
+
+    a, b, c, *items = options("a", "b  c", "$d$")
+    assert options("$d$", "b c", "a") == (c, b, a, items[2], items[1], items[0])
+    assert options("b c", "b  c")[:2] == (b, f"{b}-2")
+
+
+def test_a_quiz_with_mistakes_is_there_with_its_right_questions() -> None:
+    body = (
+        '{"id": "x", "questions": [\n'
+        '{"kind": "output", "q": "Q", "of": "examples/a.py", "line": 1, "tol": 1},\n'
+        '{"kind": "open", "q": "Q"},\n'
+        '{"kind": "predict", "q": "Q", "options": ["a", "b"], "answer": 0,\n'
+        ' "sim": {"model": "m", "note": "BAD"}}]}'
+    )
+    parsed = parse(body)
+    assert [d.rule for d in parsed.diagnostics] == ["field-unknown", "field-missing", "math-syntax"]
+    assert parsed.value is not None
+    output, predict = parsed.value.questions
+    assert isinstance(output, OutputQuestion) and output.script == "examples/a.py"
+    assert isinstance(predict, ChoiceQuestion) and predict.sim is None
+    nameless = parse(body.replace('"id": "x"', '"id": "my quiz"')).value
+    assert nameless is not None and (nameless.id, len(nameless.questions)) == ("", 2)
 
 
 def test_in_a_lesson() -> None:
@@ -348,7 +422,7 @@ def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
     mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 12)) :]
     span, body = fence(mutated.replace("\r", ""))
     parsed = parse_quiz(span, body, Plain())
-    assert (parsed.value is None) == bool(parsed.diagnostics)
+    assert parsed.value is not None or parsed.diagnostics
     orders = [d.order for d in parsed.diagnostics]
     assert orders == sorted(orders)
     assert all(span.contains(d.span) for d in parsed.diagnostics)
@@ -375,8 +449,9 @@ FIELDS = st.sampled_from(
 def test_any_question_becomes_one_or_is_told_why_not(kind: str, fields: dict[str, object]) -> None:
     body = json.dumps({"id": "x", "questions": [{"kind": kind, "q": "Q", **fields}]}, indent=1)
     parsed = parse(body)
-    assert (parsed.value is None) == bool(parsed.diagnostics)
-    if parsed.value is not None:
+    assert parsed.value is not None
+    assert parsed.diagnostics or len(parsed.value.questions) == 1
+    if not parsed.diagnostics:
         question = parsed.value.questions[0]
         if isinstance(question, ChoiceQuestion):
             assert all(0 <= index < len(question.options) for index in question.answers)

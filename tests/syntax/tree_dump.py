@@ -9,7 +9,16 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.model import Block, Comparison, Document, Inline, ListItem, Table
+from coursebuild.model import (
+    Block,
+    Comparison,
+    Document,
+    Inline,
+    Label,
+    ListItem,
+    Meaning,
+    Table,
+)
 from coursebuild.source import Excerpt, Span
 
 HIDDEN = {"span", "children", "blocks", "items", "header", "rows"}
@@ -73,6 +82,10 @@ def _value(name: str, value: object) -> str:
         return f"{name}={where(value)}"
     if isinstance(value, Excerpt):
         return f"{name}={where(value.span())} {value.text!r}"
+    if isinstance(value, Label):
+        return f"label={where(value.span)} {value.id!r}"
+    if isinstance(value, Meaning):
+        return f"meaning={where(value.span)} {value.text!r} {value.unit!r}"
     if isinstance(value, Comparison):
         tolerances = f" rtol={value.rtol} atol={value.atol}" if value.mode.value == "rtol" else ""
         return f"[{value.mode.value}{tolerances}{' ellipsis' if value.ellipsis else ''}]"

@@ -28,6 +28,8 @@ from coursebuild.model import Course, Document, Lesson
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.preview.differences import (
+    changed_questions,
+    changed_references,
     changed_runs,
     has_errors,
     offered,
@@ -44,6 +46,7 @@ from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library, Owner, owners
+from coursebuild.render.own_pages import own_pages
 from coursebuild.results import CompileResult, LabResult
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
@@ -71,8 +74,8 @@ class Plan:
     """Pages, and their finished texts."""
     names: Names | None
     """Of the shared files that these texts name."""
-    stale: frozenset[str]
-    """Pages that show something of it as well."""
+    stale: frozenset[str] | None
+    """Pages that show something of it as well; `None` for all."""
     documents: Mapping[str, Document]
     """Those that changed, by path."""
 
@@ -222,7 +225,7 @@ class LiveCourse:
                 page = draw(self.pages.painter(self._sites[path]), library)
                 drawn[self._sites[path]] = page, self.pages.framed(page, library)
         pairs = [(self._document(path), document) for path, document in documents.items()]
-        stale = frozenset(self._stale(pairs, course, library))
+        stale = self._stale(pairs, course, library)
         told = {path: tuple(diagnostics) for path, diagnostics in found.items()}
         names = self.pages.names
         return Plan(self.edits, course, library, known, told, drawn, names, stale, documents)
@@ -371,8 +374,8 @@ class LiveCourse:
 
     def _stale(
         self, changed: Iterable[tuple[Document, Document]], new: Course, library: Library
-    ) -> set[str]:
-        """The pages that other documents, in the same map, make stale."""
+    ) -> frozenset[str] | None:
+        """The pages that other documents, in the same map, make stale; `None` for all."""
         stale: set[str] = set()
         for before, document in changed:
             site = self._sites[document.source.path]
@@ -382,7 +385,11 @@ class LiveCourse:
             stale |= self._leaning(new, changed_runs(drawn_from.runs, library.runs))
             if len(drawn_from.scripts) != len(library.scripts):
                 stale.add(urls.HOME)  # it says how many there are
-        return stale
+            if own_pages(drawn_from) != own_pages(library):
+                return None  # every page lists them
+            stale |= changed_references(drawn_from, library)
+            stale |= changed_questions(drawn_from, library)
+        return frozenset(stale)
 
     def _models_of_both(self, old: Document, new: Document) -> Iterable[str]:
         """The pages of models that a document names or named, where that changed."""

@@ -24,11 +24,17 @@ from coursebuild.effects.read import read_bytes
 from coursebuild.model import Course, Document, MjcfModel
 from coursebuild.render import fonts, lesson, meta, pages, urls, zips
 from coursebuild.render.assets import Assets
+from coursebuild.render.characters import visible
+from coursebuild.render.exports.files import Around, Exports, OnDemand
 from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render.glossary import glossary_draft
 from coursebuild.render.library import Library, owners
+from coursebuild.render.offline import offline_draft, offline_files
+from coursebuild.render.reader import progress_draft, review_draft
 from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
 from coursebuild.render.site import all_facts
-from coursebuild.results import OutputFile
+from coursebuild.render.symbol_index import symbols_draft
+from coursebuild.results import OutputFile, SiteFile
 from coursebuild.values import dataclass
 
 Painter: TypeAlias = Callable[[Library], Draft]
@@ -63,11 +69,19 @@ def painters(library: Library, whole: Callable[[Document], Document]) -> dict[st
         found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id, whole)
     for model in course.models:
         found[urls.model_page_path(model.name)] = functools.partial(_model, model)
+    if library.references.terms:
+        found[urls.GLOSSARY] = glossary_draft
+    if library.references.symbols:
+        found[urls.SYMBOLS] = symbols_draft
     if library.reports.cases:
         found[urls.NUMERICS] = pages.numerics_draft
     for page in course.pages:
         if page.document is not None:
             found[urls.page_path(page)] = functools.partial(_page, page.id, whole)
+    found[urls.PROGRESS] = progress_draft
+    if library.asked:
+        found[urls.REVIEW] = review_draft
+    found[urls.OFFLINE] = offline_draft
     found[urls.NOT_FOUND] = pages.not_found_draft
     return found
 
@@ -206,9 +220,50 @@ class Pages:
             yield urls.file_path(path), functools.partial(read_bytes, self._root, path)
         for file in library.labs.files:
             yield file.path, functools.partial(_data, file)
+        for file in offline_files(course, self._assets):
+            if file.path != urls.WORKER:  # a preview is shown by nothing but its server
+                yield file.path, functools.partial(_data, file)
+        for kept in self._exports(library):
+            yield kept.path, functools.partial(self._exported, kept.path)
         yield urls.ROBOTS, functools.partial(meta.robots, course)
         if course.base_url:
             yield urls.SITEMAP, self._sitemap
+
+    def _exports(self, library: Library) -> Iterator[SiteFile]:
+        """What the site gives away besides its pages."""
+        assert self._names is not None, "there are shared files since the course was first read"
+        around, course = self._around(library.course), library.course
+        pictures = {file.path: file.data for file in library.labs.files}
+        files = {urls.file_path(path): path for path in course.files}
+
+        def picture(path: str) -> bytes:
+            return pictures[path] if path in pictures else read_bytes(self._root, files[path])
+
+        surroundings = Around(
+            style=self._assets.template("exports/epub.css"),
+            picture=picture,
+            pictures="",
+            archives=zips.lesson_archives(library, around),
+            imports=around.imports,
+            declarations=frozenset[str]().union(*(f.declarations for f in self._facts.values())),
+            taken=frozenset(files),
+        )
+        source = OnDemand(library, tuple(self._painters), self._body, self._whole)
+        return Exports(library, source, surroundings).files(self._names)
+
+    def _exported(self, path: str) -> bytes:
+        """One of these files, as everything is now."""
+        library = self._library
+        assert library is not None
+        if path == urls.EPUB:  # which has the styles of all pages
+            for page in self.unnoted():
+                self.look_at(page)
+        file = next(file for file in self._exports(library) if file.path == path)
+        return file.data if isinstance(file, OutputFile) else file.make()
+
+    def _body(self, path: str) -> str:
+        drawn = self._page(path)
+        return "" if drawn is None else visible(str(drawn.draft.body))
 
     def _around(self, course: Course) -> zips.Surroundings:
         return self._surroundings(course)

@@ -19,6 +19,7 @@ from coursebuild.model import (
     Document,
     Lab,
     Lesson,
+    Lexicon,
     Mjcf,
     OutputQuestion,
     Page,
@@ -28,19 +29,24 @@ from coursebuild.model import (
     document_blocks,
 )
 from coursebuild.pipeline.preview.memo import PerDocument
+from coursebuild.render.asked import asked
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import LabFiles, PublishedLabs, lab_files
+from coursebuild.render.lexicon import misdeclared
 from coursebuild.render.library import (
     Library,
     NamedModels,
     Owner,
     course_scripts,
     document_scripts,
+    lexicon_of,
     named_models,
     owners,
     place,
+    references_of,
     uses_of,
 )
+from coursebuild.render.references import Mentions, mentions
 from coursebuild.results import (
     CompileResult,
     Formula,
@@ -94,6 +100,8 @@ class Parts:
         self.has_models = PerDocument(_has_models)
         """Whether MJCF stands in a document."""
         self._formulas_of = PerDocument(document_formulas)
+        self._lexicon_of = PerDocument(self._lexicon)
+        self._asked_of = PerDocument(asked)
         self.models_of = PerDocument(named_models)
         """The models that a document names."""
         self.leans_on = PerDocument(_leans_on)
@@ -113,6 +121,8 @@ class Parts:
             self._assets,
             scripts_of=self._scripts_of,
             models_of=self.models_of,
+            mentions_of=lambda document: self.mentions(document, course),
+            asked_of=self._asked_of,
             labs=self._labs(course),
             formulas=self._formulas,
             verdicts={place(v.recording): v for v in self.verdicts(course, runs)},
@@ -161,6 +171,14 @@ class Parts:
         uses = library.uses
         if any(self._named(one) != self._named(two) for one, two in zip(old, fresh, strict=True)):
             uses = uses_of(course, self.models_of)
+        references = library.references
+        pairs = zip(old, fresh, strict=True)
+        if any(self._said(a, course) != self._said(b, course) for a, b in pairs):
+            references = references_of(course, lambda document: self.mentions(document, course))
+        questions = library.asked
+        if any(self._asks(one) != self._asks(two) for one, two in zip(old, fresh, strict=True)):
+            now = {owner.path: self._asks(owner) for owner in fresh}
+            questions = {path: text for path, text in {**questions, **now}.items() if text}
         lessons = {o.id: o for o in fresh if isinstance(o, Lesson)}
         levels = {o.level for o in lessons.values()}
         return replace(
@@ -174,12 +192,29 @@ class Parts:
             scripts=scripts,
             runs=runs,
             uses=uses,
+            references=references,
+            asked=questions,
             labs=self._labs(course) if any(map(self._has_labs, (*old, *fresh))) else library.labs,
             verdicts=verdicts,
         )
 
     def _scripts(self, owner: Owner) -> tuple[Script, ...]:
         return () if owner.document is None else self._scripts_of(owner.document)
+
+    def mentions(self, document: Document, course: Course) -> Mentions:
+        """What a document says of others."""
+        return mentions(document, course, self._lexicon_of(document))
+
+    def _lexicon(self, document: Document) -> Lexicon:
+        if document.lexicon is None:
+            self.typeset([document])
+        return lexicon_of(document, self._formulas)
+
+    def _said(self, owner: Owner, course: Course) -> Mentions | None:
+        return None if owner.document is None else self.mentions(owner.document, course)
+
+    def _asks(self, owner: Owner) -> str:
+        return "" if owner.document is None else self._asked_of(owner.document)
 
     def _named(self, owner: Owner) -> NamedModels | None:
         return None if owner.document is None else self.models_of(owner.document)
@@ -272,11 +307,12 @@ class Parts:
 
     def formula_mistakes(self, document: Document) -> tuple[Diagnostic, ...]:
         """The formulas of a document that do not parse, of those that were typeset."""
+        told = misdeclared(document, self._formulas)
         if not self._wrong or self._wrong.isdisjoint(self._formulas_of(document)):
-            return ()
+            return told
         made = {f: self._formulas[f] for f in self._formulas_of(document) if f in self._formulas}
         missing = {f: "" for f in self._formulas_of(document) if f not in made}
-        return formula_findings(document, made | missing)
+        return (*formula_findings(document, made | missing), *told)
 
     def forget_formulas(self, course: Course) -> None:
         """Let go of formulas that were written and taken back."""

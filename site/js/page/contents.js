@@ -1,4 +1,4 @@
-/** Marks the section that is being read in the contents list, and opens the list where there is room for it. */
+/** Marks the section that is being read in the contents list, and keeps it in sight in a long one. */
 
 /** The index of the last heading at or above `line` (px from the top of the window); -1 above the first. */
 export function currentHeading(tops, line) {
@@ -10,6 +10,19 @@ export function currentHeading(tops, line) {
     else high = middle
   }
   return low - 1
+}
+
+/**
+ * How far a list that scrolls must move so that an entry is in sight, with room for one more on either side.
+ * @param {{top: number, bottom: number}} list its edges, in px
+ * @param {{top: number, bottom: number}} entry
+ * @returns {number} px; 0 where the entry is in sight
+ */
+export function listMove(list, entry) {
+  const room = Math.min(entry.bottom - entry.top, (list.bottom - list.top - entry.bottom + entry.top) / 2)
+  if (entry.top < list.top + room) return entry.top - list.top - room
+  if (entry.bottom > list.bottom - room) return entry.bottom - list.bottom + room
+  return 0
 }
 
 /** Gives a function that ends it. */
@@ -31,6 +44,7 @@ export function followContents(document) {
     marked?.removeAttribute('aria-current')
     link?.setAttribute('aria-current', 'location')
     marked = link
+    if (link) keepInSight(link)
   }
   const later = () => {
     if (!waiting) requestAnimationFrame(mark)
@@ -44,6 +58,13 @@ export function followContents(document) {
     ended.abort()
     marked?.removeAttribute('aria-current')
   }
+}
+
+/** Scrolls a long list to its entry, but not away from somebody who goes through it by the keyboard. */
+function keepInSight(link) {
+  const list = link.closest('.toc')
+  if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
+  list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
 }
 
 /** At the end of a page the last heading in sight counts, however low it stands. */

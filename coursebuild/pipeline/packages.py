@@ -1,0 +1,214 @@
+"""`coursebuild export`: the course, or its quizzes, as an archive for learning platforms.
+
+Entry point: `export(options, kind, out)`.
+
+The course is verified as for a build, and nothing is written where something is wrong.
+
+- `scorm`: the files of the site, a page that opens each lesson, and a manifest.
+- `qti`: the items of the quizzes of each document, kept under the key of its page, and a manifest.
+
+Of a file no more is held than how it is made: archives are written one file after the other.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Literal, TypeAlias, assert_never
+
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.archives import check_archive, write_archive
+from coursebuild.effects.aside import Aside, Kept
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.locks import project_lock
+from coursebuild.effects.read import read_bytes
+from coursebuild.effects.resources import Bundle, template_texts
+from coursebuild.measured.shown import Reports
+from coursebuild.model import Block, Course, Quiz, document_blocks
+from coursebuild.pipeline.build import prepare
+from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.outlines import unpack
+from coursebuild.pipeline.pages import page_key
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reading import drawing_tools
+from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
+from coursebuild.pipeline.site import Site, library_of, site_files
+from coursebuild.render import lesson, pages, urls
+from coursebuild.render.assets import Assets
+from coursebuild.render.library import Library
+from coursebuild.render.packages import qti, scorm
+from coursebuild.render.packages.items import Loss, MadeQuiz
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.tools import Tools
+from coursebuild.report import Report
+from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
+from coursebuild.source import Source
+from coursebuild.values import dataclass, replace
+
+Kind: TypeAlias = Literal["qti", "scorm"]
+NAMES: dict[Kind, str] = {"qti": "quizzes-qti.zip", "scorm": "course-scorm.zip"}
+"""What an archive is called where nothing is said."""
+
+
+def export(options: Options, kind: Kind, out: Path) -> Report:
+    """Write the archive to `out` (relative to the course's folder), or nothing."""
+    progress = Progress(quiet=options.quiet)
+    place = options.root / out
+    check_archive(options.root, place, qti.MANIFEST)
+    make = functools.partial(_packed, kind)
+    with project_lock(options.root, progress.say), prepare(options, progress, make) as prepared:
+        if not prepared.report.ok:
+            return replace(prepared.report, remarks=("nothing was written",))
+        if not prepared.files:
+            raise EffectError("the course has no quiz with a question, so there is no QTI package")
+        with progress.stage("packing"):
+            size = write_archive(place, prepared.files)
+    said = f"wrote {len(prepared.files)} files to {out}, {size / 1e6:.1f} MB"
+    return replace(prepared.report, remarks=(said,), depends=None)
+
+
+def _packed(
+    kind: Kind,
+    course: Course,
+    results: Results,
+    documents: Documents,
+    options: Options,
+    reports: Reports,
+) -> Site:
+    """The files of a package, as the files of a site."""
+    assets = Assets(template_texts(), Bundle())
+    match kind:
+        case "scorm":
+            site = site_files(course, results, documents, options, reports)
+            tools = drawing_tools(options.store, course.language)
+            return replace(site, files=tuple(_scorm(course, tools, assets, site)), listed=None)
+        case "qti":
+            library = library_of(course, results, assets, options.store, reports)
+            items = _Items(library, documents, options)
+            return Site(tuple(items.files()), None, tuple(items.diagnostics), ())
+        case _:
+            assert_never(kind)
+
+
+# ---------------------------------------------------------------------------------------- SCORM
+
+
+def _scorm(course: Course, tools: Tools, assets: Assets, site: Site) -> Iterator[SiteFile]:
+    packed = [file for file in site.files if scorm.is_packed(file.path)]
+    shared = tuple(scorm.shared_files(assets))
+    yield from packed
+    yield from shared
+    for entry in scorm.written(course):
+        make = functools.partial(scorm.launch_page, course, entry, tools)
+        yield KeptFile(scorm.launch_path(entry), "", make)
+    yield scorm.manifest(course, sorted(file.path for file in (*packed, *shared)))
+
+
+# ------------------------------------------------------------------------------------------ QTI
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A document with quizzes."""
+
+    source: Source
+    key: str
+    sheet: Callable[[], Sheet]
+
+
+class _Items:
+    """The items of all quizzes: bytes of each document, put aside until they are written."""
+
+    def __init__(self, library: Library, documents: Documents, options: Options) -> None:
+        self._library = library
+        self._documents = documents
+        self._options = options
+        self._aside = documents.aside or Aside(options.store.folder)
+        self._last: tuple[Kept, tuple[MadeQuiz, ...]] | None = None
+        self.diagnostics: list[Diagnostic] = []
+
+    def files(self) -> Iterator[SiteFile]:
+        """The files of the package; none where there is no item."""
+        listed: list[MadeQuiz] = []
+        pictures: set[str] = set()
+        for asked, data in self._made(list(self._asked())):
+            kept = self._aside.put(data)
+            for quiz in self._unpacked(data, asked.source):
+                self.diagnostics += (_reduced(loss) for loss in quiz.losses)
+                if quiz.items:
+                    paths = [file.path for file in qti.quiz_files(quiz)]
+                    yield from (self._later(asked, kept, path) for path in paths)
+                    pictures.update(path for item in quiz.items for path in item.pictures)
+                    listed.append(qti.without_bytes(quiz))
+        if listed:
+            yield from self._pictures(pictures)
+            yield qti.style_file()
+            yield qti.manifest(self._library.course, listed)
+
+    def _later(self, asked: _Asked, kept: Kept, path: str) -> KeptFile:
+        return KeptFile(path, asked.key, functools.partial(self._file, asked.source, kept, path))
+
+    def _file(self, source: Source, kept: Kept, path: str) -> bytes:
+        if self._last is None or self._last[0] is not kept:
+            self._last = kept, self._unpacked(kept(), source)
+        files = (file for quiz in self._last[1] for file in qti.quiz_files(quiz))
+        return next(file.data for file in files if file.path == path)
+
+    def _pictures(self, found: set[str]) -> Iterator[SiteFile]:
+        for path in self._library.course.files:
+            place = urls.file_path(path)
+            if place in found:
+                yield OutputFile(place, read_bytes(self._options.root, path))
+
+    def _unpacked(self, data: bytes, source: Source) -> tuple[MadeQuiz, ...]:
+        found = unpack(data, source)
+        assert isinstance(found, tuple)
+        return found
+
+    def _asked(self) -> Iterator[_Asked]:
+        """The documents that have quizzes."""
+        library = self._library
+        for entry in library.course.lessons:
+            if entry.document is not None and any(map(_is_quiz, document_blocks(entry.document))):
+                make = functools.partial(lesson.lesson_sheet, library, entry, entry.document)
+                yield self._document(entry.document.source, make)
+        for page in library.course.pages:
+            if page.document is not None and any(map(_is_quiz, document_blocks(page.document))):
+                yield self._document(
+                    page.document.source,
+                    functools.partial(pages.page_sheet, library, page, page.document),
+                )
+
+    def _document(self, source: Source, make: Callable[[], Sheet]) -> _Asked:
+        return _Asked(source, page_key(self._library.course, self._documents, make()), make)
+
+    def _made(self, asked: list[_Asked]) -> Iterator[tuple[_Asked, bytes]]:
+        """The items, kept or made now."""
+        store = self._options.store
+        known = {a.key: None if store.fresh else store.peek(ITEMS, a.key) for a in asked}
+        known = {
+            a.key: data
+            for a in asked
+            if (data := known[a.key]) is not None and unpack(data, a.source) is not None
+        }
+        new = [a for a in asked if a.key not in known]
+        later = [Later(a.source.path, functools.partial(self._request, a)) for a in new]
+        made = dict(zip((a.key for a in new), self._documents.draw(later), strict=True))
+        for one in asked:
+            yield one, known.get(one.key) or made[one.key]
+
+    def _request(self, asked: _Asked) -> Ask:
+        course = self._library.course
+        task = self._documents.task(asked.source.path)
+        return Ask(Draw(asked.sheet(), task, course.language, course.base_url, asked.key))
+
+
+def _is_quiz(block: Block) -> bool:
+    return isinstance(block, Quiz)
+
+
+def _reduced(loss: Loss) -> Diagnostic:
+    message = f"this question is not whole in the QTI package: {loss.what}"
+    return diagnose("package-reduced", loss.span, message)

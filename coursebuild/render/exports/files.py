@@ -1,0 +1,280 @@
+"""The files beside pages, and those of the whole course: Markdown, notebooks, the e-book.
+
+Entry points: `Exports(…).files(…)`; `Source`, where what pages give to them comes from, and
+`OnDemand`, a source that makes it when it is asked for.
+
+What a page gives depends on what the page depends on. Of each file only its key is known until it
+is written: an edit of one lesson makes that lesson's files, and those of the whole course are put
+together again without drawing anything.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import struct
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Protocol, TypeAlias
+
+from coursebuild.model import Document, Lesson, Page
+from coursebuild.render import pages, urls, zips
+from coursebuild.render.characters import visible
+from coursebuild.render.exports.book import Book, books
+from coursebuild.render.exports.epub import Chapter, Deflated, Epub, File, deflate, packed
+from coursebuild.render.exports.llms import PATH as LLMS
+from coursebuild.render.exports.llms import llms
+from coursebuild.render.exports.notebook import finished
+from coursebuild.render.exports.page import Beside, PageExports, page_exports
+from coursebuild.render.exports.parts import LessonPart
+from coursebuild.render.exports.twin import twin_of
+from coursebuild.render.frame import Frames, Names
+from coursebuild.render.lesson import lesson_sheet
+from coursebuild.render.library import Library
+from coursebuild.render.sheet import Sheet
+from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.values import dataclass
+
+Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]]
+"""Archives of scripts by site path, with their keys."""
+Keep: TypeAlias = Callable[[str, Callable[[], bytes]], bytes]
+"""Gives what was made under a key before, or makes it."""
+_HEAD = struct.Struct("<LLL")
+
+
+class Source(Protocol):
+    """The pages of a site."""
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The site paths of all pages."""
+        ...
+
+    def key(self, path: str) -> str:
+        """All that a page depends on."""
+        ...
+
+    def beside(self, path: str) -> Beside:
+        """What a page gives to the files beside it."""
+        ...
+
+    def part(self, path: str) -> LessonPart:
+        """What a lesson gives to the files of the whole course."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What files need besides the pages."""
+
+    style: str
+    """The style sheet of the e-book."""
+    picture: Callable[[str], bytes]
+    """The bytes of the picture at a site path."""
+    pictures: str
+    """Another text where a picture is another."""
+    archives: Archives
+    """Those of the lessons."""
+    imports: Callable[[str], frozenset[str]]
+    """What a Python text imports."""
+    declarations: Iterable[str]
+    """Styles that were written in elements of pages."""
+    taken: frozenset[str]
+    """Paths of files that authors have put there."""
+    keep: Keep = lambda key, make: make()
+
+
+class Exports:
+    """What a site gives away besides its pages."""
+
+    def __init__(self, library: Library, source: Source, around: Around) -> None:
+        self._library = library
+        self._source = source
+        self._around = around
+        self._lessons = [one for one in library.order if one.document is not None]
+
+    def files(self, names: Names) -> Iterator[SiteFile]:
+        """All of them; `names` are those of what every page refers to."""
+        yield from self._twins()
+        yield OutputFile(LLMS, llms(self._library))
+        for lesson in self._lessons:
+            yield self._notebook(lesson)
+        if self._lessons:
+            yield from self._books(names)
+            yield self._epub()
+
+    def _page_key(self, lesson: Lesson) -> str:
+        return self._source.key(urls.lesson_path(lesson))
+
+    def _twins(self) -> Iterator[SiteFile]:
+        for page in self._source.paths:
+            path = urls.twin_path(page)
+            if path is not None and path not in self._around.taken:
+                key = _key("twin", self._source.key(page))
+                yield KeptFile(path, key, functools.partial(self._twin, page))
+
+    def _twin(self, page: str) -> bytes:
+        return visible(self._source.beside(page).twin).encode()
+
+    # --- notebooks
+
+    def _notebook(self, lesson: Lesson) -> KeptFile:
+        key, _ = self._around.archives.get(urls.lesson_zip_path(lesson), ("", None))
+        key = _key("notebook", self._page_key(lesson), key)
+        make = functools.partial(self._notebook_made, lesson)
+        return KeptFile(urls.notebook_path(lesson), key, make)
+
+    def _notebook_made(self, lesson: Lesson) -> bytes:
+        made = self._source.beside(urls.lesson_path(lesson)).notebook
+        assert made is not None, "a written lesson has a notebook"
+        packed = self._around.archives.get(urls.lesson_zip_path(lesson))
+        return finished(made, packed[1]() if packed else None, self._around.imports)
+
+    # --- the whole course on pages
+
+    def _part(self, lesson: Lesson) -> LessonPart:
+        return self._source.part(urls.lesson_path(lesson))
+
+    def _books(self, names: Names) -> Iterator[KeptFile]:
+        frames = Frames(self._library, names)
+        places = ""
+        for book in books(self._library):
+            before, after = frames.around(book.draft(self._library), ())
+            places = places or _key(repr(sorted(book.places.items())))  # of all the same
+            fixed = "".join(book.texts(self._library, lambda lesson: ""))
+            lessons = map(self._page_key, book.lessons)
+            key = _key("book", before, after, fixed, places, *lessons)
+            pieces = functools.partial(self._book, book, before, after)
+            yield KeptFile(book.path, key, functools.partial(_joined, pieces), pieces)
+
+    def _book(self, book: Book, before: str, after: str) -> Iterator[bytes]:
+        yield before.encode("utf-8", "replace")
+        for text in book.texts(self._library, lambda lesson: self._part(lesson).section):
+            yield visible(text).encode()
+        yield after.encode("utf-8", "replace")
+
+    # --- the e-book
+
+    def _epub(self) -> KeptFile:
+        course, results = self._library.course, self._library.results
+        shown = (
+            (course.key, course.title, course.summary, course.language, course.licence),
+            course.base_url,
+            [(level.id, level.title, level.summary) for level in course.levels],
+            [(lesson.id, lesson.slug, lesson.title) for lesson in self._lessons],
+            (results.engine, results.python),
+            sorted(self._around.declarations),
+        )
+        lessons = map(self._page_key, self._lessons)
+        key = _key("epub", repr(shown), self._around.style, self._around.pictures, *lessons)
+        return KeptFile(
+            urls.EPUB, key, functools.partial(_joined, self._epub_pieces), self._epub_pieces
+        )
+
+    def _epub_pieces(self) -> Iterator[bytes]:
+        around = self._around
+        epub = Epub(self._library, around.style, around.declarations)
+        links = _key(epub.places, self._library.course.language)
+        chapters = {epub.file_of(lesson): lesson for lesson in self._lessons}
+
+        def compressed(lesson: Lesson) -> bytes:
+            """A chapter and what is to be known of it: of a long course, one is made anew."""
+
+            def make() -> bytes:
+                part = self._part(lesson)
+                facts = Chapter(part.pictures, part.mathml, part.svg)
+                return _joined_chapter(facts, deflate(epub.chapter(lesson, part)))
+
+            key = _key(self._page_key(lesson), lesson.title, links)
+            return around.keep(key, make)
+
+        def pack(file: File) -> Deflated:
+            lesson = chapters.get(file.path)
+            if lesson is None:
+                return deflate(file.make())
+            return _chapter_part(compressed(lesson))[1]
+
+        def facts(lesson: Lesson) -> Chapter:
+            return _chapter_part(compressed(lesson))[0]
+
+        return packed(epub.files(facts, around.picture), pack)
+
+
+def _joined_chapter(facts: Chapter, made: Deflated) -> bytes:
+    """A chapter as it is kept."""
+    crc, size, data = made
+    head = json.dumps([facts.pictures, facts.mathml, facts.svg]).encode()
+    return _HEAD.pack(crc, size, len(head)) + head + data
+
+
+def _chapter_part(data: bytes) -> tuple[Chapter, Deflated]:
+    """The same taken apart."""
+    crc, size, length = _HEAD.unpack_from(data)
+    end = _HEAD.size + length
+    pictures, mathml, svg = json.loads(data[_HEAD.size : end])
+    return Chapter(tuple(pictures), mathml, svg), (crc, size, data[end:])
+
+
+def _joined(pieces: Callable[[], Iterator[bytes]]) -> bytes:
+    return b"".join(pieces())
+
+
+def _key(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+class OnDemand:
+    """Pages whose documents are at hand."""
+
+    def __init__(
+        self,
+        library: Library,
+        paths: tuple[str, ...],
+        body: Callable[[str], str],
+        whole: Callable[[Document], Document] = lambda document: document,
+    ) -> None:
+        """`body` gives the HTML of a page as published; `whole` a document with its text."""
+        self._library = library
+        self._body = body
+        self._whole = whole
+        self.paths = paths
+        self._documents: dict[str, Callable[[], tuple[Sheet, Document]]] = {}
+        for lesson in library.order:
+            if lesson.document is not None:
+                make = functools.partial(self._of_lesson, lesson, lesson.document)
+                self._documents[urls.lesson_path(lesson)] = make
+        for page in library.course.pages:
+            if page.document is not None:
+                made = functools.partial(self._of_page, page, page.document)
+                self._documents[urls.page_path(page)] = made
+
+    def _of_lesson(self, lesson: Lesson, document: Document) -> tuple[Sheet, Document]:
+        return lesson_sheet(self._library, lesson, document), self._whole(document)
+
+    def _of_page(self, page: Page, document: Document) -> tuple[Sheet, Document]:
+        return pages.page_sheet(self._library, page, document), self._whole(document)
+
+    def key(self, path: str) -> str:
+        """Its path: nothing is kept."""
+        return path
+
+    def beside(self, path: str) -> Beside:
+        """What a page gives to the files beside it, made now."""
+        if path in self._documents:
+            return self._exports(path).beside
+        return Beside(twin_of(path, self._body(path)), None)
+
+    def part(self, path: str) -> LessonPart:
+        """What a lesson gives to the files of the whole course, made now."""
+        part = self._exports(path).part
+        assert part is not None, "a written lesson has a part"
+        return part
+
+    def _exports(self, path: str) -> PageExports:
+        from coursebuild.render.draw import draw_whole
+
+        body, tools = self._body(path), self._library.tools
+        sheet, document = self._documents[path]()
+        _, text = draw_whole(sheet, document, tools)
+        base = self._library.course.base_url
+        return page_exports(sheet, document, tools, base, body, str(text))

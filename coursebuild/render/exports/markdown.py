@@ -1,0 +1,387 @@
+"""Blocks and inlines as Markdown that needs no course: CommonMark with tables, footnotes and `$`.
+
+Entry points: `write_blocks`, `write_inlines`, `write_footnotes`; `Context`, which says where links
+lead and what our own blocks become.
+
+1. A text that stands in the source as it reads is written as it stands there: it was read as text
+   once, between the same neighbours. Any other (with escapes or entities in it, or out of JSON) has
+   all its marks escaped.
+2. What may begin another block where a line begins is escaped when the paragraph is put together.
+3. Containers indent what they hold.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Protocol, assert_never
+
+from coursebuild.model import (
+    Block,
+    BlockQuote,
+    Callout,
+    Cell,
+    CodeBlock,
+    CodeSpan,
+    Emphasis,
+    Footnote,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Io,
+    Lab,
+    Link,
+    ListBlock,
+    ListItem,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    Quiz,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Target,
+    Term,
+    Text,
+    ThematicBreak,
+    plain_text,
+)
+from coursebuild.render.markup import OwnBlock
+
+
+class Context(Protocol):
+    """What depends on where the Markdown goes."""
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+        ...
+
+    def url(self, url: str) -> str:
+        """The address of a picture that is written as `url`."""
+        ...
+
+    def reference(self, note: int) -> str:
+        """A reference to a footnote."""
+        ...
+
+    def own(self, block: OwnBlock) -> str:
+        """A block of ours, without its last line end; empty for none."""
+        ...
+
+
+def write_blocks(blocks: Iterable[Block], context: Context) -> str:
+    """Blocks one after the other, an empty line between two, without the last line end."""
+    return _Writer(context).blocks(blocks)
+
+
+def write_inlines(inlines: Iterable[Inline], context: Context) -> str:
+    """Inlines in one line, such as a title."""
+    return " ".join(_Writer(context).inlines(inlines, line=True).split("\n")).strip()
+
+
+def write_footnotes(footnotes: Iterable[Footnote], context: Context) -> str:
+    """The definitions of footnotes, which are referred to as `[^1]`."""
+    return "\n\n".join(
+        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
+    )
+
+
+def hang(mark: str, text: str, indent: int | None = None) -> str:
+    """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
+    space = " " * (len(mark) if indent is None else indent)
+    first, *rest = text.split("\n")
+    return "\n".join([f"{mark}{first}".rstrip(), *(f"{space}{line}".rstrip() for line in rest)])
+
+
+def quoted(text: str) -> str:
+    """Lines in a blockquote."""
+    return "\n".join(f"> {line}".rstrip() for line in text.split("\n"))
+
+
+def fence(language: str, text: str) -> str:
+    """Code between fences that are longer than any in it."""
+    runs = re.findall(r"^[ ]*(`{3,})", text, re.MULTILINE)
+    ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
+    body = text if text.endswith("\n") or not text else f"{text}\n"
+    return f"{ticks}{language}\n{body}{ticks}"
+
+
+def code_span(text: str, ticks: str = "") -> str:
+    """Text as inline code, between these ticks or as few as do."""
+    text = text.replace("\n", " ")
+    runs = set(map(len, _TICKS(text)))
+    ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
+    blank = text.strip(" ") == ""
+    edges = text[:1] == "`" or text[-1:] == "`" or (text[:1] == text[-1:] == " ")
+    pad = " " if edges and not blank else ""
+    return f"{ticks}{pad}{text}{pad}{ticks}"
+
+
+_TICKS = re.compile("`+").findall
+_MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
+_DOLLAR = re.compile(r"(?<!\\)\$")
+
+
+def escaped(text: str) -> str:
+    """Text with all its marks escaped, in one line or several."""
+    return _MARKS.sub(lambda match: f"\\{match[0]}", text)
+
+
+def link(text: str, href: str, title: str = "") -> str:
+    """A link; `text` is Markdown."""
+    return f"[{text}]({_destination(href)}{_title(title)})"
+
+
+def picture(alt: str, url: str, title: str = "") -> str:
+    """A picture; `alt` is plain text."""
+    alt = escaped(" ".join(alt.split()))
+    return f"![{alt}]({_destination(url)}{_title(title)})"
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[str] = ()) -> str:
+    """A table of cells that are Markdown in one line, their pipes escaped."""
+    head = tuple(head)
+    marks = {"left": ":---", "right": "---:", "center": ":---:"}
+    aligned = [marks.get(one, "---") for one in align] or ["---"] * len(head)
+    lines = [head, aligned, *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def _destination(url: str) -> str:
+    if url and not re.search(r"[\s<>()\\]", url):
+        return url
+    safe = url.replace("\\", "%5C").replace("<", "%3C").replace(">", "%3E")
+    return f"<{''.join('%20' if c.isspace() else c for c in safe)}>"
+
+
+def _title(title: str) -> str:
+    if not title:
+        return ""
+    text = re.sub(r'[\\"]|&(?=#?\w+;)', lambda match: f"\\{match[0]}", title)
+    text = re.sub(r"\n[ \t\n]*", "\n", text)
+    return f' "{text}"'
+
+
+_APART = (HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Lab, Quiz, Table, MathBlock)
+"""Blocks that an empty line parts from others, even in a tight list."""
+
+
+class _Writer:
+    def __init__(self, context: Context) -> None:
+        self.context = context
+
+    # --- blocks
+
+    def blocks(self, blocks: Iterable[Block], *, tight: bool = False) -> str:
+        parts: list[tuple[Block, str]] = []
+        for block in blocks:
+            before = parts[-1][0] if parts else None
+            text = self.block(block, after=before)
+            if text:
+                parts.append((block, text))
+        written = ""
+        for at, (block, text) in enumerate(parts):
+            if at:
+                apart = (
+                    not tight or isinstance(parts[at - 1][0], _APART) or isinstance(block, _APART)
+                )
+                written += "\n\n" if apart else "\n"
+            written += text
+        return written
+
+    def block(self, block: Block, after: Block | None = None) -> str:
+        match block:
+            case Heading():
+                return self._heading(block)
+            case Paragraph():
+                return self.inlines(block.children)
+            case HtmlFlow():
+                return self.inlines(block.children)
+            case ListBlock():
+                return self._list(block, other=isinstance(after, ListBlock))
+            case BlockQuote():
+                return quoted(self.blocks(block.blocks))
+            case CodeBlock():
+                return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+            case HtmlBlock():
+                return block.html.rstrip("\n")
+            case ThematicBreak():
+                return "___"
+            case MathBlock():
+                return "\n".join(filter(None, ("$$", _no_empty_lines(block.tex.text), "$$")))
+            case Table():
+                return self._table(block)
+            case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf() | Lab() | Quiz():
+                return self.context.own(block)
+            case _:
+                assert_never(block)
+
+    def _heading(self, heading: Heading) -> str:
+        text = " ".join(self.inlines(heading.children, line=True).split("\n")).strip()
+        text = re.sub(r"(^|\s)(#+)$", r"\1\\\2", text)
+        return f"{'#' * heading.level} {text}".rstrip()
+
+    def _list(self, block: ListBlock, *, other: bool) -> str:
+        """A list; one right after another has other marks, by which it is known as another."""
+        number, mark = block.start, "*" if other else "-"
+        tight = all(
+            _is_tight(inner) or not isinstance(inner, Paragraph)
+            for item in block.items
+            for inner in item.blocks
+        )
+        items: list[str] = []
+        for item in block.items:
+            if number is not None:
+                mark = f"{number}{')' if other else '.'}"
+                number += 1
+            items.append(self._item(f"{mark} ", item, tight=tight))
+        return ("\n" if tight else "\n\n").join(items)
+
+    def _item(self, mark: str, item: ListItem, *, tight: bool) -> str:
+        text = self.blocks(item.blocks, tight=tight)
+        if item.checked is not None:
+            text = f"[{'x' if item.checked else ' '}] {text or '&nbsp;'}"
+        elif item.blocks and isinstance(item.blocks[0], ListBlock):
+            text = f"\n{text}"  # three marks in a line would be a break
+        return hang(mark, text, len(mark))
+
+    def _table(self, block: Table) -> str:
+        rows = (map(self._cell, row) for row in block.rows)
+        return table(map(self._cell, block.header), rows, (one or "" for one in block.align))
+
+    def _cell(self, cell: Cell) -> str:
+        return self.inlines(cell.children, line=True, cell=True).replace("\n", " ")
+
+    # --- inlines
+
+    def inlines(self, inlines: Iterable[Inline], *, line: bool = False, cell: bool = False) -> str:
+        text = "".join(self._inline(one, line=line, cell=cell) for one in inlines)
+        return text if line else guarded(text)
+
+    def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
+        def inner(inlines: tuple[Inline, ...]) -> str:
+            return "".join(self._inline(one, line=line, cell=cell) for one in inlines)
+
+        match inline:
+            case Text():
+                return _text(inline, cell=cell)
+            case SoftBreak():
+                return " " if line else "\n"
+            case HardBreak():
+                return " " if line else "\\\n"
+            case CodeSpan():
+                ticks = re.match("`*", inline.span.text)
+                return _piped(code_span(inline.text, ticks[0] if ticks else ""), cell=cell)
+            case NumberBinding():
+                return escaped(number_text(inline))
+            case Math():
+                return _formula(inline, cell=cell)
+            case Emphasis():
+                mark = _delimiter(inline.span.text, "*")
+                return f"{mark}{inner(inline.children)}{mark}"
+            case Strong():
+                mark = _delimiter(inline.span.text, "*") * 2
+                return f"{mark}{inner(inline.children)}{mark}"
+            case Term():
+                return f"*{inner(inline.children)}*"
+            case Strikethrough():
+                return f"~~{inner(inline.children)}~~"
+            case Link():
+                return self._link(inline, inner(inline.children), cell=cell)
+            case Image():
+                url = self.context.url(inline.url)
+                return _piped(picture(inline.alt, url, inline.title), cell=cell)
+            case RawInline():
+                return _piped(inline.html, cell=cell)
+            case FootnoteRef():
+                return self.context.reference(inline.number)
+            case _:
+                assert_never(inline)
+
+    def _link(self, node: Link, text: str, *, cell: bool) -> str:
+        source = node.span.text
+        if source == f"<{plain_text(node.children)}>" and not cell:
+            return source
+        href = self.context.href(node.target)
+        return link(text, href.replace("|", "%7C") if cell else href, node.title)
+
+
+def number_text(node: NumberBinding) -> str:
+    """A number that a script printed, with a real minus sign."""
+    return re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
+
+
+def _is_tight(block: Block) -> bool:
+    return isinstance(block, Paragraph) and block.tight
+
+
+def _text(node: Text, *, cell: bool) -> str:
+    source = node.span.text
+    if source != node.text:
+        text = escaped(node.text)
+        if text[:1].isspace() and not source[:1].isspace():
+            text = f"&#{ord(text[0])};{text[1:]}"
+        if text[-1:].isspace() and not source[-1:].isspace():
+            text = f"{text[:-1]}&#{ord(text[-1])};"
+        return text.replace("\n", "&#10;")
+    text = _DOLLAR.sub(r"\\$", node.text)
+    return _piped(text, cell=cell)
+
+
+def _piped(text: str, *, cell: bool) -> str:
+    return re.sub(r"(?<!\\)\|", r"\\|", text) if cell else text
+
+
+def _delimiter(source: str, usual: str) -> str:
+    return source[0] if source[:1] in ("*", "_") else usual
+
+
+def _formula(node: Math, *, cell: bool) -> str:
+    tex = node.tex.text
+    if cell:  # a pipe would end the cell, and an escaped one is another sign
+        tex = re.sub(r"\|", lambda _: r"\vert ", tex.replace(r"\|", r"\Vert "))
+    if not re.search(r"(?<!\\)%", tex):  # else a line's end ends a comment
+        tex = " ".join(part.strip() for part in tex.split("\n"))
+    else:
+        tex = _no_empty_lines(tex)
+    return f"$${tex}$$" if node.display else f"${tex}$"
+
+
+def _no_empty_lines(tex: str) -> str:
+    return "\n".join(line for line in tex.split("\n") if line.strip())
+
+
+_BEGINS = re.compile(
+    r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
+    r"|[|:\s-]*-[|:\s-]*$)"
+    r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
+    r"|(?P<note>\[\^[^\]]+\]):"
+)
+"""What begins, or makes of the line before it, another block than a paragraph."""
+
+
+def guarded(text: str) -> str:
+    """The lines of a paragraph, so that none of them begins another block."""
+    return "\n".join(_guarded_line(line) for line in text.split("\n"))
+
+
+def _guarded_line(line: str) -> str:
+    found = _BEGINS.match(line)
+    if found is None:
+        return line
+    if found["number"]:
+        return f"{found['number']}\\{line[found.end('number') :]}"
+    if found["note"]:
+        return f"{found['note']}\\{line[found.end('note') :]}"
+    return f"\\{line}"

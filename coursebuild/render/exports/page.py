@@ -1,0 +1,50 @@
+"""What a drawn page gives to the files beside it, and to those of the whole course.
+
+Entry point: `page_exports(sheet, document, tools, base_url, body)`. It depends on what the page
+depends on, and on nothing else.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from coursebuild.model import Document
+from coursebuild.render import formulas, styles, urls
+from coursebuild.render.characters import visible
+from coursebuild.render.exports.notebook import Notebook, notebook
+from coursebuild.render.exports.parts import LessonPart, lesson_part
+from coursebuild.render.exports.twin import twin
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.tools import Tools
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What a page gives to the files beside it."""
+
+    twin: str
+    """The page as Markdown; empty where it has no twin."""
+    notebook: Notebook | None
+    """Of a lesson."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageExports:
+    """See the module. The two parts are kept apart, since the second is read for other files."""
+
+    beside: Beside
+    part: LessonPart | None
+    """Of a lesson: what it gives to the files of the whole course."""
+
+
+def page_exports(
+    sheet: Sheet, document: Document | None, tools: Tools, base_url: str, body: str, article: str
+) -> PageExports:
+    """All of it; `body` is the page's HTML as published, `article` its document's as drawn."""
+    text = twin(sheet, document, tools, body) if urls.twin_path(sheet.path) is not None else ""
+    if sheet.kind != "lesson" or document is None:
+        return PageExports(Beside(text, None), None)
+    settled, _ = styles.hoist(formulas.glue(article))
+    part = lesson_part(sheet, tools, Markup(visible(settled)))
+    return PageExports(Beside(text, notebook(sheet, document, tools, base_url)), part)

@@ -1,0 +1,63 @@
+"""A lesson as a part of the whole course: on one page with the others, and in the e-book.
+
+Entry point: `lesson_part(sheet, tools, article)`. Links to the rest of the site are left open, see
+`rewrite`; so a part depends on its own lesson only.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from coursebuild.render.exports.rewrite import Rewriter, Rules
+from coursebuild.render.exports.tags import Start
+from coursebuild.render.lesson import LessonHead
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.tools import Tools
+from coursebuild.values import dataclass
+
+SHOWN = frozenset("gif jpeg jpg png svg webp".split())
+"""Endings of the pictures that every reading system shows."""
+_TOP = "_top"
+_DOWN = 2
+"""The course is the first heading, its levels are the second."""
+
+
+@dataclass(frozen=True, slots=True)
+class LessonPart:
+    """A lesson, with its links left open."""
+
+    section: str
+    """HTML."""
+    chapter: str
+    """XHTML."""
+    pictures: tuple[str, ...]
+    """Site paths of the pictures of the chapter."""
+    mathml: bool
+    svg: bool
+
+
+def anchor(lesson: str, id: str = _TOP) -> str:
+    """The id on the page of the whole course of what has an id in a lesson; of the lesson."""
+    return f"{lesson}--{id}"
+
+
+def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:
+    """The part; `article` is the lesson's text as published."""
+    head = sheet.values["lesson"]
+    assert isinstance(head, LessonHead), "the sheet of a lesson has its head"
+    values = {"lesson": head, "draft": sheet.values["draft"], "article": article, "top": _TOP}
+    html = str(tools.render("exports/lesson.html", **values))
+    page = Rules(sheet.path, prefix=anchor(head.id, ""), down=_DOWN, opened=_is_no_answer)
+    book = Rules(sheet.path, xml=True, pictures=SHOWN)
+    section, chapter = Rewriter(page), Rewriter(book)
+    return LessonPart(
+        section.text(html),
+        chapter.text(html),
+        tuple(chapter.pictures),
+        "math" in chapter.elements,
+        "svg" in chapter.elements,
+    )
+
+
+def _is_no_answer(start: Start) -> bool:
+    return not {"answer", "hint"}.intersection((start.get("class") or "").split())

@@ -1,0 +1,330 @@
+"""The blocks that are ours as plain Markdown: scripts, outputs, labs, quizzes, callouts.
+
+Entry point: `Plain`, the writer's context for one document on one page.
+
+What a page shows with templates is said here in Markdown: a script is a fence under its name, a lab
+is its recorded picture and what it showed, a quiz is a list with its answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import assert_never
+
+from coursebuild.model import (
+    AnyQuestion,
+    Block,
+    Callout,
+    ChoiceQuestion,
+    Heading,
+    Inline,
+    Io,
+    Lab,
+    Mjcf,
+    ModelTarget,
+    NumericQuestion,
+    OpenQuestion,
+    OrderQuestion,
+    OutputQuestion,
+    PlainCode,
+    Quiz,
+    Recording,
+    Script,
+    Table,
+    Target,
+    plain_text,
+)
+from coursebuild.render.blocks import output_receipt, script_receipt
+from coursebuild.render.context import PageContext
+from coursebuild.render.exports.markdown import (
+    code_span,
+    escaped,
+    fence,
+    hang,
+    link,
+    picture,
+    quoted,
+    table,
+    write_blocks,
+    write_inlines,
+)
+from coursebuild.render.labs import (
+    control_view,
+    number,
+    overlay_name,
+    plot_view,
+    seconds,
+    start_name,
+)
+from coursebuild.render.markup import OwnBlock
+from coursebuild.render.quizzes import letter, output_line
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """A document as plain Markdown."""
+
+    page: PageContext
+    locate: Callable[[str], str]
+    """An address as the page has it, as the Markdown has it."""
+    live: str
+    """The address of the page with its labs."""
+    notebook: bool = False
+    """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
+
+    # what the writer asks
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+        return self.locate(self.page.href(target))
+
+    def url(self, url: str) -> str:
+        """The address of a picture."""
+        return self.locate(self.page.url(url))
+
+    def reference(self, note: int) -> str:
+        """A reference to a footnote."""
+        return f"<sup>{note}</sup>" if self.notebook else f"[^{note}]"
+
+    def own(self, block: OwnBlock) -> str:
+        """A block of ours."""
+        match block:
+            case Callout():
+                return self._callout(block)
+            case PlainCode():
+                return fence("python", block.code.text)
+            case Script():
+                return self._script(block)
+            case Recording():
+                joined = any(block in some for some in self.page.joined.values())
+                return "" if joined else self.recording(block)
+            case Io():
+                return self._io(block)
+            case Mjcf():
+                return self._mjcf(block)
+            case Lab():
+                return self._lab(block)
+            case Quiz():
+                return self._quiz(block)
+            case _:
+                assert_never(block)
+
+    def blocks(self, blocks: tuple[Block, ...]) -> str:
+        """Blocks as Markdown."""
+        return write_blocks(blocks, self)
+
+    def inlines(self, inlines: tuple[Inline, ...]) -> str:
+        """Inlines as Markdown in one line."""
+        return write_inlines(inlines, self)
+
+    def words(self, key: str, **values: str | int | float) -> str:
+        """A text of the interface, as Markdown."""
+        return escaped(self.page.tools.words(key, **values))
+
+    # --- callouts, io, MJCF
+
+    def _callout(self, block: Callout) -> str:
+        label = f"**{escaped(self.page.shown.callouts[block.kind].label)}**"
+        title = self.inlines(block.title)
+        head = f"{label} {title}" if title else label
+        inner = self.blocks(block.blocks)
+        return quoted(f"{head}\n\n{inner}" if inner else head)
+
+    def _io(self, block: Io) -> str:
+        rows = (("input", block.input), ("process", block.process), ("output", block.output))
+        return "\n".join(
+            f"- **{self.words(f'io.{name}')}:** {self.inlines(text)}" for name, text in rows
+        )
+
+    def _mjcf(self, block: Mjcf) -> str:
+        shown = self.page.shown
+        label = (
+            self.words("mjcf.fragment", element=block.fragment)
+            if block.fragment
+            else self.words("mjcf.label")
+        )
+        receipt = f"*{self.words('mjcf.compiles', engine=shown.engine)}*"
+        if block.error is not None:
+            receipt = f"*{self.words('mjcf.fails', engine=shown.engine)}* {code_span(block.error)}"
+        return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
+
+    # --- scripts and outputs
+
+    def _script(self, block: Script) -> str:
+        href = self.locate(self.page.place.href(block.path))
+        name = link(code_span(block.path), href)
+        if self.notebook:
+            return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
+        command = code_span(" ".join(("python", block.path, *block.args)))
+        run = f"{self.words('code.run')}: {command}"
+        if block.requires:
+            run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
+        parts = [f"{name}:", fence("python", block.code.text), run]
+        recordings = self.page.joined.get(block.span.start, ())
+        parts += [self.recording(recording) for recording in recordings]
+        if not recordings:
+            receipt = script_receipt(self.page, self.page.shown.runs.get(block.path))
+            parts.append(f"*{escaped(receipt.text)}*")
+        return "\n\n".join(parts)
+
+    def recording(self, block: Recording) -> str:
+        """An output with its caption and what can be said for it."""
+        if isinstance(block.body, Table):
+            body = self.blocks((block.body,))
+        else:
+            body = fence("text", block.body.text)
+        return f"{self.inlines(block.caption)}\n\n{body}\n\n{self.receipt(block)}"
+
+    def receipt(self, block: Recording) -> str:
+        """What can be said for an output."""
+        return f"*{escaped(output_receipt(self.page, block).text)}*"
+
+    # --- labs
+
+    def _lab(self, block: Lab) -> str:
+        page, words = self.page, self.words
+        title = block.title or page.tools.words("lab.untitled")
+        parts = [f"**{words('lab.label')}: {escaped(title)}**"]
+        live = page.shown.labs.get(block.span.start)
+        record = live.record if live is not None else None
+        if record is not None:
+            alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
+            parts.append(picture(alt, self.locate(page.place.href(record.picture))))
+            if record.readouts:
+                rows = [(_cell(label), _cell(value)) for label, value in record.readouts]
+                parts.append(f"{words('lab.at', t=seconds(record.end))}:")
+                parts.append(table((words("lab.readouts"), ""), rows))
+        parts.append(self._about(block))
+        if block.controls:
+            views = [control_view(page.tools.words, control) for control in block.controls]
+            rows = [(_cell(view.label), _cell(view.values)) for view in views]
+            parts.append(table((words("lab.control"), words("lab.range")), rows))
+        shows = self._shows(block, recorded=record is not None)
+        parts += ["\n".join(shows)] if shows else []
+        parts += [self.blocks(block.note)] if block.note else []
+        return "\n\n".join((*parts, link(words("exports.run_lab"), self.live)))
+
+    def _about(self, block: Lab) -> str:
+        """What is simulated, and from where to where."""
+        if block.model is not None:
+            name = link(escaped(block.model), self.href(ModelTarget(block.model)))
+            about = f"{self.words('lab.static')} {name}."
+        else:
+            about = f"{self.words('lab.static_xml')}."
+        start = start_name(self.page, block)
+        if start:
+            about += f" {self.words('lab.start')} {code_span(start)}."
+        if block.stop_at is not None:
+            about += f" {self.words('lab.stops', t=number(block.stop_at))}"
+        return about
+
+    def _shows(self, block: Lab, *, recorded: bool) -> list[str]:
+        words = self.page.tools.words
+        rows: list[tuple[str, tuple[str, ...]]] = []
+        if block.readouts and not recorded:
+            labels = tuple(readout.label for readout in block.readouts)
+            rows.append((words("lab.readouts"), labels))
+        for index in range(len(block.plots)):
+            view = plot_view(words, block, index)
+            rows.append((view.title, view.traces + view.marks))
+        if block.toggles:
+            names = tuple(overlay_name(words, name) for name in block.toggles)
+            rows.append((words("lab.overlays"), names))
+        return [f"- {escaped(label)}: {escaped(', '.join(names))}" for label, names in rows]
+
+    # --- quizzes
+
+    def _quiz(self, block: Quiz) -> str:
+        questions = (
+            hang(f"{at}. ", self._question(question))
+            for at, question in enumerate(block.questions, 1)
+        )
+        headings = (b for b in self.page.document.blocks if isinstance(b, Heading))
+        said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
+        title = "" if said else f"**{escaped(block.title)}**"
+        return "\n\n".join(filter(None, (title, *questions)))
+
+    def _question(self, question: AnyQuestion) -> str:
+        parts = [f"*{escaped(question.label)}*"] if question.label else []
+        parts.append(self.blocks(question.text))
+        parts += self._asked(question)
+        for at, hint in enumerate(question.hints, 1):
+            parts.append(self._folded(self.words("quiz.hint", n=at), self.blocks(hint)))
+        answer = "\n\n".join(filter(None, self._answer(question)))
+        parts.append(self._folded(self.words("quiz.answer"), answer))
+        return "\n\n".join(filter(None, parts))
+
+    def _folded(self, label: str, text: str) -> str:
+        if self.notebook:
+            return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
+        return f"**{label}:** {text}" if _begins_as_text(text) else f"**{label}:**\n\n{text}"
+
+    def _asked(self, question: AnyQuestion) -> list[str]:
+        """What is said of how to answer, and what there is to choose from."""
+        match question:
+            case ChoiceQuestion():
+                how = "quiz.commit" if question.predict else ""
+                how = "quiz.choose_all" if question.several else how
+                options = (
+                    f"- {letter(at)}: {self.inlines(option.text)}"
+                    for at, option in enumerate(question.options)
+                )
+                return [f"*{self.words(how)}*" if how else "", "\n".join(options)]
+            case NumericQuestion():
+                unit = f"{self.words('quiz.unit')} {escaped(question.unit)}"
+                return [f"*{unit}*"] if question.unit else []
+            case OpenQuestion():
+                return []
+            case OutputQuestion():
+                asked = self.words("quiz.output_of", path=question.script, line=question.line)
+                return [f"*{asked}*"]
+            case OrderQuestion():
+                right = [self.inlines(item) for item in question.items]
+                items = sorted(right)
+                items = [*items[1:], items[0]] if items == right else items
+                return [
+                    f"*{self.words('quiz.order')}*",
+                    "\n".join(f"- {item}" for item in items),
+                ]
+            case _:
+                assert_never(question)
+
+    def _answer(self, question: AnyQuestion) -> list[str]:
+        explain = self.blocks(question.explain)
+        match question:
+            case ChoiceQuestion():
+                right = ", ".join(letter(at) for at in question.answers)
+                said = [
+                    f"- {self.words('quiz.feedback', option=letter(at))}: "
+                    + hang("", self.blocks(option.feedback), 2)
+                    for at, option in enumerate(question.options)
+                    if option.feedback
+                ]
+                sim = self._lab(question.sim) if question.sim is not None else ""
+                return [f"{right}.", explain, "\n".join(said), sim]
+            case NumericQuestion():
+                unit = f" {escaped(question.unit)}" if question.unit else ""
+                near = self.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
+                return [f"{escaped(question.answer_text)}{unit} ({near}).", explain]
+            case OpenQuestion():
+                return [self.blocks(question.reference), explain]
+            case OutputQuestion():
+                line = output_line(self.page, question.script, question.line)
+                shown = self.words("quiz.none") if line is None else fence("text", line)
+                return [shown, explain]
+            case OrderQuestion():
+                right = "\n".join(
+                    f"{at}. {self.inlines(item)}" for at, item in enumerate(question.items, 1)
+                )
+                return [right, explain]
+            case _:
+                assert_never(question)
+
+
+def _cell(text: str) -> str:
+    return escaped(" ".join(text.split()))
+
+
+def _begins_as_text(text: str) -> bool:
+    return not text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))

@@ -1,0 +1,132 @@
+"""A page as plain Markdown: for people, feeds and language models.
+
+Entry points: `twin(sheet, document, tools, body)`, the text; `twin_href`, an address in it.
+
+A lesson or page of the course is written from its document. Every other page (the map, levels,
+models, measured figures) is written from its HTML, so that it says what the page says.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable
+from typing import TypeAlias
+from urllib.parse import unquote, urlsplit
+
+from coursebuild.model import Document
+from coursebuild.render import urls
+from coursebuild.render.context import PageContext
+from coursebuild.render.exports.fromhtml import markdown_of
+from coursebuild.render.exports.markdown import (
+    code_span,
+    escaped,
+    guarded,
+    link,
+    write_blocks,
+    write_footnotes,
+)
+from coursebuild.render.exports.plain import Plain
+from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.strings import Strings
+from coursebuild.render.tools import Tools
+
+Locate: TypeAlias = Callable[[str], str]
+
+
+def twin_href(place: urls.Place, href: str) -> str:
+    """An address on a page as its twin has it: that of the other page's twin."""
+    parts = urlsplit(href)
+    if parts.scheme or parts.netloc or not parts.path.endswith(".html"):
+        return href
+    folder = posixpath.dirname(place.path)
+    target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
+    if target.startswith(("files/", "../")) or urls.twin_path(target) is None:
+        return href
+    return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
+
+
+def twin(sheet: Sheet, document: Document | None, tools: Tools, body: str) -> str:
+    """The text of a page; `body` is its HTML, as published."""
+    if document is None or sheet.shown is None:
+        return twin_of(sheet.path, body)
+    place = urls.Place(sheet.path)
+    page = PageContext.made(tools, sheet.shown, place, document)
+    context = Plain(page, lambda href: twin_href(place, href), place.href(place.path))
+    parts = (
+        *head(sheet, tools.words, context.locate),
+        write_blocks(document.blocks, context),
+        write_footnotes(document.footnotes, context),
+        *_foot(sheet, tools.words, context.locate),
+    )
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def twin_of(path: str, body: str) -> str:
+    """The text of a page without a document, from its HTML."""
+    if urls.twin_path(path) is None:
+        return ""
+    return f"{markdown_of(body, lambda href: twin_href(urls.Place(path), href))}\n"
+
+
+def head(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
+    """Title, summary, facts and objectives; of a page that is no lesson, its title."""
+    lesson = sheet.values.get("lesson")
+    if not isinstance(lesson, LessonHead):
+        return [f"# {_line(sheet.title)}"]
+    parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
+    if lesson.summary:
+        parts.append(guarded(_line(lesson.summary)))
+    parts.append(" · ".join(_facts(sheet, lesson, words, locate)))
+    if lesson.objectives:
+        items = "\n".join(f"- {guarded(_line(one))}" for one in lesson.objectives)
+        parts.append(f"{_line(words('lesson.objectives'))}\n\n{items}")
+    return parts
+
+
+def _facts(sheet: Sheet, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
+    facts = []
+    level, href = sheet.values.get("level"), sheet.values.get("level_href")
+    if isinstance(level, LevelName) and isinstance(href, str):
+        name = f"{words('level.label', id=level.id)}: {level.title}"
+        facts.append(link(_line(name), locate(href)))
+    facts.append(_line(words(f"status.{sheet.values['status']}")))
+    if lesson.minutes:
+        facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
+    needs = lesson_links(sheet, "needs", locate)
+    if needs:
+        facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")
+    return facts
+
+
+def lesson_links(sheet: Sheet, name: str, locate: Locate) -> list[str]:
+    """Links to the lessons that a value of a sheet names."""
+    found = sheet.values.get(name)
+    lessons = found if isinstance(found, tuple) else (found,)
+    return [
+        link(_line(f"{one.id} {one.title}"), locate(one.href))
+        for one in lessons
+        if isinstance(one, LessonLink)
+    ]
+
+
+def _foot(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
+    """Where to go from here."""
+    rows = []
+    scripts = sheet.values.get("scripts")
+    if isinstance(scripts, tuple) and scripts:
+        named = (link(code_span(path), href) for path, href in scripts)
+        rows.append(f"{_line(words('lesson.scripts'))}: {', '.join(named)}")
+    for name, key in (
+        ("leads", "lesson.leads"),
+        ("previous", "lesson.previous"),
+        ("following", "lesson.next"),
+    ):
+        links = lesson_links(sheet, name, locate)
+        if links:
+            rows.append(f"{_line(words(key))}: {', '.join(links)}")
+    return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []
+
+
+def _line(text: str) -> str:
+    return escaped(" ".join(text.split()))

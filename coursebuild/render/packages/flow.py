@@ -1,0 +1,351 @@
+"""Drawn HTML as the part of XHTML that QTI 2.1 allows.
+
+Entry points: `Flow(files)`, and its `blocks` and `line`; `Flow.lost` says what could not be kept.
+
+QTI 2.1 has the text of XHTML (information model, chapter "Content Model"), pictures, links, tables
+and MathML, and nothing that moves, plays or asks. What has no place there is either
+
+- opened, where only its content counts (a box, a mark of highlighted code), or
+- told in `lost`, with what became of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from urllib.parse import urlsplit
+
+from coursebuild.render.packages.formulas import mathml
+from coursebuild.render.packages.tree import BLOCKS, Content, Node, parse_html
+from coursebuild.render.packages.xml import Element, add, element
+from coursebuild.values import dataclass
+
+STRUCK = "struck"
+"""A class of the package's style sheet."""
+
+_INLINE = frozenset(
+    "abbr acronym b big cite code dfn em i kbd q samp small strong sub sup tt var".split()
+)
+_NEVER_IN_PRE = frozenset("big img object small sub sup".split())
+_HEADINGS = frozenset("h1 h2 h3 h4 h5 h6 address".split())
+_EMPHASIS = frozenset("ins mark u".split())
+_STRUCK = frozenset("del s strike".split())
+_GONE = frozenset("area base col dialog link meta param script source style template title".split())
+"""What shows nothing by itself."""
+_ACTIVE = frozenset(
+    "applet audio button canvas datalist embed iframe input keygen map meter object optgroup option"
+    " output picture progress select svg textarea track video".split()
+)
+_OWN = frozenset({"anchor"})
+"""Classes of what a page adds for its own readers."""
+_SPACE = re.compile(r"[ \t\n\r\f]+")
+_NUMBER = re.compile(r"[0-9]{1,5}")
+_LANGUAGE = re.compile(r"[A-Za-z]{1,8}(?:-[A-Za-z0-9]{1,8})*")
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where addresses of a drawn page lead, seen from a file of the package."""
+
+    link: Callable[[str], str | None]
+    """The same address for someone who has the package alone; `None` where there is none."""
+    picture: Callable[[str], str | None]
+    """The picture's place in the package."""
+
+
+class Flow:
+    """Brings texts into the package, one after the other."""
+
+    def __init__(self, places: Places) -> None:
+        self._places = places
+        self.lost: list[str] = []
+        """What was not kept, a sentence each, without repeats."""
+
+    def blocks(self, html: str) -> list[Element]:
+        """Blocks: what an item's body, an option or a feedback may hold."""
+        return list(self._blocks(joined(parse_html(html))))
+
+    def line(self, html: str) -> list[Element | str]:
+        """A line of text: what a paragraph may hold."""
+        return list(self._line(joined(parse_html(html))))
+
+    def _lose(self, what: str) -> None:
+        if what not in self.lost:
+            self.lost.append(what)
+
+    # --- blocks
+
+    def _blocks(self, content: Iterable[Content]) -> Iterator[Element]:
+        """Blocks, with a paragraph around each run of lines between them."""
+        run: list[Content] = []
+        for child in content:
+            if isinstance(child, Node) and _is_block(child):
+                yield from self._paragraph(run)
+                run = []
+                yield from self._block(child)
+            else:
+                run.append(child)
+        yield from self._paragraph(run)
+
+    def _paragraph(self, run: Sequence[Content]) -> Iterator[Element]:
+        made = element("p", {}, *self._line(run))
+        if len(made) or (made.text or "").strip():
+            yield made
+
+    def _block(self, node: Node) -> Iterator[Element]:
+        name = node.name
+        if name in _HEADINGS:
+            yield from self._lines(name, node)
+        elif name == "p":
+            yield from self._blocks(node.children)
+        elif name == "pre":
+            made = element("pre", _language(node), *self._line(node.children, pre=True))
+            _trim(made)
+            yield made
+        elif name == "hr":
+            yield element("hr")
+        elif name in ("ul", "ol"):
+            yield self._list(node)
+        elif name == "dl":
+            yield from self._definitions(node)
+        elif name == "table":
+            yield from self._table(node)
+        elif name == "blockquote":
+            inner = list(self._blocks(node.children))
+            yield from [element("blockquote", _language(node), *inner)] if inner else ()
+        elif _holds_form(node):
+            self._lose(f"what {tag(node)} holds stays, and does nothing")
+            yield from self._blocks(node.children)
+        else:
+            if name == "details":
+                self._lose("`<details>` is open")
+            elif name in _INLINE or name == "a":
+                self._lose(f"{tag(node)} around whole blocks is left out, and they stay")
+            inner = list(self._blocks(node.children))
+            yield from [element("div", _language(node), *inner)] if len(inner) > 1 else inner
+
+    def _lines(self, name: str, node: Node) -> Iterator[Element]:
+        """A heading and the like; blocks in it, which HTML does not allow, follow it."""
+        inside = [c for c in node.children if not (isinstance(c, Node) and _is_block(c))]
+        made = element(name, _language(node), *self._line(inside))
+        if len(made) or (made.text or "").strip():
+            yield made
+        yield from self._blocks(c for c in node.elements if _is_block(c))
+
+    def _list(self, node: Node) -> Element:
+        if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
+            self._lose("a numbered list counts from 1")
+        made = element(node.name, _language(node))
+        for child in node.children:
+            if isinstance(child, Node) and child.name == "li":
+                add(made, self._holder("li", child))
+            elif not (isinstance(child, str) and not child.strip()):
+                add(made, self._holder("li", Node("li", {}, [child])))
+        return made if len(made) else element("p")
+
+    def _holder(self, name: str, node: Node, attributes: dict[str, str] | None = None) -> Element:
+        """What may hold lines as well as blocks; a paragraph by itself stands without its box."""
+        made = element(name, _language(node) | (attributes or {}))
+        if any(isinstance(c, Node) and _is_block(c) for c in node.children):
+            add(made, *self._blocks(node.children))
+        else:
+            add(made, *self._line(node.children))
+        return made
+
+    def _definitions(self, node: Node) -> Iterator[Element]:
+        made = element("dl", _language(node))
+        for child in _flat(node, "div"):
+            if child.name == "dt":
+                add(made, element("dt", {}, *self._line([child])))
+            elif child.name == "dd":
+                add(made, self._holder("dd", child))
+        if len(made):
+            yield made
+
+    # --- tables
+
+    def _table(self, node: Node) -> Iterator[Element]:
+        """`caption`, `thead`, `tfoot`, then at least one `tbody`, as QTI orders them."""
+        made = element("table", _language(node))
+        parts: dict[str, list[Element]] = {"thead": [], "tfoot": [], "tbody": []}
+        loose: list[Node] = []
+        for child in node.elements:
+            if child.name == "caption":
+                add(made, element("caption", {}, *self._line([child])))
+            elif child.name in parts:
+                rows = [self._row(row) for row in child.elements if row.name == "tr"]
+                parts[child.name] += [element(child.name, {}, *rows)] if rows else []
+            elif child.name == "tr":
+                loose.append(child)
+        if loose:
+            parts["tbody"].append(element("tbody", {}, *map(self._row, loose)))
+        head, foot, body = parts["thead"], parts["tfoot"], parts["tbody"]
+        if not body:  # which QTI requires
+            body, head = [element("tbody", {}, *(row for part in head for row in part))], []
+        if any(len(part) for part in (*head, *foot, *body)):
+            add(made, *head[:1], *foot[:1], *head[1:], *foot[1:], *body)
+            yield made
+
+    def _row(self, row: Node) -> Element:
+        cells = (child for child in row.elements if child.name in ("td", "th"))
+        return element("tr", {}, *(self._cell(cell) for cell in cells))
+
+    def _cell(self, cell: Node) -> Element:
+        kept = {k: v for k, v in cell.attributes.items() if k in ("colspan", "rowspan")}
+        kept = {key: value for key, value in kept.items() if _NUMBER.fullmatch(value)}
+        scope = cell.attributes.get("scope", "")
+        if scope in ("row", "col", "rowgroup", "colgroup"):
+            kept["scope"] = scope
+        aligned = [c for c in sorted(cell.classes) if c in ("align-center", "align-right")]
+        return self._holder(cell.name, cell, kept | ({"class": aligned[0]} if aligned else {}))
+
+    # --- lines
+
+    def _line(self, content: Iterable[Content], *, pre: bool = False) -> Iterator[Element | str]:
+        for child in content:
+            if isinstance(child, str):
+                yield child if pre else _SPACE.sub(" ", child)
+            else:
+                yield from self._inline(child, pre)
+
+    def _inline(self, node: Node, pre: bool) -> Iterator[Element | str]:
+        name, inner = node.name, node.children
+        if name in _GONE or node.classes & _OWN:
+            return
+        if name == "math":
+            yield mathml(node)
+        elif pre and name in _NEVER_IN_PRE and name != "img":
+            yield from self._line(inner, pre=pre)
+        elif name in _INLINE:
+            yield element(name, _language(node), *self._line(inner, pre=pre))
+            if name in ("abbr", "acronym", "dfn") and node.attributes.get("title", "").strip():
+                yield f" ({node.attributes['title'].strip()})"
+        elif name == "br":
+            yield "\n" if pre else element("br")
+        elif name == "img":
+            yield from self._picture(node)
+        elif name == "a":
+            yield from self._link(node, pre)
+        elif name in _STRUCK:
+            self._lose("crossed-out text is marked by a class, which some platforms do not show")
+            yield element("span", {"class": STRUCK}, *self._line(inner, pre=pre))
+        elif name in _EMPHASIS:
+            yield element("em", _language(node), *self._line(inner, pre=pre))
+        elif name in _ACTIVE:
+            yield from self._active(node)
+        elif name in ("ruby", "rt", "rp"):
+            yield from self._ruby(node, pre)
+        elif _language(node):
+            yield element("span", _language(node), *self._line(inner, pre=pre))
+        else:
+            yield from self._line(inner, pre=pre)
+
+    def _ruby(self, node: Node, pre: bool) -> Iterator[Element | str]:
+        if node.name == "rt":
+            yield " ("
+        if node.name != "rp":
+            yield from self._line(node.children, pre=pre)
+        if node.name == "rt":
+            yield ")"
+
+    def _picture(self, node: Node) -> Iterator[Element | str]:
+        place = self._places.picture(node.attributes.get("src", ""))
+        alt = node.attributes.get("alt", "")
+        if place is None:
+            source = node.attributes.get("src", "")
+            self._lose(f"the picture `{source}` is replaced by its words")
+            yield alt
+            return
+        size = {k: v for k, v in node.attributes.items() if k in ("height", "width")}
+        size = {key: value for key, value in size.items() if _NUMBER.fullmatch(value)}
+        yield element("img", {"src": place, "alt": alt} | dict(sorted(size.items())))
+
+    def _link(self, node: Node, pre: bool) -> Iterator[Element | str]:
+        address = node.attributes.get("href", "")
+        inner = list(self._line(node.children, pre=pre))
+        place = self._places.link(address) if address else None
+        if place is not None:
+            yield element("a", {"href": place}, *inner)
+            return
+        if address:
+            why = "" if urlsplit(address).scheme else ", as the course has no `base_url`"
+            self._lose(f"the link to `{address}` is text{why}")
+        yield from inner
+
+    def _active(self, node: Node) -> Iterator[Element | str]:
+        kind = node.attributes.get("type", "").lower()
+        if node.name == "input" and kind == "checkbox":
+            yield "☑" if "checked" in node.attributes else "☐"
+            return
+        inner = list(self._line(node.children)) if node.name in ("object", "picture") else []
+        if node.name == "picture" and inner:
+            yield from inner
+            return
+        self._lose(f"{tag(node)} has no place in QTI and is left out")
+        yield from inner
+
+
+def tag(node: Node) -> str:
+    """How an element begins: `<video>`."""
+    return f"`<{node.name}>`"
+
+
+def _trim(made: Element) -> None:
+    """Take away the line ends at the end of a block of code."""
+    while len(made) and not (made[-1].tail or "").strip("\n"):
+        made[-1].tail = None
+        made = made[-1]
+    if len(made):
+        made[-1].tail = (made[-1].tail or "").rstrip("\n")
+    else:
+        made.text = (made.text or "").rstrip("\n")
+
+
+def _holds_form(node: Node) -> bool:
+    return node.name in ("form", "fieldset")
+
+
+def _is_block(node: Node) -> bool:
+    """Whether an element is, or holds, a block."""
+    if node.name == "math":
+        return False
+    if node.name in _ACTIVE or node.name in _GONE:
+        return False
+    return node.name in BLOCKS or any(map(_is_block, node.elements))
+
+
+def _language(node: Node) -> dict[str, str]:
+    said = node.attributes.get("lang", "")
+    return {"xml:lang": said} if _LANGUAGE.fullmatch(said) else {}
+
+
+def _flat(node: Node, name: str) -> Iterator[Node]:
+    """The elements in one, those in groups of a name as well."""
+    for child in node.elements:
+        if child.name == name:
+            yield from _flat(child, name)
+        else:
+            yield child
+
+
+def joined(content: Iterable[Content]) -> list[Content]:
+    """Content in which formulas that were cut so that a line may break in them are whole again."""
+    made: list[Content] = []
+    for child in content:
+        last = made[-1] if made else None
+        if isinstance(child, Node):
+            child = Node(child.name, child.attributes, joined(child.children))
+        if _is_formula(child) and _is_formula(last):
+            assert isinstance(last, Node) and isinstance(child, Node)
+            made[-1] = Node("math", last.attributes, [*last.children, *child.children])
+        else:
+            made.append(child)
+    return made
+
+
+def _is_formula(content: Content | None) -> bool:
+    return (
+        isinstance(content, Node)
+        and content.name == "math"
+        and content.attributes.get("display") != "block"
+    )

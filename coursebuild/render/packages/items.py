@@ -1,0 +1,372 @@
+"""A question as an item of QTI 2.1.
+
+Entry point: `made_items(page, quiz)`, from the page of a quiz's document.
+
+A quiz's texts are drawn as its page draws them, and brought into what QTI allows (`flow`). Names
+are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012:
+
+1. A response and outcomes are declared: the points, and what to say.
+2. The body has the question, hints that are opened one by one (`infoControl`), and an interaction.
+3. Response processing compares, and says which feedback is shown: that of each option that was
+   chosen, and the explanation.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable, Iterable
+from typing import assert_never
+from urllib.parse import unquote, urlsplit
+
+from coursebuild.model import (
+    AnyQuestion,
+    ChoiceQuestion,
+    NumericQuestion,
+    OpenQuestion,
+    OrderQuestion,
+    OutputQuestion,
+    Quiz,
+)
+from coursebuild.render import urls
+from coursebuild.render.context import PageContext
+from coursebuild.render.packages.flow import Flow, Places
+from coursebuild.render.packages.formulas import NAMESPACE as MATHML
+from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.render.quizzes import letter, output_line, shuffle, unit_html
+from coursebuild.source import Span
+from coursebuild.values import dataclass
+
+NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"
+SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/imsqti_v2p1.xsd"
+STYLE = "style.css"
+NAME = 32
+"""Characters that an identifier should have at most, for systems that keep no more."""
+
+_RESPONSE, _SCORE, _FEEDBACK, _EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
+
+
+@dataclass(frozen=True, slots=True)
+class MadeItem:
+    """A question as an item."""
+
+    identifier: str
+    data: bytes
+    pictures: tuple[str, ...]
+    """Site paths of the files that it shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Something of a question that an item cannot hold, or why there is no item."""
+
+    span: Span
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class MadeQuiz:
+    """A quiz as items."""
+
+    identifier: str
+    title: str
+    items: tuple[MadeItem, ...]
+    losses: tuple[Loss, ...]
+
+
+def made_items(page: PageContext, quiz: Quiz, base_url: str, language: str) -> MadeQuiz:
+    """A quiz as items, and what could not be kept."""
+    made, losses = [], []
+    for number, question in enumerate(quiz.questions, 1):
+        writer = _Writer(page, quiz, number, base_url, language)
+        item = writer.item(question)
+        losses += [Loss(question.span, what) for what in writer.flow.lost]
+        made += [item] if item is not None else []
+    return MadeQuiz(
+        identifier("quiz.", quiz.id, most=NAME),
+        quiz.title or quiz.id,
+        tuple(made),
+        tuple(losses),
+    )
+
+
+class _Writer:
+    """Writes one item."""
+
+    def __init__(
+        self, page: PageContext, quiz: Quiz, number: int, base_url: str, language: str
+    ) -> None:
+        self.page = page
+        self.quiz = quiz
+        self.number = number
+        self.base_url = base_url
+        self.language = language
+        self.pictures: dict[str, None] = {}
+        self.flow = Flow(Places(self._link, self._picture))
+
+    def item(self, question: AnyQuestion) -> MadeItem | None:
+        """The item, or nothing where the question has no answer."""
+        parts = self._parts(question)
+        if parts is None:
+            return None
+        name = identifier("q.", self.quiz.anchor(question.key), most=NAME)
+        words = self.page.tools.words
+        title = question.label or words("package.question", n=self.number)
+        root = element(
+            "assessmentItem",
+            {
+                "xmlns": NAMESPACE,
+                "xmlns:m": MATHML,
+                "xmlns:xsi": XSI,
+                "xsi:schemaLocation": f"{NAMESPACE} {SCHEMA}",
+                "identifier": name,
+                "title": f"{self.quiz.title}: {title}" if self.quiz.title else title,
+                "adaptive": "false",
+                "timeDependent": "false",
+                "xml:lang": self.language,
+            },
+        )
+        add(root, parts.response, *self._outcomes())
+        add(root, element("stylesheet", {"href": f"../{STYLE}", "type": "text/css"}))
+        add(root, self._body(question, parts))
+        explanation = self._explanation(question)
+        says = [_EXPLANATION] if explanation is not None else []
+        add(root, _processing(parts, says))
+        add(root, *parts.feedback, explanation)
+        return MadeItem(name, document(root), tuple(self.pictures))
+
+    def _outcomes(self) -> tuple[Element, Element]:
+        zero = element("defaultValue", {}, element("value", {}, "0"))
+        score = element("outcomeDeclaration", _declared(_SCORE, "single", "float"), zero)
+        score.set("normalMaximum", "1")
+        return score, element("outcomeDeclaration", _declared(_FEEDBACK, "multiple", "identifier"))
+
+    def _body(self, question: AnyQuestion, parts: _Parts) -> Element:
+        body = element("itemBody", {}, *self._blocks(question.text), *parts.before)
+        for number, hint in enumerate(question.hints, 1):
+            title = self.page.tools.words("package.hint", n=number)
+            add(body, element("infoControl", {"title": title}, *self._blocks(hint)))
+        add(body, *parts.interaction)
+        return body
+
+    def _explanation(self, question: AnyQuestion) -> Element | None:
+        inner: list[Element] = []
+        if isinstance(question, OpenQuestion):
+            inner += [self._said("package.reference"), *self._blocks(question.reference)]
+        inner += self._blocks(question.explain)
+        if isinstance(question, ChoiceQuestion) and question.sim is not None:
+            address = self._link(f"#{self.quiz.anchor(question.key)}")
+            if address is None:
+                self.flow.lost.append("its simulation is on its page alone, and left out")
+            else:
+                words = self.page.tools.words("package.simulation")
+                inner.append(element("p", {}, element("a", {"href": address}, words)))
+                self.flow.lost.append("its simulation is on its page alone, and the item links it")
+        return _feedback(_EXPLANATION, inner) if inner else None
+
+    # --- texts
+
+    def _blocks(self, content: tuple[object, ...]) -> list[Element]:
+        return self.flow.blocks(self.page.blocks(content))  # type: ignore[arg-type]
+
+    def _said(self, key: str, **values: str | int) -> Element:
+        return element("p", {}, self.page.tools.words(key, **values))
+
+    def _link(self, address: str) -> str | None:
+        parts = urlsplit(address)
+        if parts.scheme or parts.netloc:
+            return address if parts.scheme in ("http", "https", "mailto") else None
+        if not self.base_url:
+            return None
+        path = self._site_path(parts.path) if parts.path else self.page.place.path
+        rest = address[len(address.split("#", 1)[0].split("?", 1)[0]) :]
+        return f"{self.base_url.rstrip('/')}/{urls.encode(path)}{rest}"
+
+    def _picture(self, address: str) -> str | None:
+        parts = urlsplit(address)
+        if parts.scheme == "data":
+            return address
+        path = self._site_path(parts.path)
+        if parts.scheme or parts.netloc or not parts.path or not _is_file(path):
+            return None
+        self.pictures[path] = None
+        return f"../{urls.encode(path)}"
+
+    def _site_path(self, path: str) -> str:
+        folder = posixpath.dirname(self.page.place.path)
+        return posixpath.normpath(posixpath.join(folder, unquote(path)))
+
+    # --- kinds of questions
+
+    def _parts(self, question: AnyQuestion) -> _Parts | None:
+        match question:
+            case ChoiceQuestion():
+                return self._choice(question)
+            case NumericQuestion():
+                return self._numeric(question)
+            case OutputQuestion():
+                return self._output(question)
+            case OpenQuestion():
+                return self._open(question)
+            case OrderQuestion():
+                return self._order(question)
+            case _:
+                assert_never(question)
+
+    def _choice(self, question: ChoiceQuestion) -> _Parts:
+        names = [letter(index) for index in range(len(question.options))]
+        choices = [
+            element("simpleChoice", {"identifier": name}, *self._text(option.text))
+            for name, option in zip(names, question.options, strict=True)
+        ]
+        feedback = [
+            _feedback(name, self._blocks(option.feedback), title=name)
+            for name, option in zip(names, question.options, strict=True)
+            if option.feedback
+        ]
+        most = "0" if question.several else "1"
+        given = {"responseIdentifier": _RESPONSE, "shuffle": "false", "maxChoices": most}
+        cardinality = "multiple" if question.several else "single"
+        right = [names[index] for index in question.answers]
+        return _Parts(
+            _response(cardinality, "identifier", right),
+            (element("choiceInteraction", given, *choices),),
+            before=(self._said("package.choose_all"),) if question.several else (),
+            test=_matches,
+            feedback=tuple(feedback),
+            chosen=bool(feedback),
+        )
+
+    def _numeric(self, question: NumericQuestion) -> _Parts:
+        field = element("textEntryInteraction", {"responseIdentifier": _RESPONSE})
+        field.set("expectedLength", "12")
+        line = element("p", {}, field)
+        if question.unit:
+            add(line, " ", *self.flow.line(unit_html(question.unit)))
+        within = _double(question.tolerance)
+
+        def test() -> Element:
+            how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
+            return element("equal", how, *_compared())
+
+        return _Parts(_response("single", "float", [_double(question.answer)]), (line,), test=test)
+
+    def _output(self, question: OutputQuestion) -> _Parts | None:
+        answer = output_line(self.page, question.script, question.line)
+        if answer is None:
+            self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
+            return None
+        asked = self._said("package.output_of", path=question.script, line=question.line)
+        size = str(min(max(len(answer), 12), 80))
+        field = element("textEntryInteraction", {"responseIdentifier": _RESPONSE})
+        field.set("expectedLength", size)
+        return _Parts(
+            _response("single", "string", [answer]),
+            (element("p", {}, field),),
+            before=(asked,),
+            test=lambda: element("stringMatch", {"caseSensitive": "true"}, *_compared()),
+        )
+
+    def _open(self, question: OpenQuestion) -> _Parts:
+        reference = [self._said("package.reference"), *self._blocks(question.reference)]
+        given = {"responseIdentifier": _RESPONSE, "expectedLines": "6"}
+        return _Parts(
+            _response("single", "string", ()),
+            (
+                element("rubricBlock", {"view": "scorer"}, *reference),
+                element("extendedTextInteraction", given),
+            ),
+        )
+
+    def _order(self, question: OrderQuestion) -> _Parts:
+        shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
+        names = {index: letter(place) for place, index in enumerate(shown)}
+        choices = [
+            element(
+                "simpleChoice", {"identifier": names[index]}, *self._text(question.items[index])
+            )
+            for index in shown
+        ]
+        right = [names[index] for index in range(len(question.items))]
+        given = {"responseIdentifier": _RESPONSE, "shuffle": "false"}
+        return _Parts(
+            _response("ordered", "identifier", right),
+            (element("orderInteraction", given, *choices),),
+            before=(self._said("package.order"),),
+            test=_matches,
+        )
+
+    def _text(self, text: tuple[object, ...]) -> list[Element | str]:
+        return self.flow.line(self.page.inlines(text))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """What differs between the kinds of questions."""
+
+    response: Element
+    interaction: tuple[Element, ...]
+    before: tuple[Element, ...] = ()
+    """What to do, between the question and its hints."""
+    test: Callable[[], Element] | None = None
+    """An expression that is true for a right response; `None`: a person scores."""
+    feedback: tuple[Element, ...] = ()
+    chosen: bool = False
+    """Whether feedback is named by what was chosen."""
+
+
+def _is_file(path: str) -> bool:
+    return path.startswith("files/") or path.startswith("models/")
+
+
+def _declared(name: str, cardinality: str, base: str) -> dict[str, str]:
+    return {"identifier": name, "cardinality": cardinality, "baseType": base}
+
+
+def _response(cardinality: str, base: str, right: Iterable[str]) -> Element:
+    """A declaration of the response, with the right one where there is one."""
+    values = [element("value", {}, value) for value in right]
+    made = element("responseDeclaration", _declared(_RESPONSE, cardinality, base))
+    add(made, element("correctResponse", {}, *values) if values else None)
+    return made
+
+
+def _compared() -> tuple[Element, Element]:
+    """The response and the right one, which take part in a comparison."""
+    given = {"identifier": _RESPONSE}
+    return element("variable", given), element("correct", given)
+
+
+def _matches() -> Element:
+    return element("match", {}, *_compared())
+
+
+def _feedback(name: str, content: list[Element], title: str = "") -> Element:
+    given = {"outcomeIdentifier": _FEEDBACK, "identifier": name, "showHide": "show"}
+    return element("modalFeedback", given | ({"title": title} if title else {}), *content)
+
+
+def _processing(parts: _Parts, says: list[str]) -> Element:
+    """The points, and what is said."""
+    made = element("responseProcessing")
+    if parts.test is not None:
+        right = element("responseIf", {}, parts.test(), _set(_SCORE, _value("float", "1")))
+        wrong = element("responseElse", {}, _set(_SCORE, _value("float", "0")))
+        add(made, element("responseCondition", {}, right, wrong))
+    said = [element("variable", {"identifier": _RESPONSE})] if parts.chosen else []
+    said += [_value("identifier", name) for name in says]
+    if said:
+        add(made, _set(_FEEDBACK, element("multiple", {}, *said)))
+    return made
+
+
+def _set(name: str, value: Element) -> Element:
+    return element("setOutcomeValue", {"identifier": name}, value)
+
+
+def _value(base: str, text: str) -> Element:
+    return element("baseValue", {"baseType": base}, text)
+
+
+def _double(value: float) -> str:
+    """As XML Schema writes a number, digit by digit."""
+    return repr(float(value))

@@ -1,0 +1,128 @@
+"""Quizzes as a content package of IMS QTI 2.1.
+
+Entry points: `quiz_files`, `style_file`, `manifest`.
+
+One test for each quiz, one item for each question, and the pictures that they show. Paths:
+`imsmanifest.xml`, `style.css`, `tests/….xml`, `items/….xml`, `files/…`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from coursebuild.model import Course
+from coursebuild.render import urls
+from coursebuild.render.packages.flow import STRUCK
+from coursebuild.render.packages.items import NAMESPACE, SCHEMA, STYLE, MadeItem, MadeQuiz
+from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.results import OutputFile
+from coursebuild.values import replace
+
+MANIFEST = "imsmanifest.xml"
+CP = "http://www.imsglobal.org/xsd/imscp_v1p1"
+_CP_SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/qtiv2p1_imscpv1p2_v1p0.xsd"
+_STYLE = f"""\
+.{STRUCK} {{ text-decoration: line-through; }}
+.align-center {{ text-align: center; }}
+.align-right {{ text-align: right; }}
+"""
+
+
+def test_path(quiz: MadeQuiz) -> str:
+    """Where a quiz is in the package."""
+    return f"tests/{quiz.identifier}.xml"
+
+
+def item_path(item: MadeItem) -> str:
+    """Where a question is."""
+    return f"items/{item.identifier}.xml"
+
+
+def quiz_files(quiz: MadeQuiz) -> Iterator[OutputFile]:
+    """The files of a quiz: its test, and its items."""
+    yield OutputFile(test_path(quiz), _test(quiz))
+    for item in quiz.items:
+        yield OutputFile(item_path(item), item.data)
+
+
+def without_bytes(quiz: MadeQuiz) -> MadeQuiz:
+    """What the manifest needs of a quiz."""
+    return replace(quiz, items=tuple(replace(item, data=b"") for item in quiz.items), losses=())
+
+
+def style_file() -> OutputFile:
+    """The style sheet of all items."""
+    return OutputFile(STYLE, _STYLE.encode())
+
+
+def manifest(course: Course, quizzes: Iterable[MadeQuiz]) -> OutputFile:
+    """The package's manifest, which lists every file with the item that shows it."""
+    resources = element("resources")
+    for quiz in quizzes:
+        names = [f"RES-{item.identifier}" for item in quiz.items]
+        path = test_path(quiz)
+        given = {"identifier": f"RES-{quiz.identifier}", "type": "imsqti_test_xmlv2p1"}
+        test = element("resource", given | {"href": path}, _file(path))
+        add(resources, test)
+        add(test, *(element("dependency", {"identifierref": name}) for name in names))
+        for item, name in zip(quiz.items, names, strict=True):
+            path = item_path(item)
+            files = (_file(path), _file(STYLE), *map(_file, item.pictures))
+            given = {"identifier": name, "type": "imsqti_item_xmlv2p1", "href": path}
+            add(resources, element("resource", given, *files))
+    root = element(
+        "manifest",
+        {
+            "xmlns": CP,
+            "xmlns:xsi": XSI,
+            "xsi:schemaLocation": f"{CP} {_CP_SCHEMA} {NAMESPACE} {SCHEMA}",
+            "identifier": identifier("course.", course.key),
+        },
+        element(
+            "metadata",
+            {},
+            element("schema", {}, "QTIv2.1 Package"),
+            element("schemaversion", {}, "1.0.0"),
+        ),
+        element("organizations"),
+        resources,
+    )
+    return OutputFile(MANIFEST, document(root, pretty=True))
+
+
+def _file(path: str) -> Element:
+    return element("file", {"href": urls.encode(path)})
+
+
+def _test(quiz: MadeQuiz) -> bytes:
+    """A test of one section, whose points are the sum of those of its items."""
+    items = (
+        element(
+            "assessmentItemRef", {"identifier": item.identifier, "href": f"../{item_path(item)}"}
+        )
+        for item in quiz.items
+    )
+    section = element(
+        "assessmentSection",
+        {"identifier": "section", "title": quiz.title, "visible": "true"},
+        *items,
+    )
+    how = {"navigationMode": "nonlinear", "submissionMode": "individual"}
+    score = {"identifier": "SCORE", "cardinality": "single", "baseType": "float"}
+    total = element("sum", {}, element("testVariables", {"variableIdentifier": "SCORE"}))
+    root = element(
+        "assessmentTest",
+        {
+            "xmlns": NAMESPACE,
+            "xmlns:xsi": XSI,
+            "xsi:schemaLocation": f"{NAMESPACE} {SCHEMA}",
+            "identifier": quiz.identifier,
+            "title": quiz.title,
+        },
+        element("outcomeDeclaration", score),
+        element("testPart", {"identifier": "part"} | how, section),
+        element(
+            "outcomeProcessing", {}, element("setOutcomeValue", {"identifier": "SCORE"}, total)
+        ),
+    )
+    return document(root, pretty=True)

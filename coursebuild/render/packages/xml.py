@@ -1,0 +1,65 @@
+"""Elements of XML, and names that it allows.
+
+Entry points: `element`, `document`; `identifier`, a name out of any text.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from typing import TypeAlias
+from xml.etree.ElementTree import Element as Element
+from xml.etree.ElementTree import indent, tostring
+
+XSI = "http://www.w3.org/2001/XMLSchema-instance"
+
+Child: TypeAlias = "Element | str | None"
+
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What XML 1.0 has no place for, section 2.2."""
+_OUTSIDE = re.compile("[^A-Za-z0-9.-]")
+
+
+def clean(text: str) -> str:
+    """A text without the characters that XML cannot hold."""
+    return _FORBIDDEN.sub("\ufffd", text)
+
+
+def element(name: str, attributes: dict[str, str] | None = None, *children: Child) -> Element:
+    """An element; a child that is `None` is left out."""
+    made = Element(name, {key: clean(value) for key, value in (attributes or {}).items()})
+    add(made, *children)
+    return made
+
+
+def add(parent: Element, *children: Child) -> None:
+    """Append elements and texts, in their order."""
+    for child in children:
+        if child is None:
+            continue
+        if isinstance(child, Element):
+            parent.append(child)
+        elif len(parent):
+            parent[-1].tail = (parent[-1].tail or "") + clean(child)
+        else:
+            parent.text = (parent.text or "") + clean(child)
+
+
+def document(root: Element, *, pretty: bool = False) -> bytes:
+    """A whole file; `pretty` is for one in which blanks between elements mean nothing."""
+    if pretty:
+        indent(root, " ")
+    text = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def identifier(prefix: str, text: str, *, most: int = 0) -> str:
+    """An NCName of ASCII; other texts, other names.
+
+    With `most` characters, a longer one ends with digits of its hash.
+    """
+    name = prefix + _OUTSIDE.sub(lambda found: f"_{ord(found[0]):x}_", text)
+    if most and len(name) > most:
+        digest = hashlib.sha256(name.encode()).hexdigest()[:12]
+        name = f"{name[: most - 13]}_{digest}"
+    return name

@@ -1,0 +1,156 @@
+"""What the documents of a course say of each other: links, terms and symbols, brought together.
+
+Entry points: `mentions(document, course, lexicon)`, for one document; `CrossReferences.of`, for all
+of them.
+
+Each document is looked at once. What is kept is what pages show: who refers to a lesson, where a
+term is defined and used, which symbols there are and where.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
+
+from coursebuild.model import (
+    Course,
+    DefinedTerm,
+    Document,
+    Lesson,
+    LessonTarget,
+    Lexicon,
+    Link,
+    Page,
+    TermTarget,
+    document_inlines,
+    resolve,
+)
+from coursebuild.render import urls
+from coursebuild.values import dataclass, field
+
+Owner: TypeAlias = Lesson | Page
+
+
+def owner_path(owner: Owner) -> str:
+    """The site path of the page of a lesson, or of another page."""
+    return urls.lesson_path(owner) if isinstance(owner, Lesson) else urls.page_path(owner)
+
+
+@dataclass(frozen=True, slots=True)
+class Mentions:
+    """What one document says of others, and adds to what all share."""
+
+    lessons: frozenset[str] = frozenset()
+    """Ids of lessons that it links to."""
+    terms: frozenset[str] = frozenset()
+    """Ids of terms that it links to."""
+    lexicon: Lexicon = field(default_factory=Lexicon)
+
+
+@dataclass(frozen=True, slots=True)
+class GlossaryTerm:
+    """A term of the course."""
+
+    term: DefinedTerm
+    owner: Owner
+    """Where it is defined."""
+    used: tuple[Owner, ...]
+    """Where else it is linked to, in the order of the course."""
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolMeaning:
+    """What a symbol stands for, and in which documents."""
+
+    text: str
+    unit: str
+    owners: tuple[Owner, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CourseSymbol:
+    """A symbol of the formulas of a course."""
+
+    symbol: str
+    """See `SymbolUse`."""
+    section: tuple[str, str]
+    """Anchor and text of the heading under which it stands first; empty before the first."""
+    owners: tuple[Owner, ...]
+    """Where it is used, in the order of the course."""
+    meanings: tuple[SymbolMeaning, ...]
+    """In the order of the course; none where nobody says."""
+
+
+@dataclass(frozen=True, slots=True)
+class CrossReferences:
+    """See the module."""
+
+    referrers: Mapping[str, tuple[Owner, ...]] = field(default_factory=dict)
+    """Who links to a lesson, by its id, in the order of the course."""
+    terms: Mapping[str, GlossaryTerm] = field(default_factory=dict)
+    """By id; of two definitions the first."""
+    symbols: tuple[CourseSymbol, ...] = ()
+    """In the order in which they are first used."""
+
+    @classmethod
+    def of(cls, documents: Iterable[tuple[Owner, Mentions]]) -> CrossReferences:
+        """All of it, from lessons and pages in the order of the course."""
+        referrers: dict[str, list[Owner]] = {}
+        users: dict[str, list[Owner]] = {}
+        defined: dict[str, tuple[DefinedTerm, Owner]] = {}
+        rows: dict[str, _Row] = {}
+        for owner, said in documents:
+            for id in said.lessons:
+                if not (isinstance(owner, Lesson) and owner.id == id):
+                    referrers.setdefault(id, []).append(owner)
+            for id in said.terms:
+                users.setdefault(id, []).append(owner)
+            for term in said.lexicon.terms:
+                defined.setdefault(term.id, (term, owner))
+            _note_symbols(rows, owner, said.lexicon)
+        terms = {
+            id: GlossaryTerm(term, owner, tuple(o for o in users.get(id, ()) if o is not owner))
+            for id, (term, owner) in defined.items()
+        }
+        symbols = tuple(row.made(symbol) for symbol, row in rows.items())
+        return cls({id: tuple(found) for id, found in referrers.items()}, terms, symbols)
+
+
+@dataclass(slots=True)
+class _Row:
+    """A symbol, as far as the course was looked at."""
+
+    section: tuple[str, str]
+    owners: list[Owner] = field(default_factory=list)
+    meanings: dict[tuple[str, str], list[Owner]] = field(default_factory=dict)
+
+    def made(self, symbol: str) -> CourseSymbol:
+        """The whole."""
+        meanings = (SymbolMeaning(*said, tuple(owners)) for said, owners in self.meanings.items())
+        return CourseSymbol(symbol, self.section, tuple(self.owners), tuple(meanings))
+
+
+def _note_symbols(rows: dict[str, _Row], owner: Owner, lexicon: Lexicon) -> None:
+    for use in lexicon.symbols:
+        row = rows.get(use.symbol)
+        if row is None:
+            section = lexicon.sections[use.section] if use.section >= 0 else ("", "")
+            row = rows[use.symbol] = _Row(section)
+        row.owners.append(owner)
+        if use.meaning:
+            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
+
+
+def mentions(document: Document, course: Course, lexicon: Lexicon) -> Mentions:
+    """What a document says; its skeleton does as well."""
+    lessons: set[str] = set()
+    terms: set[str] = set()
+    path = document.source.path
+    for inline in document_inlines(document):
+        if isinstance(inline, Link):
+            target = resolve(inline.target, course, path)
+            if isinstance(target, LessonTarget):
+                lessons.add(target.id)
+            elif isinstance(target, TermTarget):
+                terms.add(target.id)
+    return Mentions(frozenset(lessons), frozenset(terms), lexicon)

@@ -1,0 +1,189 @@
+"""The index of a course: terms and the pages that have them, in many small files.
+
+Entry points: `Plan`, how many files there are; `cells` and `shard`, by which they are made.
+
+A query loads the file of each of its words, and no other. Terms that begin alike stand in one file,
+so that the beginning of a word finds it. A third kind of file has the terms alone: by these a
+misspelt word is set right.
+
+1. Pages are dealt out to buckets by their path. The terms of a bucket's pages are sorted into the
+   shards of the index; what one shard gets of one bucket is a slice, and slices go by their digest.
+2. Shards stand in groups; the slices of one bucket for one group are a cell, which is kept.
+3. A shard is put together from its slices of all buckets, and is named by their digests. An edit
+   makes one bucket's cells anew, and of the shards those of which a slice is another.
+
+So what is held at once is a bucket or a column of cells, and every file follows from the pages and
+from nothing else.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+
+from coursebuild.render.search.words import is_fuzzy, shelf_of
+from coursebuild.values import dataclass
+
+FORMAT = 1
+"""Of the files; part of every name."""
+_PAGES_A_BUCKET = 16
+_PAGES_A_SHARD = 4
+_MOST_SHARDS = 1024
+_SHARDS_A_GROUP = 32
+_DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How an index is cut: by the number of pages alone."""
+
+    buckets: int
+    terms: int
+    """Shards of terms with their pages."""
+    words: int
+    """Shards of terms alone."""
+
+    @classmethod
+    def of(cls, pages: int) -> Plan:
+        """For a number of pages; all are powers of two."""
+        terms = min(_MOST_SHARDS, _below(pages / _PAGES_A_SHARD))
+        return cls(_below(pages / _PAGES_A_BUCKET), terms, _below(terms / 16))
+
+    @property
+    def groups(self) -> tuple[range, ...]:
+        """Numbers of the shards that stand together: those with pages, then those without."""
+        step, end = _SHARDS_A_GROUP, self.terms
+        return (*(range(at, min(at + step, end)) for at in range(0, end, step)), self._alone)
+
+    @property
+    def _alone(self) -> range:
+        return range(self.terms, self.terms + self.words)
+
+    def bucket(self, path: str) -> int:
+        """Which bucket has a page."""
+        return _hash(path) & (self.buckets - 1)
+
+    def shards(self, term: str) -> tuple[int, ...]:
+        """Numbers of the shards that have a term."""
+        first = _placed(shelf_of(term)) & (self.terms - 1)
+        if not is_fuzzy(term):
+            return (first,)
+        return first, self.terms + (_placed(term[0]) & (self.words - 1))
+
+
+def _below(number: float) -> int:
+    """The largest power of two that is no larger, and at least one."""
+    return 1 << max(0, int(number).bit_length() - 1)
+
+
+def _hash(text: str) -> int:
+    """FNV-1a of the text in UTF-8, 32 bits, as the browser computes it."""
+    value = 0x811C9DC5
+    for byte in text.encode("utf-8", "surrogatepass"):
+        value = (value ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return value
+
+
+_placed = functools.lru_cache(maxsize=1 << 14)(_hash)
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """What the index gets of one bucket."""
+
+    groups: tuple[bytes, ...]
+    """For each group of shards its slices; see `slices`."""
+    digests: bytes
+    """Of all slices in order, `DIGEST` bytes each."""
+
+
+DIGEST = 8
+
+
+def cells(plan: Plan, pages: Iterable[bytes]) -> Cells:
+    """Sort the terms of a bucket's pages, given in the order of the course, into slices."""
+    found: list[dict[str, list[str]]] = [{} for _ in range(plan.terms + plan.words)]
+    pages_of: dict[str, list[str]] = {}
+    for number, data in enumerate(pages):
+        prefix = f"{number:x}"
+        for line in data.decode().split("\n") if data else ():
+            term = line[1:]
+            known = pages_of.get(term)
+            if known is None:
+                known = pages_of[term] = []
+            known.append(prefix + line[0])
+    for term, having in pages_of.items():
+        first, *others = plan.shards(term)
+        found[first][term] = having
+        for shard in others:
+            found[shard][term] = []
+    slices = [_slice(terms) for terms in found]
+    groups = tuple(b"\0".join(slices[n] for n in group) for group in plan.groups)
+    digests = b"".join(hashlib.blake2b(part, digest_size=DIGEST).digest() for part in slices)
+    return Cells(groups, digests)
+
+
+def _slice(terms: dict[str, list[str]]) -> bytes:
+    """Lines of a term and the pages that have it: their hexadecimal number here, and the weight."""
+    return "\n".join(f"{term} {' '.join(terms[term])}" for term in sorted(terms)).encode()
+
+
+def slices(group: bytes) -> list[bytes]:
+    """The slices of a cell."""
+    return group.split(b"\0")
+
+
+def shard(parts: Iterable[tuple[bytes, Sequence[int]]]) -> str:
+    """A shard as the browser reads it, from its slices of all buckets.
+
+    Args:
+        parts: slices, and for each the numbers that its bucket's pages have in the course.
+
+    Returns:
+        Lines of a term and, after a blank, its pages: rising numbers as differences to the one
+        before, times 16 and with the weight, each in digits of five bits, the lowest first.
+    """
+    found: dict[str, list[int]] = {}
+    for part, numbers in parts:
+        for line in part.decode().split("\n") if part else ():
+            term, _, pages = line.partition(" ")
+            held = found.setdefault(term, [])
+            for page in pages.split():
+                held.append(numbers[int(page[:-1], 16)] << 4 | int(page[-1], 16))
+    return "\n".join(_line(term, found[term]) for term in sorted(found))
+
+
+def _line(term: str, pages: list[int]) -> str:
+    if not pages:
+        return term
+    pages.sort()
+    said, before = [f"{term} "], 0
+    for page in pages:
+        said.append(_digits(page - (before << 4)))
+        before = page >> 4
+    return "".join(said)
+
+
+@functools.lru_cache(maxsize=1 << 14)
+def _digits(value: int) -> str:
+    """A number in digits of five bits, the lowest first; all but the last have the sixth bit."""
+    said = ""
+    while value > 31:
+        said += _DIGIT[value & 31 | 32]
+        value >>= 5
+    return said + _DIGIT[value]
+
+
+def names(plan: Plan, digests: Sequence[bytes], order: str) -> Iterator[str]:
+    """What each shard is called by: a hash of all that it is made from.
+
+    Args:
+        plan: of the index.
+        digests: of the slices of each bucket.
+        order: a digest of the order of all pages, whose numbers the shards have.
+    """
+    for at in range(0, (plan.terms + plan.words) * DIGEST, DIGEST):
+        parts = b"".join(bucket[at : at + DIGEST] for bucket in digests)
+        whole = hashlib.sha256(f"{FORMAT} {order} ".encode() + parts)
+        yield whole.hexdigest()[:8]

@@ -1,0 +1,111 @@
+"""A page as it is searched: its text for the reader's browser, and its terms for the index.
+
+Entry points: `searched(sheet, document, body)`; its steps `page_text`, `packed` and `terms`;
+`call`, a file of the index.
+"""
+
+from __future__ import annotations
+
+import json
+
+from coursebuild.model import Document
+from coursebuild.render.characters import visible
+from coursebuild.render.lesson import LessonHead
+from coursebuild.render.search.drawn import drawn_sections
+from coursebuild.render.search.sections import document_sections
+from coursebuild.render.search.values import PageText, Piece, Searched, Section
+from coursebuild.render.search.words import counted
+from coursebuild.render.sheet import Highlighted, Sheet
+
+_LEFT_OUT = frozenset({"home", "notfound", "search"})
+"""Kinds of pages that nobody looks for: all that stands on them stands on others as well."""
+_LEADS = frozenset({"level", "stub"})
+"""Kinds of pages of which the title and the summary count: the rest is of other pages."""
+TITLE, HEADING, TEXT, CODE = 3, 2, 1, 0
+"""Where a term stands, by weight."""
+_FIELDS = {"text": TEXT, "formula": TEXT, "code": CODE, "output": CODE}
+_SHORT = {"text": "t", "formula": "f", "code": "c", "output": "o"}
+_FUNCTION = "coursebuildSearch.take"
+"""What a file of the index calls: browsers load scripts from a disk, but no other data."""
+
+
+def searched(sheet: Sheet, document: Document | None, body: str) -> Searched | None:
+    """What a page gives to the search; `None` where it is not searched. See `page_text`."""
+    text = page_text(sheet, document, body)
+    if text is None:
+        return None
+    return Searched(text.name, call("page", "", packed(text)), terms(text))
+
+
+def page_text(sheet: Sheet, document: Document | None, body: str) -> PageText | None:
+    """What a page is found by; `None` where it is not searched.
+
+    Args:
+        sheet: what is drawn.
+        document: of the page, with its prose, where it has one.
+        body: as it was drawn.
+    """
+    if sheet.kind in _LEFT_OUT or not (sheet.indexed or sheet.kind in _LEADS):
+        return None
+    head = sheet.values.get("lesson")
+    name = head.id if isinstance(head, LessonHead) else ""
+    lead = (sheet.description, *(head.objectives if isinstance(head, LessonHead) else ()))
+    if document is not None:
+        kinds = sheet.shown.callouts if sheet.shown is not None else {}
+        labels = {kind: shown.label for kind, shown in kinds.items()}
+        return PageText(sheet.title, name, document_sections(document, lead, labels))
+    code = [v.text for v in sheet.values.values() if isinstance(v, Highlighted)]
+    pieces = [Piece("text", text) for text in lead if text] + [Piece("code", t) for t in code if t]
+    drawn = drawn_sections(body) if sheet.kind not in _LEADS else ()
+    return PageText(sheet.title, name, (Section("", "", 0, tuple(pieces)), *drawn))
+
+
+def call(kind: str, name: str, value: object) -> bytes:
+    """A file of the index: a script that hands over a value."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    return visible(f"{_FUNCTION}({json.dumps(kind)},{json.dumps(name)},{text})\n").encode()
+
+
+def packed(text: PageText) -> object:
+    """The sections of a page as its file has them."""
+    return [
+        [
+            section.anchor,
+            section.heading,
+            section.level,
+            [[_SHORT[piece.kind], piece.text] for piece in section.pieces],
+            " ".join(section.also),
+        ]
+        for section in text.sections
+    ]
+
+
+def terms(text: PageText) -> bytes:
+    """The terms of a page with their weight: lines of a hexadecimal digit and a term, sorted.
+
+    The digit is the field (0 to 3) times four, and how often the term occurs on the page: 0 for
+    once, 1 up to three times, 2 up to nine, 3 for more.
+    """
+    fields: dict[str, int] = {}
+    times: dict[str, int] = {}
+    for field, said in sorted(_said(text).items()):
+        for term, count in counted("\n".join(said)).items():
+            fields[term] = field
+            times[term] = times.get(term, 0) + count
+    lines = (f"{fields[t] << 2 | _often(times[t]):x}{t}" for t in sorted(fields))
+    return "\n".join(lines).encode("utf-8", "replace")
+
+
+def _said(text: PageText) -> dict[int, list[str]]:
+    """What the page says, by field."""
+    found: dict[int, list[str]] = {TITLE: [text.name, text.title], HEADING: [], TEXT: [], CODE: []}
+    for section in text.sections:
+        found[HEADING].append(section.heading)
+        found[CODE] += section.also
+        for piece in section.pieces:
+            found[_FIELDS[piece.kind]].append(piece.text)
+    return found
+
+
+def _often(count: int) -> int:
+    return 0 if count == 1 else 1 if count <= 3 else 2 if count <= 9 else 3

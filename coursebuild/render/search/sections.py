@@ -1,0 +1,220 @@
+"""A document as sections that are searched.
+
+Entry point: `document_sections(document, lead, labels)`.
+
+1. The blocks are walked in order, what stands in containers included; a heading begins a section.
+2. Formulas become lines of plain text (`tex`); the names of their commands are kept beside.
+3. Answers and explanations of quizzes are left out: a search must not give them away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from html import unescape
+from typing import assert_never
+
+from coursebuild.model import (
+    Block,
+    BlockQuote,
+    Callout,
+    ChoiceQuestion,
+    CodeBlock,
+    Document,
+    Emphasis,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Io,
+    Lab,
+    Link,
+    ListBlock,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    OrderQuestion,
+    Paragraph,
+    PlainCode,
+    Quiz,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Term,
+    Text,
+    ThematicBreak,
+)
+from coursebuild.model.inlines import CodeSpan
+from coursebuild.render.search.tex import plain_formula
+from coursebuild.render.search.values import Kind, Piece, Section
+
+_TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
+_BLANKS = re.compile(r"\s+")
+
+
+def document_sections(
+    document: Document, lead: Iterable[str], labels: Mapping[str, str]
+) -> tuple[Section, ...]:
+    """The sections of a document.
+
+    Args:
+        document: with its prose, not its skeleton.
+        lead: paragraphs that stand above the document on its page.
+        labels: of the kinds of callouts, by name.
+    """
+    reader = _Reader(labels)
+    for text in lead:
+        reader.add("text", text)
+    reader.blocks(document.blocks)
+    for footnote in document.footnotes:
+        reader.blocks(footnote.blocks)
+    return reader.ended()
+
+
+class _Reader:
+    def __init__(self, labels: Mapping[str, str]) -> None:
+        self._labels = labels
+        self._done: list[Section] = []
+        self._begin("", "", 0)
+
+    def _begin(self, anchor: str, heading: str, level: int) -> None:
+        self._anchor, self._heading, self._level = anchor, heading, level
+        self._pieces: list[Piece] = []
+        self._also: dict[str, None] = {}
+
+    def ended(self) -> tuple[Section, ...]:
+        """All sections; one with nothing in it only where it has a heading."""
+        if self._anchor or self._pieces or not self._done:
+            pieces, also = tuple(self._pieces), tuple(self._also)
+            self._done.append(Section(self._anchor, self._heading, self._level, pieces, also))
+        return tuple(self._done)
+
+    def add(self, kind: Kind, text: str) -> None:
+        """A piece of the section, unless there is nothing in it."""
+        text = text.strip("\n").rstrip() if kind in ("code", "output") else _line(text)
+        if text:
+            self._pieces.append(Piece(kind, text))
+
+    def blocks(self, blocks: Iterable[Block]) -> None:
+        """Blocks in order."""
+        for block in blocks:
+            self._block(block)
+
+    def _block(self, block: Block) -> None:
+        match block:
+            case Heading():
+                heading = _line(self._text(block.children))
+                self.ended()
+                self._begin(block.anchor, heading, block.level)
+            case Paragraph() | HtmlFlow():
+                self.add("text", self._text(block.children))
+            case ListBlock():
+                for item in block.items:
+                    self.blocks(item.blocks)
+            case BlockQuote():
+                self.blocks(block.blocks)
+            case Callout():
+                label = self._labels.get(block.kind, block.kind)
+                self.add("text", f"{label}: {self._text(block.title)}" if block.title else label)
+                self.blocks(block.blocks)
+            case MathBlock():
+                self.add("formula", self._formula(block.tex.text))
+            case Table():
+                for row in (block.header, *block.rows):
+                    self.add("text", " | ".join(self._text(cell.children) for cell in row))
+            case HtmlBlock():
+                self.add("text", unescape(_TAG.sub(" ", block.html)))
+            case ThematicBreak():
+                pass
+            case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
+                self._code(block)
+            case Io() | Lab() | Quiz():
+                self._card(block)
+            case _:
+                assert_never(block)
+
+    def _code(self, block: CodeBlock | PlainCode | Mjcf | Script | Recording) -> None:
+        match block:
+            case CodeBlock() | PlainCode() | Mjcf():
+                self.add("code", block.code.text)
+            case Script():
+                self._also[block.path] = None
+                self.add("code", block.code.text)
+            case Recording():
+                if isinstance(block.body, Table):
+                    self._block(block.body)
+                else:
+                    self.add("output", block.body.text)
+            case _:
+                assert_never(block)
+
+    def _card(self, block: Io | Lab | Quiz) -> None:
+        match block:
+            case Io():
+                for part in (block.input, block.process, block.output):
+                    self.add("text", self._text(part))
+            case Lab():
+                self.add("text", block.title)
+                self.blocks(block.note)
+                labels = [control.label for control in block.controls]
+                labels += [readout.label for readout in block.readouts]
+                self.add("text", ", ".join(filter(None, labels)))
+                if block.model is not None:
+                    self._also[block.model] = None
+                if block.xml is not None:
+                    self.add("code", block.xml.text)
+            case Quiz():
+                self.add("text", block.title)
+                for question in block.questions:
+                    self.blocks(question.text)
+                    if isinstance(question, ChoiceQuestion):
+                        for option in question.options:
+                            self.add("text", self._text(option.text))
+                    elif isinstance(question, OrderQuestion):
+                        # In the order of their texts: how they are written is the answer.
+                        for text in sorted(map(self._text, question.items)):
+                            self.add("text", text)
+            case _:
+                assert_never(block)
+
+    def _formula(self, tex: str) -> str:
+        text, names = plain_formula(tex)
+        self._also.update(dict.fromkeys(names))
+        return text
+
+    def _text(self, inlines: Iterable[Inline]) -> str:
+        return "".join(self._parts(inlines))
+
+    def _parts(self, inlines: Iterable[Inline]) -> Iterator[str]:
+        for inline in inlines:
+            match inline:
+                case Text() | CodeSpan() | NumberBinding():
+                    yield inline.text
+                case Math():
+                    yield self._formula(inline.tex.text)
+                    if inline.meaning is not None:
+                        self._also[inline.meaning.text] = None
+                case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+                    yield from self._parts(inline.children)
+                case Image():
+                    yield inline.alt
+                case SoftBreak() | HardBreak():
+                    yield " "
+                case RawInline():
+                    yield " " if inline.html.startswith(("<br", "<BR")) else ""
+                case FootnoteRef():
+                    pass
+                case _:
+                    assert_never(inline)
+
+
+def _line(text: str) -> str:
+    return _BLANKS.sub(" ", text).strip()

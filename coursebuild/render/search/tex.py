@@ -1,0 +1,166 @@
+"""TeX as a line of plain text: what a formula is found by, and how a search result shows it.
+
+Entry point: `plain_formula(tex)`, such as `τ = I_xx dω/dt` and the names of the commands in it.
+
+It never fails: what it does not know it leaves out of the text, and what does not balance ends
+where the TeX ends. That a formula parses is checked elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from coursebuild.render.search.words import GREEK
+
+_PIECE = re.compile(r"\\([A-Za-z]+)\*?|\\(.)|%[^\n]*|([{}^_&~'])|([^\\{}^_&~'%]+)", re.DOTALL)
+
+_SIGNS = {
+    **{"partial": "∂", "nabla": "∇", "int": "∫", "iint": "∬", "oint": "∮", "sum": "∑"},
+    **{"prod": "∏", "infty": "∞", "times": "×", "cdot": "·", "pm": "±", "approx": "≈"},
+    **{"le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "ne": "≠", "neq": "≠", "propto": "∝"},
+    **{"to": "→", "rightarrow": "→", "Rightarrow": "⇒", "mapsto": "↦", "in": "∈", "ell": "ℓ"},
+    **{"otimes": "⊗", "perp": "⊥", "parallel": "∥", "equiv": "≡", "sim": "∼", "ll": "≪"},
+    **{"gg": "≫", "dots": "…", "ldots": "…", "cdots": "…", "circ": "°", "degree": "°"},
+    **{"lVert": "‖", "rVert": "‖", "Vert": "‖", "langle": "⟨", "rangle": "⟩", "hbar": "ℏ"},
+    **{"forall": "∀", "exists": "∃", "dagger": "†", "top": "⊤", "prime": "′", "mid": "|"},
+}
+_NAMED = frozenset(
+    "sin cos tan cot sec csc arcsin arccos arctan sinh cosh tanh exp log ln lim max min sup inf det"
+    " dim ker arg deg gcd Pr tr".split()
+)
+"""Functions, which are written as they are called."""
+_STYLE = frozenset(
+    "left right big Big bigg Bigg bigl bigr Bigl Bigr middle displaystyle textstyle scriptstyle"
+    " limits nolimits quad qquad text textrm textit textbf mathrm mathbf mathit mathsf mathcal"
+    " mathbb mathfrak mathtt boldsymbol bm symbf operatorname begin end nonumber notag label tag"
+    " mathstrut strut phantom hphantom vphantom color textcolor mathop mathrel mathbin".split()
+)
+"""How things look: by these nobody searches."""
+_SKIPPED = frozenset("begin end label tag color hspace vspace phantom hphantom vphantom".split())
+"""Commands whose argument is no part of the formula."""
+_VARIANTS = {"varepsilon": "ε", "vartheta": "ϑ", "varphi": "φ", "varrho": "ϱ", "varpi": "ϖ"}
+_VARIANTS["varsigma"] = "ς"
+_MATHEMATICAL = "\U0001d400-\U0001d7ff"
+_BLANKS = re.compile(r"\s+")
+_TIGHT = re.compile(r"\s*([_^])\s*")
+_OPERATOR = re.compile(r"([Δδ∂∇])\s+(?=[^\W\d])")
+"""A difference or derivative and what it is of: one word, as `Δt`."""
+_INNER = re.compile(r"([(\[|⟨])\s+|\s+([)\]⟩,;])")
+
+
+def _letters() -> dict[str, str]:
+    found = dict(_VARIANTS)
+    for letter, name in GREEK.items():
+        found.setdefault(name, letter)
+        found.setdefault(name.capitalize(), letter.upper())
+    return found
+
+
+_LETTERS = _letters()
+
+
+def plain_formula(tex: str) -> tuple[str, tuple[str, ...]]:
+    """The formula as text, and the names of its commands, each once, in order."""
+    reader = _Reader(tex)
+    text = _INNER.sub(r"\1\2", _TIGHT.sub(r"\1", _BLANKS.sub(" ", reader.until_end()))).strip()
+    text = _OPERATOR.sub(r"\1", text)
+    text = re.sub(f"[{_MATHEMATICAL}]", lambda m: unicodedata.normalize("NFKC", m[0]), text)
+    return text, tuple(dict.fromkeys(reader.names))
+
+
+class _Reader:
+    """Reads pieces from left to right."""
+
+    def __init__(self, tex: str) -> None:
+        self._pieces = [m for m in _PIECE.finditer(tex) if not m[0].startswith("%")]
+        self._at = 0
+        self._depth = 0
+        self.names: list[str] = []
+
+    def until_end(self) -> str:
+        """The rest, whatever closes in it."""
+        parts: list[str] = []
+        while self._at < len(self._pieces):
+            parts.append(self._group())
+            self._at += 1  # a brace that closes nothing
+        return " ".join(parts)
+
+    def _group(self) -> str:
+        """Up to the brace that closes, which is left."""
+        parts: list[str] = []
+        while self._at < len(self._pieces) and self._pieces[self._at][0] != "}":
+            parts.append(self._item())
+        return "".join(parts)
+
+    def _item(self) -> str:
+        piece = self._pieces[self._at]
+        self._at += 1
+        if piece[1] is not None:
+            return self._command(piece[1])
+        if piece[2] is not None:
+            return " " if piece[2].isspace() or piece[2] in ",;:!\\" else piece[2]
+        match piece[3]:
+            case "{":
+                return self._closed()
+            case "^" | "_" as mark:
+                return mark + _bracketed(self._argument())
+            case "&":
+                return " "
+            case "~":
+                return " "
+            case "'":
+                return "′"
+            case _:
+                return piece[4] or ""
+
+    def _closed(self) -> str:
+        self._depth += 1
+        # Beyond any depth that a formula has, the rest is read flat: TeX may be made to be deep.
+        inner = self._group() if self._depth < 64 else ""
+        self._depth -= 1
+        if self._at < len(self._pieces) and self._pieces[self._at][0] == "}":
+            self._at += 1
+        return inner
+
+    def _argument(self) -> str:
+        """The next group or item; of a run of letters the first."""
+        while self._at < len(self._pieces) and not self._pieces[self._at][0].strip():
+            self._at += 1
+        if self._at >= len(self._pieces) or self._pieces[self._at][0] == "}":
+            return ""
+        piece = self._pieces[self._at]
+        if piece[4] is None:
+            return self._item().strip()
+        self._at += 1
+        text = piece[4].lstrip()
+        rest = _PIECE.match(text, 1)
+        if rest is not None:  # what follows the first character stays
+            self._at -= 1
+            self._pieces[self._at] = rest
+        return text[:1]
+
+    def _command(self, name: str) -> str:
+        if name in _LETTERS:
+            return f" {_LETTERS[name]} "
+        if name not in _STYLE:
+            self.names.append(name)
+        if name in _SIGNS:
+            return f" {_SIGNS[name]} "
+        if name in _NAMED:
+            return f" {name} "
+        if name in ("frac", "dfrac", "tfrac", "cfrac"):
+            top = _bracketed(self._argument())
+            return f" {top}/{_bracketed(self._argument())} "
+        if name == "sqrt":
+            return f"√{_bracketed(self._argument())}"
+        if name in _SKIPPED:
+            self._argument()
+            return " "
+        return " " if name in ("quad", "qquad") else ""
+
+
+def _bracketed(text: str) -> str:
+    """In brackets, unless it is one word or sign."""
+    text = text.strip()
+    return text if len(text) <= 1 or text.isalnum() else f"({text})"

@@ -1,0 +1,192 @@
+"""The terms that a text is found by; what a reader types goes through the same rules.
+
+Entry points: `terms_of(text)`, the terms of a text in order; `counted(text)`, how often each
+occurs; `shelf_of(term)`, what decides which file of the index has a term.
+
+1. Characters are brought to their compatible form, without marks (NFKD, so that `Iₓₓ` is `Ixx` and
+   `é` is `e`).
+2. The text is cut into words, numbers, names of code (`data.qpos`, `mj_step`) and symbols.
+3. A name gives itself and its parts, a Greek letter or a symbol its name, a run of a script without
+   spaces its pairs of characters.
+
+`site/js/search/words.js` does the same; `site/tests/search-words.json` holds both to it.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator
+
+LONGEST = 48
+"""Characters; longer runs are data, which nobody types."""
+_LONGEST_NUMBER = 12
+BEGINNING = 4
+"""Characters by which words are found that begin with them."""
+
+_SYMBOLS = {
+    "∂": ("partial",),
+    "∇": ("nabla", "gradient"),
+    "∫": ("integral", "int"),
+    "∮": ("integral", "oint"),
+    "∑": ("sum",),
+    "∏": ("product", "prod"),
+    "√": ("sqrt", "root"),
+    "∞": ("infinity", "infty"),
+    "×": ("times",),
+    "⋅": ("cdot",),
+    "±": ("pm",),
+    "≈": ("approx",),
+    "≤": ("leq",),
+    "≥": ("geq",),
+    "∝": ("propto",),
+    "⊗": ("otimes",),
+    "⊥": ("perp",),
+    "∥": ("parallel",),
+}
+"""Names of symbols, the usual one first."""
+
+_GREEK = (
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigma"
+    " tau upsilon phi chi psi omega"
+).split()
+GREEK = {
+    **dict(zip("αβγδεζηθικλμνξοπρστυφχψω", _GREEK, strict=True)),
+    **{"ς": "sigma", "ϵ": "epsilon", "ϑ": "theta", "ϕ": "phi", "ϖ": "pi", "ϱ": "rho"},
+}
+"""Names of the Greek letters, by the small letter."""
+
+_ROWS = (
+    "\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3005-\u3007\u3040-\u30ff"
+    "\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff\U00020000-\U0003ffff"
+)
+"""Scripts without spaces between words: Thai, Lao, Burmese, Khmer, Kana, Han."""
+_ROW = re.compile(f"[{_ROWS}]")
+_TOKEN = re.compile(
+    r"[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!\w)|\w+(?:\.\w+)*|[" + "".join(_SYMBOLS) + "]"
+)
+_RUN = re.compile(f"([{_ROWS}]+)|([\u0370-\u03ff]+)|[^{_ROWS}\u0370-\u03ff]+")
+_NUMBER = re.compile(r"[0-9][0-9.eE+-]*\Z")
+_SEAM = re.compile(
+    r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])"
+    r"|_+"
+)
+_FOREIGN = re.compile(r"[^\x00-\x7f]+")
+_GENITIVE = re.compile("['’]s\\b")
+_SIMPLE = re.compile(r"[a-z]+\Z")
+
+
+def terms_of(text: str) -> list[str]:
+    """The terms of a text, in order, with repeats."""
+    return [term for token in _tokens(text) for term in _expanded(token)]
+
+
+def counted(text: str) -> Counter[str]:
+    """How often each term occurs."""
+    found: Counter[str] = Counter()
+    for token, times in Counter(_tokens(text)).items():
+        for term in _expanded(token):
+            found[term] += times
+    return found
+
+
+def shelf_of(term: str) -> str:
+    """Terms with the same shelf stand in the same file: those that begin alike.
+
+    Of a number it is the whole; of a name with dots the beginning of its last part, since very many
+    may begin with the same one.
+    """
+    first = term[:1]
+    if first.isascii():
+        return term if first.isdecimal() else term.rpartition(".")[2][:BEGINNING]
+    return first if _is_row(first) else term[:BEGINNING]
+
+
+def is_fuzzy(term: str) -> bool:
+    """Whether a misspelt word may mean the term."""
+    if not 3 <= len(term) <= 24 or "." in term:
+        return False
+    first = term[0]
+    return not first.isdecimal() if first.isascii() else not _is_row(first)
+
+
+def _is_row(character: str) -> bool:
+    """Whether it belongs to a script without spaces."""
+    return _ROW.match(character) is not None
+
+
+def _tokens(text: str) -> list[str]:
+    if not text.isascii():
+        text = _FOREIGN.sub(_compatible, text)
+    if "s" in text:
+        text = _GENITIVE.sub("", text)
+    return _TOKEN.findall(text)
+
+
+def _compatible(run: re.Match[str]) -> str:
+    return _folded(run[0])
+
+
+@functools.lru_cache(maxsize=1 << 12)
+def _folded(run: str) -> str:
+    """Characters that are not ASCII in their compatible form, without marks."""
+    text = unicodedata.normalize("NFKD", run)
+    return "".join(c for c in text if unicodedata.category(c)[0] != "M")
+
+
+@functools.lru_cache(maxsize=1 << 15)
+def _expanded(token: str) -> tuple[str, ...]:
+    """The terms of a word, a name, a number or a symbol, each once."""
+    if _SIMPLE.match(token):
+        return (token,) if len(token) <= LONGEST else ()
+    if token in _SYMBOLS:
+        return _SYMBOLS[token]
+    token = token.strip("_")
+    if len(token) > LONGEST or not token:
+        return ()
+    if _NUMBER.match(token):
+        return (token.lower(),) if len(token) <= _LONGEST_NUMBER else ()
+    if token.isascii():
+        return tuple(dict.fromkeys(_latin(token)))
+    return tuple(dict.fromkeys(_mixed(token)))
+
+
+def _latin(token: str) -> Iterator[str]:
+    """A name, and what it is put together from."""
+    yield token.lower()
+    for name in filter(None, (name.strip("_") for name in token.split("."))):
+        if len(name) > 1:
+            yield name.lower()
+        parts = [part.lower() for part in _SEAM.split(name) if part]
+        if len(parts) > 1:
+            if "_" in name:
+                yield name.lower().replace("_", "")
+            yield from (part for part in parts if len(part) > 1)
+
+
+def _mixed(token: str) -> Iterator[str]:
+    """A word with letters of other scripts."""
+    runs = list(_RUN.finditer(token))
+    said: list[str] = []
+    for run in runs:
+        text = unicodedata.normalize("NFC", run[0].lower())
+        if run[1]:
+            yield from _pairs(text)
+        elif run[2] and len(text) == 1 and text in GREEK:
+            said.append(GREEK[text])
+            yield GREEK[text]
+        else:
+            word = text.replace("ς", "σ").strip("._")
+            said.append(word)
+            if len(word) > 1 or (word and len(runs) == 1):
+                yield from _latin(run[0].strip("._")) if word.isascii() else (word,)
+    joined = "".join(said).replace("_", "")
+    if len(said) > 1 and len(joined) <= LONGEST:
+        yield joined
+
+
+def _pairs(run: str) -> Iterator[str]:
+    """Each character with its next one, and the last alone."""
+    yield from (run[at : at + 2] for at in range(len(run)))

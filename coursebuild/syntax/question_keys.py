@@ -1,0 +1,46 @@
+"""Keys by which a learner's answers find their question again, whatever else of a quiz changes.
+
+Entry points: `text_key`, `Keys`.
+
+A question's key is its `id`, or else a hash of its kind and its text; an option's and an item's is
+a hash of its text. So adding, removing and moving them changes no other's key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import unicodedata
+from collections.abc import Iterable
+
+from coursebuild.values import dataclass, field
+
+DIGITS = 8
+"""Hexadecimal digits of a hash: so few that an address with them can still be read."""
+
+
+def text_key(kind: str, text: str) -> str:
+    """The key of a text of a kind (`mcq`, `option`); what white space stands in it is no matter."""
+    folded = unicodedata.normalize("NFC", " ".join(text.split()))
+    data = f"{kind}\n{folded}".encode("utf-8", "surrogatepass")
+    return hashlib.sha256(data).hexdigest()[:DIGITS]
+
+
+@dataclass(slots=True)
+class Keys:
+    """Keys that are each given once."""
+
+    taken: set[str] = field(default_factory=set)
+
+    def of(self, kind: str, text: str) -> str:
+        """The key of a text; one that is there already gets a number behind it."""
+        base = key = text_key(kind, text)
+        count = 1
+        while key in self.taken:
+            count += 1
+            key = f"{base}-{count}"
+        self.taken.add(key)
+        return key
+
+    def each(self, kind: str, texts: Iterable[str]) -> tuple[str, ...]:
+        """The keys of texts."""
+        return tuple(self.of(kind, text) for text in texts)

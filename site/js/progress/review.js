@@ -1,0 +1,154 @@
+/**
+ * The page of the review: brings back questions that were missed, one at a time, when they are due.
+ *
+ * Entry point: `showReview(document, { words, progress, improve })`. It gives a function that ends it.
+ *
+ * A question is taken out of its lesson’s page, which is fetched from the same site; it is answered here as it is there, but for what
+ * was answered before, which is not shown. Pages from disk cannot be fetched: then there are links to the questions.
+ */
+
+import { h } from '../lab/page/dom.js'
+import { leaveQuizzes, mountQuestion } from '../quiz/mount.js'
+import { overview } from './course.js'
+import { readRows } from './map.js'
+import { QuestionPages } from './questions.js'
+import { agenda } from './schedule.js'
+import { say } from './words.js'
+
+export function showReview(document, { words, progress, improve = () => {} }) {
+  return new Review(document, words, progress, improve).begun()
+}
+
+class Review {
+  constructor(document, words, progress, improve) {
+    this.document = document
+    this.say = (key, values) => say(words, `review.live.${key}`, values)
+    this.words = words
+    this.progress = progress
+    this.improve = improve
+    this.place = document.querySelector('[data-progress="review"]')
+    this.pages = new QuestionPages()
+    this.rows = readRows(document).map((row, number) => ({ ...row, id: row.id || `page ${number}` }))
+    this.running = false
+  }
+
+  begun() {
+    this.#showAgenda()
+    return this.progress.onChange(() => this.running || this.#showAgenda())
+  }
+
+  #showAgenda(before = []) {
+    const { answers, orphans } = overview(this.rows, this.progress.all(), this.progress.lessons())
+    const { due, later } = agenda(answers, Date.now())
+    const lost = agenda(orphans.answers, Date.now())
+    const missed = due.length + later.length > 0
+    const parts = [...before, h('p', { class: 'due', role: 'status' }, this.#dueText(due.length, missed))]
+    if (due.length && this.document.location.protocol === 'file:') {
+      parts.push(h('p', {}, this.say('disk')), h('ul', {}, ...due.map((item) => h('li', {}, this.#link(item)))))
+    } else if (due.length) parts.push(h('p', {}, this.#button(this.say('start'), () => this.#run(due), 'button')))
+    const coming = later.map(({ days, count }) => this.say('later', { n: count, days: this.say('days', { n: days }) }))
+    if (coming.length) parts.push(h('p', { class: 'later' }, coming.join(' ')))
+    const gone = lost.due.length + lost.later.reduce((sum, { count }) => sum + count, 0)
+    if (gone) parts.push(h('p', { class: 'later' }, this.say('orphans', { n: gone })))
+    const wrong = this.progress.trouble()
+    if (wrong) parts.push(h('p', { class: 'trouble' }, say(this.words, `progress.trouble.${wrong}`)))
+    this.place.replaceChildren(...parts)
+  }
+
+  #dueText(count, missed) {
+    if (count) return this.say('due', { n: count })
+    return this.say(missed ? 'none' : 'never')
+  }
+
+  // --- one question after the other
+
+  #run(due) {
+    this.running = true
+    this.right = 0
+    this.answered = 0
+    this.#ask(due, 0)
+  }
+
+  async #ask(due, index) {
+    if (index === due.length) return this.#finish()
+    const item = due[index]
+    const heading = h('h2', { tabIndex: -1, class: 'review-count' }, this.say('count', { number: index + 1, n: due.length }))
+    const row = this.rows.find(({ id }) => id === item.page)
+    const from = h('p', { class: 'review-from' }, `${this.say('from')} `, this.#source(row), ' ')
+    from.append(h('span', { class: 'review-box' }, this.say('box', { number: item.box + 1 })))
+    const body = h('div', { class: 'review-question', 'aria-busy': 'true' }, h('p', {}, this.say('loading')))
+    const next = this.#button(this.say('skip'), () => this.#leave(body, due, index + 1), 'quiet')
+    const end = this.#button(this.say('end'), () => this.#leave(body, due, due.length), 'quiet')
+    this.place.replaceChildren(heading, from, body, h('p', { class: 'review-actions' }, next, ' ', end))
+    heading.focus()
+    const shown = await this.#load(item, row)
+    if (!body.isConnected) return
+    body.removeAttribute('aria-busy')
+    body.replaceChildren(shown.part)
+    if (shown.question) this.#mount(shown, item, next)
+  }
+
+  async #load(item, row) {
+    try {
+      const found = await this.pages.question(row.link.href, item.quiz, item.question, this.say('lab'))
+      if (found) return { part: found.section, question: found.question }
+      return { part: h('p', {}, this.say('moved')) }
+    } catch {
+      return { part: h('p', {}, `${this.say('failed')} `, this.#link(item)) }
+    }
+  }
+
+  #mount({ part, question }, item, next) {
+    const { progress } = this
+    let last = null
+    let first = true
+    if (item.key !== item.question) progress.rename(item.quiz, item.key, item.question)
+    const keep = {
+      put: (quiz, key, answer) => {
+        const trial = last === null || last.tries !== answer.tries || last.right !== answer.right
+        last = answer
+        progress.put(quiz, key, { ...answer, lesson: item.lesson }, { trial })
+        if (answer.right === null) return
+        if (first) {
+          this.answered += 1
+          this.right += Number(answer.right)
+        }
+        first = false
+        next.textContent = this.say('next')
+      },
+    }
+    mountQuestion(question, this.words, keep, { fresh: true })
+    this.improve(part)
+  }
+
+  #leave(body, due, index) {
+    leaveQuizzes(body)
+    this.#ask(due, index)
+  }
+
+  #finish() {
+    this.running = false
+    const text = this.answered ? [this.say('done', { n: this.answered, right: this.right })] : []
+    const heading = h('h2', { tabIndex: -1 }, ...text)
+    this.#showAgenda(text.length ? [heading] : [])
+    const focused = text.length ? heading : this.place.querySelector('button') ?? this.document.querySelector('h1')
+    if (focused.localName === 'h1') focused.tabIndex = -1
+    focused.focus()
+  }
+
+  // --- pieces
+
+  #button(text, onclick, name) {
+    return h('button', { type: 'button', class: name, onclick }, text)
+  }
+
+  #source(row) {
+    return h('a', { href: row.link.href }, row.link.textContent)
+  }
+
+  #link({ quiz, question, number, page }) {
+    const row = this.rows.find(({ id }) => id === page)
+    const address = `${row.link.href}#${encodeURIComponent(`${quiz}.${question}`)}`
+    return h('a', { href: address }, `${row.link.textContent}: ${this.say('to_lesson', { number })}`)
+  }
+}

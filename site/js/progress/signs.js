@@ -1,0 +1,22 @@
+/** Signs for what is read: each a shape of its own, beside a word. */
+
+const SVG = 'http://www.w3.org/2000/svg'
+
+/** Lines in a square of 16. */
+const SHAPES = {
+  begun: 'M4.5 2.500h7v11l-3.500-3-3.500 3z',
+  read: 'M2.5 8.500l3.500 3.500 7.500-8',
+  right: 'M.8 8.800l3.200 3.200 6.500-7.200M6.800 11.200l.8.8 7.600-8.200',
+}
+
+/** A small picture in the colour of the text around it. @param {'begun' | 'read' | 'right'} name */
+export function sign(name) {
+  const svg = document.createElementNS(SVG, 'svg')
+  svg.setAttribute('viewBox', '0 0 16 16')
+  svg.setAttribute('class', `sign sign-${name}`)
+  svg.setAttribute('aria-hidden', 'true')
+  const path = document.createElementNS(SVG, 'path')
+  path.setAttribute('d', SHAPES[name])
+  svg.append(path)
+  return svg
+}

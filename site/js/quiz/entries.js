@@ -1,0 +1,107 @@
+/** Questions that are answered in a field: a number, or a line that a script prints. */
+
+import { formatLabel } from '../lab/page/numbers.js'
+import { gradeNumber } from './grade.js'
+import { compareBy, gradeOutput } from './output.js'
+import { copyOf, fill, h } from './parts.js'
+
+/** A field with its label and what is said of it. */
+class Entry {
+  keeps = true // what is wrong stays to be read while it is mended
+
+  constructor(question, label, { help = '', unit = null, code = false } = {}) {
+    this.question = question
+    this.words = question.words
+    this.submit = this.words('quiz.live.check')
+    const ids = { input: question.id('entry'), help: question.id('help'), unit: question.id('unit') }
+    const described = [unit && ids.unit, help && ids.help].filter(Boolean).join(' ')
+    this.input = h('input', {
+      id: ids.input,
+      type: 'text',
+      class: code ? 'quiz-entry-field quiz-entry-code' : 'quiz-entry-field',
+      autocomplete: 'off',
+      autocapitalize: 'off',
+      spellcheck: false,
+      maxLength: 1000,
+      'aria-describedby': described || null,
+    })
+    this.body = h(
+      'div',
+      { class: 'quiz-entry' },
+      h('label', { class: 'quiz-entry-label', for: ids.input }, label),
+      h('span', { class: 'quiz-entry-row' }, this.input, unit && h('span', { class: 'quiz-entry-unit', id: ids.unit }, ...copyOf(unit))),
+      help && h('p', { class: 'quiz-entry-help', id: ids.help }, help),
+    )
+  }
+
+  given() {
+    return this.input.value.trim() === '' ? null : this.input.value
+  }
+
+  show(given) {
+    this.input.value = typeof given === 'string' ? given : ''
+    return this.given() !== null
+  }
+
+  clear() {
+    this.input.value = ''
+  }
+
+  focus() {
+    this.input.focus()
+  }
+
+  mark(result) {
+    if (result?.state === 'unread' || result?.state === 'wrong') this.input.setAttribute('aria-invalid', 'true')
+    else this.input.removeAttribute('aria-invalid')
+  }
+}
+
+export class Numeric extends Entry {
+  constructor(question) {
+    const { element, words } = question
+    const unit = element.querySelector(':scope > .question-how .unit')
+    super(question, words('quiz.live.number'), { help: words('quiz.live.number_help'), unit })
+    this.unit = unit
+    this.asked = {
+      answer: Number(element.dataset.answer),
+      tolerance: Number(element.dataset.tolerance),
+      unit: element.dataset.unit ?? '',
+    }
+  }
+
+  grade(given) {
+    const result = gradeNumber(given, this.asked)
+    if (result.state === 'unread') {
+      const [first = '', second = ''] = result.readings
+      const text = fill(this.words(`quiz.live.unread.${result.problem}`), { detail: result.detail, first, second })
+      return { state: 'unread', right: null, line: this.words('quiz.live.unread.line'), more: text }
+    }
+    const right = result.state === 'right'
+    // Where a point may have been meant to part thousands, it is told how it was read.
+    const unsure = !right && /(?:^|\D)[1-9]\d{0,2}\.\d{3}(?!\d)/.test(given)
+    const nodes = result.converted || (unsure && result.near !== 'unit') ? [this.#read(result.value)] : []
+    const more = result.near ? this.words(`quiz.live.near.${result.near}`) : ''
+    return { state: result.state, right, more, nodes, solution: right }
+  }
+
+  /** How the entry was understood. */
+  #read(value) {
+    const unit = this.unit ? [' ', h('span', {}, ...copyOf(this.unit))] : []
+    return h('p', { class: 'quiz-entry-read' }, fill(this.words('quiz.live.read_as'), { value: formatLabel(value) }), ...unit)
+  }
+}
+
+export class Output extends Entry {
+  constructor(question) {
+    const { element, words } = question
+    super(question, words('quiz.live.line'), { code: true })
+    this.printed = element.dataset.answer
+    this.same = compareBy(element.dataset.compare ?? 'digits')
+  }
+
+  grade(given) {
+    const { right, near } = gradeOutput(given, this.printed, this.same)
+    return { state: right ? 'right' : 'wrong', right, more: near ? this.words(`quiz.live.printed.${near}`) : '', solution: right }
+  }
+}

@@ -1,0 +1,58 @@
+/** Questions that are answered in words: the learner writes, compares with the reference, and says how well the two agree. */
+
+import { h } from './parts.js'
+
+const MARKS = ['right', 'partly', 'wrong']
+
+export class Open {
+  stays = true // the reference stays in sight while the answer is worked over
+
+  constructor(question) {
+    this.question = question
+    this.words = question.words
+    this.submit = this.words('quiz.live.compare')
+    const id = question.id('entry')
+    const changed = () => this.question.result?.finished && this.#marked()
+    this.input = h('textarea', { id, class: 'quiz-entry-field', rows: 4, maxLength: 20_000, onchange: changed })
+    this.body = h('div', { class: 'quiz-entry' }, h('label', { class: 'quiz-entry-label', for: id }, this.words('quiz.live.words')), this.input)
+    this.radios = MARKS.map((value) => h('input', { type: 'radio', name: 'mark', value, onchange: () => this.#marked() }))
+    const labels = this.radios.map((radio, i) => h('label', { class: 'option' }, radio, h('span', {}, this.words(`quiz.live.self.${MARKS[i]}`))))
+    this.below = h('fieldset', { class: 'self-mark', hidden: true }, h('legend', {}, this.words('quiz.live.self.how')), ...labels)
+  }
+
+  given() {
+    if (this.input.value.trim() === '') return null
+    return { text: this.input.value, mark: this.radios.find(({ checked }) => checked)?.value ?? '' }
+  }
+
+  show(given) {
+    this.input.value = typeof given?.text === 'string' ? given.text : ''
+    for (const radio of this.radios) radio.checked = radio.value === given?.mark
+    return this.given() !== null
+  }
+
+  clear() {
+    this.input.value = ''
+    for (const radio of this.radios) radio.checked = false
+  }
+
+  focus() {
+    this.input.focus()
+  }
+
+  grade({ mark }) {
+    const state = MARKS.includes(mark) ? mark : 'done'
+    // What is right in part comes back like what is wrong.
+    const right = state === 'done' ? null : state === 'right'
+    const line = this.words(state === 'done' ? 'quiz.live.self.compare' : `quiz.live.self.said_${state}`)
+    return { state, right, line, solution: true, finished: true }
+  }
+
+  mark(result) {
+    this.below.hidden = !result || result.state === 'unread'
+  }
+
+  #marked() {
+    this.question.note(this.grade(this.given() ?? { mark: '' }))
+  }
+}

@@ -1,0 +1,269 @@
+/**
+ * Units: read, and set in relation by what they measure.
+ *
+ *   readUnit('kg·m²')[0]                     → { scale: 1, offset: 0, powers: { kg: 1, m: 2 } }
+ *   relation(readUnit('g cm^2'), readUnit('kg m^2'))  → { factor: 1e-7, offset: 0 }
+ *
+ * The SI with its prefixes, what is in use beside it, and angles. An angle is no dimension, but telling it apart shows mistakes: `rad`
+ * and `deg` can be left out or put in; but hertz count cycles, and are not taken for radians a second.
+ */
+
+import { normalise } from './numbers.js'
+
+const PREFIXES = {
+  Q: 30, R: 27, Y: 24, Z: 21, E: 18, P: 15, T: 12, G: 9, M: 6, k: 3, h: 2, da: 1,
+  d: -1, c: -2, m: -3, μ: -6, u: -6, n: -9, p: -12, f: -15, a: -18, z: -21, y: -24, r: -27, q: -30,
+}
+const ANGLE = 'rad'
+const CYCLES = 'cycle'
+const DEGREE = Math.PI / 180
+
+/** Symbol: scale, powers of the base units, whether it takes prefixes. */
+const UNITS = {
+  m: [1, { m: 1 }, true],
+  g: [1e-3, { kg: 1 }, true],
+  s: [1, { s: 1 }, true],
+  A: [1, { A: 1 }, true],
+  K: [1, { K: 1 }, true],
+  mol: [1, { mol: 1 }, true],
+  cd: [1, { cd: 1 }, true],
+  rad: [1, { [ANGLE]: 1 }, true],
+  sr: [1, { [ANGLE]: 2 }, true],
+  Hz: [1, { s: -1, [CYCLES]: 1 }, true],
+  N: [1, { kg: 1, m: 1, s: -2 }, true],
+  Pa: [1, { kg: 1, m: -1, s: -2 }, true],
+  J: [1, { kg: 1, m: 2, s: -2 }, true],
+  W: [1, { kg: 1, m: 2, s: -3 }, true],
+  C: [1, { A: 1, s: 1 }, true],
+  V: [1, { kg: 1, m: 2, s: -3, A: -1 }, true],
+  F: [1, { kg: -1, m: -2, s: 4, A: 2 }, true],
+  Ω: [1, { kg: 1, m: 2, s: -3, A: -2 }, true],
+  ohm: [1, { kg: 1, m: 2, s: -3, A: -2 }, true],
+  S: [1, { kg: -1, m: -2, s: 3, A: 2 }, true],
+  Wb: [1, { kg: 1, m: 2, s: -2, A: -1 }, true],
+  T: [1, { kg: 1, s: -2, A: -1 }, true],
+  H: [1, { kg: 1, m: 2, s: -2, A: -2 }, true],
+  lm: [1, { cd: 1, [ANGLE]: 2 }, true],
+  lx: [1, { cd: 1, m: -2, [ANGLE]: 2 }, true],
+  Bq: [1, { s: -1 }, true],
+  Gy: [1, { m: 2, s: -2 }, true],
+  Sv: [1, { m: 2, s: -2 }, true],
+  kat: [1, { mol: 1, s: -1 }, true],
+  min: [60, { s: 1 }, false],
+  h: [3600, { s: 1 }, false],
+  d: [86400, { s: 1 }, false],
+  t: [1e3, { kg: 1 }, true],
+  l: [1e-3, { m: 3 }, true],
+  L: [1e-3, { m: 3 }, true],
+  eV: [1.602176634e-19, { kg: 1, m: 2, s: -2 }, true],
+  Da: [1.6605390666e-27, { kg: 1 }, true],
+  au: [149597870700, { m: 1 }, false],
+  bar: [1e5, { kg: 1, m: -1, s: -2 }, true],
+  atm: [101325, { kg: 1, m: -1, s: -2 }, false],
+  kgf: [9.80665, { kg: 1, m: 1, s: -2 }, false],
+  cal: [4.184, { kg: 1, m: 2, s: -2 }, true],
+  Å: [1e-10, { m: 1 }, false],
+  '°': [DEGREE, { [ANGLE]: 1 }, false],
+  "'": [DEGREE / 60, { [ANGLE]: 1 }, false],
+  turn: [2 * Math.PI, { [ANGLE]: 1 }, false],
+  rpm: [Math.PI / 30, { s: -1, [ANGLE]: 1 }, false],
+  '%': [1e-2, {}, false],
+  '‰': [1e-3, {}, false],
+  '°C': [1, { K: 1 }, false],
+}
+
+/** Other ways to write a unit. */
+const NAMES = {
+  deg: '°', degree: '°', degrees: '°', arcmin: "'", rads: 'rad', radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
+  rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
+  meter: 'm', meters: 'm', metre: 'm', metres: 'm', kilogram: 'kg', kilograms: 'kg', gram: 'g', grams: 'g', kelvin: 'K',
+  sec: 's', secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
+  newton: 'N', newtons: 'N', joule: 'J', joules: 'J', watt: 'W', watts: 'W', pascal: 'Pa', pascals: 'Pa', hertz: 'Hz',
+  volt: 'V', volts: 'V', ampere: 'A', amperes: 'A', coulomb: 'C', coulombs: 'C', tesla: 'T', ohms: 'Ω', litre: 'l', liter: 'l',
+  litres: 'l', liters: 'l', percent: '%', Kg: 'kg', KG: 'kg', hz: 'Hz', HZ: 'Hz', Rad: 'rad', Deg: '°', Nm: 'N m',
+}
+
+const KELVIN = 273.15
+
+/**
+ * @typedef {{scale: number, offset: number, powers: Object<string, number>}} Unit in base units; `offset`, K: what is added first (°C)
+ */
+
+/**
+ * What a text may mean as a unit: mostly one thing; two where several factors follow a solidus (`J/kg K`), the strict one first.
+ *
+ * @returns {Unit[]} none where it is no unit; an empty text is the unit 1
+ */
+export function readUnit(text) {
+  const source = plain(text)
+  if (source === '') return [{ scale: 1, offset: 0, powers: {} }]
+  const readings = [parse(source, false)]
+  if (/\/.*[ *]/.test(source)) readings.push(parse(source, true))
+  return readings.filter((unit) => unit !== null)
+}
+
+/** A unit's text, whatever signs were chosen: for units that nobody knows. */
+export function plain(text) {
+  const bare = text
+    .slice(0, 100)
+    .replace(/\\(?:mathrm|text|rm|operatorname)\b/g, ' ')
+    .replace(/\\(?:[,;:! ]|cdot|times|quad)/g, ' ')
+    .replace(/\\mu\b(?:\{\})? ?/g, 'μ')
+    .replace(/\\Omega\b/g, 'Ω')
+    .replace(/\^? ?\{?\\(?:degree|circ)\}?/g, '°')
+    .replace(/[$~]/g, ' ')
+  return normalise(bare)
+    .replace(/\^ ?\{([^{}]*)\}/g, '^($1)')
+    .replace(/[{}]/g, ' ')
+    .replace(/ per /g, '/')
+    .replace(/″/g, '"')
+    .replace(/° ?C(?![\p{L}])/gu, '°C')
+    .replace(/(\p{L})\.(?=\p{L})/gu, '$1*')
+    .replace(/ *([*/^()]) */g, (_, sign) => (sign === '(' ? ' (' : sign === ')' ? ') ' : sign))
+    .replace(/ *([*/^]) */g, '$1')
+    .replace(/ +/g, ' ')
+    .replace(/ \)/g, ')')
+    .replace(/\( /g, '(')
+    .trim()
+}
+
+/** How to come from a value in one unit to the same in another: `value · factor + offset`; null where they measure different things. */
+export function relation(given, asked) {
+  for (const one of given) {
+    for (const other of asked) {
+      if (!alike(one.powers, other.powers)) continue
+      const factor = one.scale / other.scale
+      return { factor, offset: one.offset === other.offset ? 0 : (one.offset - other.offset) / other.scale }
+    }
+  }
+  return null
+}
+
+/** Whether two units measure the same; an angle can be left out of either. */
+function alike(one, other) {
+  const names = new Set([...Object.keys(one), ...Object.keys(other)])
+  names.delete(ANGLE)
+  names.delete(CYCLES)
+  for (const name of names) if (Math.abs((one[name] ?? 0) - (other[name] ?? 0)) > 1e-9) return false
+  const [a, b] = [angular(one), angular(other)]
+  return a === 0 || b === 0 || a === b
+}
+
+/** 0: no angle, else which. */
+const angular = (powers) => (powers[CYCLES] ? CYCLES : powers[ANGLE] ? ANGLE : 0)
+
+/** Whether a unit has an angle in it that is counted in radians (or degrees). */
+export const hasAngle = (units) => units.some(({ powers }) => angular(powers) === ANGLE)
+
+// --- reading
+
+function parse(source, wide) {
+  const reader = { text: source, at: 0, wide, depth: 0 }
+  const unit = product(reader)
+  return unit !== null && reader.at === source.length && Number.isFinite(unit.scale) && unit.scale > 0 ? unit : null
+}
+
+/** Factors with signs between them; with `wide`, all that follows a solidus is below the line. */
+function product(reader) {
+  let unit = { scale: 1, offset: 0, powers: {} }
+  let sign = 1
+  let first = true
+  for (;;) {
+    const char = reader.text[reader.at] ?? ''
+    if (char === '/') {
+      reader.at += 1
+      sign = -1
+    } else if (!first && (char === '*' || char === ' ')) reader.at += 1
+    else if (!first && (char === '' || char === ')')) return unit
+    const factor = group(reader)
+    if (factor === null) return null
+    if ((!first || sign < 0) && (factor.offset || unit.offset)) return null // °C stands alone
+    unit = times(unit, factor, sign)
+    if (!reader.wide) sign = 1
+    first = false
+  }
+}
+
+function group(reader) {
+  let unit
+  if (reader.text[reader.at] === '(') {
+    if (++reader.depth > 5) return null
+    reader.at += 1
+    unit = product(reader)
+    if (unit === null || reader.text[reader.at] !== ')') return null
+    reader.at += 1
+    reader.depth -= 1
+  } else {
+    const symbol = /^(?:°C|[°%‰'"]|\p{L}+|1(?![\d.]))/u.exec(reader.text.slice(reader.at))?.[0]
+    if (symbol === undefined) return null
+    reader.at += symbol.length
+    if (symbol === '1') return { scale: 1, offset: 0, powers: {} }
+    const parts = named(symbol)
+    if (parts === null) return null
+    const power = exponent(reader)
+    if (power === null) return null
+    // Of units written together, an exponent belongs to the last.
+    const raised = raise(parts.at(-1), power)
+    return parts.slice(0, -1).reduce((all, part) => times(all, part, 1), raised)
+  }
+  const power = exponent(reader)
+  return power === null ? null : raise(unit, power)
+}
+
+/** An exponent as written: `^2`, `^-1`, `^(1/2)`, `2`, `-1`; 1 where there is none; null where it is none. */
+function exponent(reader) {
+  const found = /^(?:\^(?:\(([-+]?\d+(?:\.\d+)?)(?:\/(\d+))?\)|([-+]?\d+(?:\.\d+)?))|([-+]?\d+))/.exec(reader.text.slice(reader.at))
+  if (!found) return reader.text[reader.at] === '^' ? null : 1
+  reader.at += found[0].length
+  const power = Number(found[1] ?? found[3] ?? found[4]) / Number(found[2] ?? 1)
+  return Number.isFinite(power) && Math.abs(power) <= 12 ? power : null
+}
+
+/** The units that a word stands for: one, or several written together (`Nm`, `kgm`). */
+function named(word) {
+  const name = Object.hasOwn(NAMES, word) ? NAMES[word] : word
+  if (name.includes(' ')) return name.split(' ').map((part) => single(part))
+  const whole = single(name)
+  if (whole !== null) return [whole]
+  if (word.length > 12) return null
+  for (let end = word.length - 1; end > 0; end--) {
+    const head = single(word.slice(0, end))
+    const tail = head === null ? null : named(word.slice(end))
+    if (tail !== null) return [head, ...tail]
+  }
+  return null
+}
+
+/** A unit with or without a prefix. */
+function single(symbol) {
+  if (Object.hasOwn(UNITS, symbol)) return base(symbol, 1)
+  for (const length of [1, 2]) {
+    const prefix = symbol.slice(0, length)
+    const rest = symbol.slice(length)
+    if (Object.hasOwn(PREFIXES, prefix) && Object.hasOwn(UNITS, rest) && UNITS[rest][2]) return base(rest, Number(`1e${PREFIXES[prefix]}`))
+  }
+  return null
+}
+
+function base(symbol, prefix) {
+  const [scale, powers] = UNITS[symbol]
+  // Written so, a kilogram is exactly 1.
+  return { scale: prefix === 1e3 && scale === 1e-3 ? 1 : scale * prefix, offset: symbol === '°C' ? KELVIN : 0, powers }
+}
+
+function times(one, other, sign) {
+  const powers = { ...one.powers }
+  for (const [name, power] of Object.entries(other.powers)) {
+    powers[name] = (powers[name] ?? 0) + sign * power
+    if (powers[name] === 0) delete powers[name]
+  }
+  const scale = sign > 0 ? one.scale * other.scale : one.scale / other.scale
+  return { scale, offset: one.offset || (sign > 0 ? other.offset : 0), powers }
+}
+
+function raise(unit, power) {
+  if (power === 1) return unit
+  if (unit.offset) return { scale: Number.NaN, offset: 0, powers: {} } // no power of °C
+  const powers = Object.fromEntries(Object.entries(unit.powers).map(([name, own]) => [name, own * power]))
+  return { scale: unit.scale ** power, offset: 0, powers }
+}

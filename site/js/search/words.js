@@ -1,0 +1,205 @@
+/**
+ * The terms that a text is found by: the same rules as in coursebuild/render/search/words.py, by which the index is
+ * made; site/tests/search-words.json holds both to them.
+ */
+
+const LONGEST = 48
+const LONGEST_NUMBER = 12
+
+const SYMBOLS = {
+  '∂': ['partial'],
+  '∇': ['nabla', 'gradient'],
+  '∫': ['integral', 'int'],
+  '∮': ['integral', 'oint'],
+  '∑': ['sum'],
+  '∏': ['product', 'prod'],
+  '√': ['sqrt', 'root'],
+  '∞': ['infinity', 'infty'],
+  '×': ['times'],
+  '⋅': ['cdot'],
+  '±': ['pm'],
+  '≈': ['approx'],
+  '≤': ['leq'],
+  '≥': ['geq'],
+  '∝': ['propto'],
+  '⊗': ['otimes'],
+  '⊥': ['perp'],
+  '∥': ['parallel'],
+}
+
+const NAMES = (
+  'alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigma tau upsilon phi chi ' +
+  'psi omega sigma epsilon theta phi pi rho'
+).split(' ')
+const GREEK = Object.fromEntries([...'αβγδεζηθικλμνξοπρστυφχψωςϵϑϕϖϱ'].map((letter, at) => [letter, NAMES[at]]))
+
+const ROWS =
+  '\\u0e00-\\u0eff\\u1000-\\u109f\\u1780-\\u17ff\\u3005-\\u3007\\u3040-\\u30ff' +
+  '\\u3400-\\u4dbf\\u4e00-\\u9fff\\uf900-\\ufaff\\u{20000}-\\u{3ffff}'
+const ROW = new RegExp(`^[${ROWS}]`, 'u')
+const WORD = '[\\p{L}\\p{N}_]'
+const TOKEN = new RegExp(
+  `[0-9]+(?:\\.[0-9]+)*[eE][+-]?[0-9]+(?!${WORD})|${WORD}+(?:\\.${WORD}+)*|[${Object.keys(SYMBOLS).join('')}]`,
+  'gu',
+)
+const RUN = new RegExp(`([${ROWS}]+)|([\\u0370-\\u03ff]+)|[^${ROWS}\\u0370-\\u03ff]+`, 'gu')
+const NUMBER = /^[0-9][0-9.eE+-]*$/
+const SEAM = /(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])|_+/
+const GENITIVE = new RegExp(`['’]s(?!${WORD})`, 'gu')
+const SIMPLE = /^[a-z]+$/
+const ASCII = /^[\0-\x7f]*$/
+
+/** The words, numbers, names and symbols of a text. */
+function tokensOf(text) {
+  let plain = text
+  if (!ASCII.test(plain)) plain = plain.normalize('NFKD').replace(/\p{M}/gu, '')
+  return plain.replace(GENITIVE, '').match(TOKEN) ?? []
+}
+
+/** The terms of a text, in order, with repeats. */
+export function termsOf(text) {
+  return tokensOf(text).flatMap(expanded)
+}
+
+/**
+ * The terms of a query by the word that they come from: of each word the whole first, then its parts. In a script
+ * without spaces each pair of characters is a word, and the last character only where it is alone.
+ */
+export function wordsOf(text) {
+  return tokensOf(text).flatMap((token) => {
+    const terms = expanded(token)
+    const pairs = terms.filter(isRow)
+    const others = terms.filter((term) => !isRow(term))
+    const joined = others.length > 1 && !ASCII.test(token) ? others.pop() : null
+    if (joined !== null) others.unshift(joined)
+    return [others, ...pairs.filter((pair) => [...pair].length > 1 || pairs.length === 1).map((pair) => [pair])]
+  }).filter((word) => word.length > 0)
+}
+
+/** Whether a term is of a script without spaces, where one character may begin others. */
+export const isRow = (term) => ROW.test(term)
+
+/**
+ * Words of a text with their places, for marking: a place is given in the text as it is, though terms are made of its
+ * compatible form.
+ * @returns {{ start: number, end: number, terms: string[] }[]}
+ */
+export function placesOf(text) {
+  const found = []
+  const cut = /[\p{L}\p{N}\p{M}_.]+|[^\s\p{L}\p{N}\p{M}_.]/gu
+  for (const { 0: piece, index } of text.matchAll(cut)) {
+    const terms = termsOf(piece)
+    if (terms.some(isRow)) found.push(...pairPlaces(piece, index))
+    else if (terms.length > 0) found.push(...namePlaces(piece, index, terms))
+  }
+  return found
+}
+
+/** A word, or of a name with dots the whole and then what the dots part; of a number with dots the whole alone. */
+function namePlaces(piece, start, terms) {
+  const whole = { start, end: start + piece.replace(/\.+$/, '').length, terms }
+  if (!/[^.]\.[^.]/.test(piece) || NUMBER.test(piece)) return [whole]
+  const parts = [...piece.matchAll(/[^.]+/g)].map(({ 0: part, index }) => ({
+    start: start + index,
+    end: start + index + part.length,
+    terms: termsOf(part),
+  }))
+  return [{ ...whole, terms: terms.slice(0, 1) }, ...parts]
+}
+
+/** Of a script without spaces every pair of characters has a place. */
+function pairPlaces(piece, start) {
+  let at = start
+  const signs = [...piece].map((sign) => ({ sign, from: at, to: (at += sign.length) }))
+  return signs.map(({ sign, from, to }, i) => {
+    const next = signs[i + 1]
+    return { start: from, end: next?.to ?? to, terms: termsOf(sign + (next?.sign ?? '')) }
+  })
+}
+
+const known = new Map()
+
+function expanded(token) {
+  let terms = known.get(token)
+  if (terms === undefined) {
+    if (known.size > 20000) known.clear()
+    terms = [...new Set(made(token))]
+    known.set(token, terms)
+  }
+  return terms
+}
+
+function made(token) {
+  if (SIMPLE.test(token)) return token.length <= LONGEST ? [token] : []
+  if (Object.hasOwn(SYMBOLS, token)) return SYMBOLS[token]
+  const name = token.replace(/^_+|_+$/g, '')
+  if (name === '' || [...name].length > LONGEST) return []
+  if (NUMBER.test(name)) return name.length <= LONGEST_NUMBER ? [name.toLowerCase()] : []
+  return ASCII.test(name) ? latin(name) : mixed(name)
+}
+
+/** A name, and what it is put together from. */
+function latin(token) {
+  const found = [token.toLowerCase()]
+  for (const given of token.split('.')) {
+    const name = given.replace(/^_+|_+$/g, '')
+    if (name.length > 1) found.push(name.toLowerCase())
+    const parts = name.split(SEAM).filter(Boolean)
+    if (parts.length < 2) continue
+    if (name.includes('_')) found.push(name.toLowerCase().replaceAll('_', ''))
+    found.push(...parts.filter((part) => part.length > 1).map((part) => part.toLowerCase()))
+  }
+  return found
+}
+
+/** A word with letters of other scripts. */
+function mixed(token) {
+  const runs = [...token.matchAll(RUN)]
+  const found = []
+  const said = []
+  for (const [run, row, greek] of runs) {
+    const text = run.toLowerCase().normalize('NFC')
+    if (row) {
+      const signs = [...text]
+      signs.forEach((sign, at) => found.push(sign + (signs[at + 1] ?? '')))
+    } else if (greek && Object.hasOwn(GREEK, text)) {
+      said.push(GREEK[text])
+      found.push(GREEK[text])
+    } else {
+      const word = text.replaceAll('ς', 'σ').replace(/^[._]+|[._]+$/g, '')
+      said.push(word)
+      if (runs.length > 1 && [...word].length < 2) continue
+      if (ASCII.test(word)) found.push(...latin(run.replace(/^[._]+|[._]+$/g, '')))
+      else found.push(word)
+    }
+  }
+  const joined = said.join('').replaceAll('_', '')
+  if (said.length > 1 && [...joined].length <= LONGEST) found.push(joined)
+  return found.filter(Boolean)
+}
+
+const isDigit = (sign) => sign >= '0' && sign <= '9'
+
+/** Characters by which words are found that begin with them. */
+export const BEGINNING = 4
+
+/** Terms with the same shelf stand in the same file: those that begin alike, but numbers, and by the end of a name. */
+export function shelfOf(term) {
+  if (isDigit(term[0])) return term
+  if (ROW.test(term)) return [...term][0]
+  const last = ASCII.test(term[0]) ? term.slice(term.lastIndexOf('.') + 1) : term
+  return [...last].slice(0, BEGINNING).join('')
+}
+
+/** Whether a misspelt word may mean the term. */
+export function isFuzzy(term) {
+  const length = [...term].length
+  return length >= 3 && length <= 24 && !term.includes('.') && !isDigit(term[0]) && !ROW.test(term)
+}
+
+/** FNV-1a of a text in UTF-8, 32 bits. */
+export function hashOf(text) {
+  let value = 0x811c9dc5
+  for (const byte of new TextEncoder().encode(text)) value = Math.imul(value ^ byte, 0x01000193) >>> 0
+  return value
+}

@@ -1,0 +1,101 @@
+/** When missed questions come back: Leitner's boxes. */
+
+import assert from 'node:assert/strict'
+import { test } from 'node:test'
+import { agenda, counts, standing, WAITS } from '../js/progress/schedule.js'
+import { random } from './progress-helpers.mjs'
+
+const DAY = 86_400_000
+const START = Date.UTC(2026, 0, 1, 20)
+const wrong = (at) => ({ right: false, at })
+const right = (at) => ({ right: true, at })
+
+test('what was right at the first go does not come back', () => {
+  assert.equal(standing([], START), null)
+  assert.equal(standing([right(START)], START), null)
+  assert.equal(counts([], right(START)), false)
+})
+
+test('a missed question comes back the next evening, then later and later, and leaves', () => {
+  let trials = [wrong(START)]
+  let day = START
+  const gaps = []
+  for (let round = 0; round < 5; round++) {
+    const { box, due } = standing(trials, day)
+    assert.equal(box, round)
+    assert.ok(due > day && due < day + WAITS[round] + DAY)
+    const next = day + Math.ceil((due - day) / DAY) * DAY
+    gaps.push((next - day) / DAY)
+    day = next
+    assert.ok(counts(trials, right(day)))
+    trials = [...trials, right(day)]
+  }
+  assert.deepEqual(gaps, [1, 3, 7, 16, 35])
+  assert.equal(standing(trials, day), null)
+})
+
+test('missed again, it starts from the first box', () => {
+  const trials = [wrong(START), right(START + DAY), right(START + 4 * DAY), wrong(START + 11 * DAY)]
+  assert.deepEqual(standing(trials.slice(0, 3), START + 5 * DAY), { box: 2, due: START + 4 * DAY + WAITS[2] })
+  assert.deepEqual(standing(trials, START + 11 * DAY), { box: 0, due: START + 11 * DAY + WAITS[0] })
+})
+
+test('an answer before its day moves nothing and is not kept', () => {
+  const trials = [wrong(START)]
+  const early = right(START + 60_000)
+  assert.deepEqual(standing([...trials, early], START), standing(trials, START))
+  assert.equal(counts(trials, early), false)
+})
+
+test('tries that follow each other are one miss; a miss on another day counts', () => {
+  assert.equal(counts([wrong(START)], wrong(START + 60_000)), false)
+  assert.equal(counts([wrong(START)], wrong(START + DAY / 2)), true)
+})
+
+test('a clock that was ahead makes a question due at once, not in years', () => {
+  const now = START
+  const ahead = START + 3650 * DAY
+  assert.deepEqual(standing([wrong(ahead)], now), { box: 0, due: now })
+  assert.equal(standing([wrong(ahead), right(now)], now).box, 1)
+  assert.deepEqual(standing([wrong(now), right(ahead)], now), { box: 1, due: now })
+})
+
+test('a clock that was behind makes a question due at once', () => {
+  const { box, due } = standing([wrong(0)], START)
+  assert.equal(box, 0)
+  assert.ok(due < START)
+})
+
+test('leaving out what does not count gives the same standing, in random histories', () => {
+  const draw = random(3)
+  for (let i = 0; i < 2000; i++) {
+    let at = START
+    let [all, kept] = [[], []]
+    for (let n = 0; n < 25; n++) {
+      at += Math.floor(draw() ** 8 * 30 * DAY)
+      const trial = draw() < 0.6 ? right(at) : wrong(at)
+      all = [...all, trial]
+      if (counts(kept, trial)) kept = [...kept, trial]
+      assert.deepEqual(standing(all, at), standing(kept, at))
+    }
+  }
+})
+
+test('the agenda has what is due, first boxes first, and counts the rest by day', () => {
+  const now = START + 4 * DAY
+  const answers = [
+    { key: 'second box', trials: [wrong(START - 9 * DAY), right(START - 3 * DAY)] },
+    { key: 'old', trials: [wrong(START)] },
+    { key: 'older', trials: [wrong(START - DAY)] },
+    { key: 'fresh', trials: [wrong(now)] },
+    { key: 'fresh too', trials: [wrong(now - 1000)] },
+    { key: 'third box', trials: [wrong(START - 9 * DAY), right(START - 3 * DAY), right(now)] },
+    { key: 'never missed', trials: [right(START)] },
+  ]
+  const { due, later } = agenda(answers, now)
+  assert.deepEqual(due.map(({ key }) => key), ['older', 'old', 'second box'])
+  assert.deepEqual(later, [
+    { days: 1, count: 2 },
+    { days: 7, count: 1 },
+  ])
+})

@@ -1,0 +1,170 @@
+"""A static host: compresses, sends validators and lifetimes as hosts do, and can be away."""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import hashlib
+import http.server
+import re
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import brotli
+
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".webmanifest": "application/manifest+json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".woff2": "font/woff2",
+    ".wasm": "application/wasm",
+    ".xml": "application/xml",
+    ".py": "text/x-python; charset=utf-8",
+    ".md": "text/markdown; charset=utf-8",
+    ".txt": "text/plain; charset=utf-8",
+}
+_PACKED = (".html", ".css", ".js", ".json", ".webmanifest", ".svg", ".wasm", ".xml", ".txt")
+_LASTING = re.compile(r".*/assets/.*\.[0-9a-f]{8}\.[a-z0-9]+")
+
+
+class Host:
+    """Serves a folder at `url`, which stays its address while it is away."""
+
+    def __init__(self, folder: Path, base: str = "/") -> None:
+        """`base` is the path under which the folder is served."""
+        self.folder = folder
+        self.base = base
+        self.asked: list[str] = []
+        """Paths that were asked for, with their queries."""
+        self.delay = 0.0
+        """Seconds before an answer."""
+        self._packed: dict[tuple[str, bytes], bytes] = {}
+        self._server: http.server.ThreadingHTTPServer | None = None
+        self._port = 0
+        self.start()
+
+    @property
+    def url(self) -> str:
+        return f"http://localhost:{self._port}{self.base}"
+
+    def start(self) -> None:
+        handler = type("Handler", (_Handler,), {"host": self})
+        self._server = _Server(("127.0.0.1", self._port), handler)
+        self._port = self._server.server_address[1]
+        threading.Thread(target=self._server.serve_forever, args=(0.02,), daemon=True).start()
+
+    def stop(self) -> None:
+        """Be away: connections are refused, and those that are open end."""
+        server, self._server = self._server, None
+        if server is not None:
+            server.shutdown()
+            server.server_close()
+
+    @contextlib.contextmanager
+    def away(self) -> Iterator[None]:
+        self.stop()
+        try:
+            yield
+        finally:
+            self.start()
+
+    def since(self) -> list[str]:
+        """What was asked for since this was asked the last time."""
+        found, self.asked = self.asked, []
+        return sorted(found)
+
+    def file(self, address: str) -> tuple[int, Path]:
+        path = unquote(urlsplit(address).path)
+        if not path.startswith(self.base):
+            return 404, self.folder / "404.html"
+        inner = path.removeprefix(self.base)
+        if not inner or inner.endswith("/"):
+            inner += "index.html"
+        found = self.folder / inner
+        return (200, found) if found.is_file() else (404, self.folder / "404.html")
+
+    def packed(self, data: bytes, accepted: str) -> tuple[str, bytes]:
+        coding = "br" if "br" in accepted else "gzip" if "gzip" in accepted else ""
+        if not coding or len(data) < 256:
+            return "", data
+        key = coding, hashlib.sha256(data).digest()
+        if key not in self._packed:
+            self._packed[key] = (
+                brotli.compress(data, quality=5) if coding == "br" else gzip.compress(data, 6)
+            )
+        return coding, self._packed[key]
+
+
+class _Server(http.server.ThreadingHTTPServer):
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, *arguments: Any) -> None:
+        self.open: set[socket.socket] = set()
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        self.open.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        self.open.discard(request)
+        super().shutdown_request(request)
+
+    def server_close(self) -> None:
+        super().server_close()
+        for connection in list(self.open):
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that hangs up is no news."""
+
+
+class _Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    host: Host
+    wbufsize = -1
+    disable_nagle_algorithm = True
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+    def do_GET(self) -> None:
+        host = self.host
+        host.asked.append(self.path.removeprefix(host.base))
+        time.sleep(host.delay)
+        status, path = host.file(self.path)
+        data = path.read_bytes() if path.is_file() else b""
+        tag = f'"{hashlib.sha256(data).hexdigest()[:16]}"'
+        lasting = _LASTING.fullmatch(urlsplit(self.path).path)
+        fresh = self.headers.get("If-None-Match", "").removeprefix("W/") == tag
+        if status == 200 and fresh:
+            status, data = 304, b""
+        self.send_response(status)
+        coding = ""
+        if path.suffix in _PACKED and status != 304:
+            coding, data = host.packed(data, self.headers.get("Accept-Encoding", ""))
+        self.send_header("Content-Type", TYPES.get(path.suffix, "application/octet-stream"))
+        if coding:
+            self.send_header("Content-Encoding", coding)
+        self.send_header("Vary", "Accept-Encoding")
+        self.send_header("ETag", tag)
+        kept = "max-age=31536000, immutable" if lasting else "max-age=0, must-revalidate"
+        self.send_header("Cache-Control", kept)
+        self.send_header("Content-Length", str(len(data)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+    do_HEAD = do_GET

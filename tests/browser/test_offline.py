@@ -1,0 +1,379 @@
+"""The site without a network: what a browser keeps, when it asks for what, and what it shows."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from coursekit import Folder
+from hostkit import Host
+from labcourse import PAGE
+from labpage import lab, until, watched
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from coursebuild.effects.resources import bundled_files
+from coursebuild.effects.server import PreviewServer
+from coursebuild.render.assets import page_script
+
+pytestmark = pytest.mark.browser
+
+PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0h9v9z"/></svg>'
+TEXTS = ("## One\n\nText of one.\n\n![a sketch](s.svg)\n", "## Two\n\nText of two.\n")
+FIRST, SECOND = "lessons/1.1-one.html", "lessons/1.2-two.html"
+
+KEPT = """async () => {
+  const found = []
+  for (const name of await caches.keys()) {
+    for (const { url } of await (await caches.open(name)).keys()) {
+      const { pathname, search } = new URL(url)
+      const name = pathname.replace(/\\b[0-9a-f]{8,}\\b/, 'HASH')
+      found.push(name + search.replace(/[0-9a-f]{12}/, 'DIGEST'))
+    }
+  }
+  return found.sort()
+}"""
+QUIET = """async () => {
+  // The worker answers one after the other: when this is answered, everything before it is done.
+  const { active } = await navigator.serviceWorker.ready
+  const { port1, port2 } = new MessageChannel()
+  const done = new Promise((told) => { port1.onmessage = ({ data }) => data.end && told(data) })
+  const asked = { pages: [location.href], uses: [], keep: KEEP, sparing: false, look: LOOK }
+  active.postMessage({ coursebuild: 'visit', ...asked }, [port2])
+  return done
+}"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course, built once; tests that change it copy its site."""
+    folder = Folder(tmp_path_factory.mktemp("offline") / "course")
+    folder.fill(TEXTS, stores)
+    folder.write("content/lessons/s.svg", PICTURE)
+    assert folder.main("build").status == 0
+    shutil.copytree(folder.root / "public", folder.root / "first")
+    return folder
+
+
+@pytest.fixture
+def host(made: Folder, tmp_path: Path) -> Iterator[Host]:
+    """Serves a copy of the site, in a folder of its host."""
+    shutil.copytree(made.root / "first", tmp_path / "site")
+    host = Host(tmp_path / "site", "/course/")
+    yield host
+    host.stop()
+
+
+def settle(page: Page, keep: str = "auto", look: bool = False) -> dict[str, object]:
+    """Wait until the worker has done all it was told to, after one visit more."""
+    asked = QUIET.replace("KEEP", json.dumps(keep)).replace("LOOK", json.dumps(look))
+    found: dict[str, object] = page.evaluate(asked)
+    return found
+
+
+def opened(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
+    """A page whose worker has kept what it keeps."""
+    page, said = watched(context)
+    page.goto(host.url + path)
+    page.evaluate("navigator.serviceWorker.ready.then(() => 0)")
+    own = "new URL(document.documentElement.dataset.root + 'service-worker.js', document.baseURI)"
+    until(page, f"navigator.serviceWorker.controller?.scriptURL === {own}.href")
+    settle(page)
+    return page, said
+
+
+def edited(made: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
+    """Another build of the course in the place of the one that is served."""
+    for path, old, new in edits:
+        made.replace(path, old, new)
+    try:
+        assert made.main("build").status == 0
+        shutil.rmtree(site)
+        shutil.copytree(made.root / "public", site)
+    finally:
+        for path, old, new in edits:
+            made.replace(path, new, old)
+
+
+def test_after_one_visit_every_page_is_there_without_a_network(
+    context: BrowserContext, host: Host
+) -> None:
+    page, said = opened(context, host)
+    assert said == []
+    host.stop()
+    for path, text in ((FIRST, "Text of one."), (SECOND, "Text of two."), ("", "Lesson one")):
+        page.goto(host.url + path)
+        assert page.locator("main").get_by_text(text).first.is_visible()
+        assert page.evaluate("getComputedStyle(document.body).display") == "flex", "its style"
+        assert page.locator("[data-tools] select").count() == 1, "its script"
+        until(page, "document.fonts.status === 'loaded'")
+    page.goto(host.url + FIRST)
+    until(page, "document.querySelector('article img').naturalWidth > 0")
+    page.goto(f"{host.url}lessons/1.2-two")  # as hosts that leave out the ending call it
+    assert page.get_by_text("Text of two.").is_visible()
+    host.start()
+
+
+def test_a_page_that_is_not_there_leads_back_when_there_is_a_network(
+    context: BrowserContext, host: Host
+) -> None:
+    page, _ = opened(context, host)
+    with host.away():
+        page.goto(f"{host.url}lessons/9.9-none.html?x=<b>&y")
+        assert page.locator("h1").inner_text() == "Without a network"
+        assert page.url.startswith(f"{host.url}offline/?from=")
+        missing = page.locator(".keep-missing")
+        assert "/course/lessons/9.9-none.html?x=%3Cb%3E&y" in missing.inner_text()
+        again = missing.get_by_role("link", name="Try again")
+        assert again.get_attribute("href") == f"{host.url}lessons/9.9-none.html?x=%3Cb%3E&y"
+    again.click()
+    page.wait_for_url("**/9.9-none.html*")
+    assert page.locator("h1").inner_text() == "Page not found"
+
+
+@pytest.mark.parametrize("from_", ["https://example.com/x", "//example.com/", "/a/", "data:,"])
+def test_no_way_back_leads_elsewhere(context: BrowserContext, host: Host, from_: str) -> None:
+    page, _ = watched(context)
+    page.goto(f"{host.url}offline/?from={from_}")
+    page.locator(".keep input").first.wait_for()
+    assert page.locator(".keep-missing").count() == 0
+
+
+def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
+    context: BrowserContext, host: Host
+) -> None:
+    page, _ = watched(context)
+    page.goto(host.url + FIRST)
+    assert not [path for path in host.asked if path.startswith(("service-worker", "files.json"))]
+    until(page, "navigator.serviceWorker.controller !== null")
+    settle(page)
+    host.since()
+    page.goto(host.url + SECOND)
+    settle(page)
+    assert host.since() == [SECOND]
+
+
+def test_a_new_build_costs_what_has_changed(
+    context: BrowserContext, host: Host, made: Folder
+) -> None:
+    page, said = opened(context, host)
+    before = page.evaluate(KEPT)
+    edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
+    host.since()
+    settle(page, look=True)
+    assert FIRST in host.since()
+    assert page.evaluate("() => document.querySelector('.notice')") is None
+    page.goto(host.url + SECOND)
+    settle(page, look=True)
+    settle(page)
+    assert page.evaluate(KEPT) == before, "what is no more in use is gone"
+    with host.away():
+        page.goto(host.url + FIRST)
+        assert page.get_by_text("Other text.").is_visible()
+    assert said == []
+
+
+def test_a_page_that_was_kept_says_when_there_is_a_newer_one(
+    context: BrowserContext, host: Host, made: Folder
+) -> None:
+    page, _ = opened(context, host)
+    with host.away():
+        page.goto(host.url + FIRST)
+        edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
+        assert page.get_by_text("Text of one.").is_visible()
+        page.wait_for_timeout(2000)  # the page's own visit, which hears of no newer list
+        settle(page)
+    page.evaluate("window.dispatchEvent(new Event('online'))")
+    page.locator(".notice").wait_for()
+    assert "This page has changed" in page.locator(".notice").inner_text()
+    page.get_by_role("button", name="Load it again").click()
+    page.get_by_text("Other text.").wait_for()
+    assert page.locator(".notice").count() == 0
+
+
+def test_a_slow_network_does_not_keep_a_page_that_is_here(
+    context: BrowserContext, host: Host
+) -> None:
+    page, _ = opened(context, host)
+    host.delay = 60.0
+    page.goto(host.url + SECOND)
+    assert page.get_by_text("Text of two.").is_visible()
+    host.delay = 0.0
+
+
+def test_several_courses_on_one_origin(
+    context: BrowserContext, made: Folder, tmp_path: Path
+) -> None:
+    shutil.copytree(made.root / "first", tmp_path / "both")
+    shutil.copytree(made.root / "first", tmp_path / "both" / "inner")
+    host = Host(tmp_path / "both", "/")
+    try:
+        opened(context, host)
+        page, _ = opened(context, host, "inner/")
+        names = page.evaluate("caches.keys()")
+        assert sorted(names) == [f"coursebuild 1 {host.url}", f"coursebuild 1 {host.url}inner/"]
+        page.goto(f"{host.url}inner/offline/")
+        page.get_by_label("nothing", exact=True).check()
+        page.get_by_text("Nothing of the course is kept here.").wait_for()
+        assert page.evaluate("caches.keys()") == [f"coursebuild 1 {host.url}"]
+        scopes = "navigator.serviceWorker.getRegistrations().then(all => all.map(r => r.scope))"
+        assert page.evaluate(scopes) == [host.url]
+    finally:
+        host.stop()
+
+
+def test_the_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
+    page, said = watched(context)
+    page.goto(f"{host.url}offline/")
+    page.get_by_text("files of the course are here.").wait_for()
+    assert page.get_by_label("all text and pictures").is_checked()
+    assert "MB" in page.locator(".keep").inner_text()
+    page.get_by_label("everything, with all simulations").check()
+    status = page.locator(".keep-status")
+    listed = json.loads((host.folder / "files.json").read_text())
+    total = sum(len(listed[group]["files"]) for group in ("shell", "text", "rest"))
+    page.get_by_text(f"{total} of {total} files of the course are here.").wait_for()
+    assert status.get_attribute("role") == "status"
+    page.get_by_label("nothing", exact=True).check()
+    page.get_by_text("Nothing of the course is kept here.").wait_for()
+    page.goto(host.url + FIRST)
+    page.wait_for_timeout(2500)  # a page's own visit would have come by then
+    assert page.evaluate("caches.keys()") == []
+    assert page.evaluate("navigator.serviceWorker.getRegistrations()") == []
+    page.goto(f"{host.url}offline/")
+    page.get_by_label("what was read").check()
+    page.get_by_text("files of the course are here.").wait_for()
+    assert page.get_by_label("what was read").is_checked()
+    assert said == []
+
+
+def test_without_a_script_and_without_workers_it_says_what_is_so(
+    browsers: dict[str, Browser], host: Host
+) -> None:
+    with browsers["webgl"].new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(f"{host.url}offline/")
+        assert page.get_by_text("Nothing is kept by this browser now.").is_visible()
+    with browsers["webgl"].new_context(service_workers="block") as context:
+        page, said = watched(context)
+        page.goto(host.url + FIRST)
+        page.wait_for_timeout(2500)
+        assert page.evaluate("caches.keys()") == []
+        assert [text for text in said if "blocked by Playwright" not in text] == []
+
+
+def test_the_site_can_be_installed(context: BrowserContext, host: Host) -> None:
+    page, _ = opened(context, host)
+    client = context.new_cdp_session(page)
+    errors = client.send("Page.getInstallabilityErrors")["installabilityErrors"]
+    # A context of Playwright's is a private window, in which nothing can be installed.
+    assert [error["errorId"] for error in errors if error["errorId"] != "in-incognito"] == []
+    found = client.send("Page.getAppManifest")
+    assert found["errors"] == []
+    assert found["url"] == f"{host.url}manifest.webmanifest"
+    manifest = json.loads(found["data"])
+    assert manifest["name"] == "Scratch" and manifest["short_name"] == "Scratch"
+    for icon in manifest["icons"]:
+        sides = page.evaluate(
+            "src => new Promise((done) => { const i = new Image(); i.src = src;"
+            " i.onload = () => done(`${i.naturalWidth}x${i.naturalHeight}`); i.onerror = done })",
+            host.url + icon["src"],
+        )
+        assert icon["sizes"] in ("any", sides)
+
+
+def test_labs_run_without_a_network_once_they_were_used(
+    context: BrowserContext, tmp_path: Path, course: Folder
+) -> None:
+    shutil.copytree(course.root / "public", tmp_path / "site")
+    host = Host(tmp_path / "site")
+    try:
+        page, _ = opened(context, host, PAGE)
+        assert not [path for path in page.evaluate(KEPT) if path.endswith(".wasm")]
+        lab(page)
+        settle(page)
+        until(page, f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))")
+        with host.away():
+            page.goto(host.url + PAGE)
+            lab(page)
+    finally:
+        host.stop()
+
+
+def test_a_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
+    context: BrowserContext, tmp_path: Path, course: Folder
+) -> None:
+    shutil.copytree(course.root / "public", tmp_path / "site")
+    host = Host(tmp_path / "site")
+    try:
+        page, _ = watched(context)
+        page.route("**/service-worker.js", lambda route: route.abort())
+        page.goto(host.url + PAGE)
+        lab(page)
+        page.unroute("**/service-worker.js")
+        page.reload()
+        lab(page)
+        until(page, "navigator.serviceWorker.controller !== null")
+        until(page, f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))")
+    finally:
+        host.stop()
+
+
+class Previewed:
+    """What a preview serves: the files of a folder."""
+
+    version = 0
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.changed = threading.Condition()
+
+    def find(self, path: str) -> bytes | None:
+        file = self.folder / path
+        return file.read_bytes() if file.is_file() else None
+
+    def base(self) -> str:
+        return "/"
+
+    def expected(self, path: str) -> bool:
+        return False
+
+    def news(self, path: str) -> str:
+        return "{}"
+
+    def accept(self, path: str, id: str) -> str:
+        return "no"
+
+
+@pytest.mark.parametrize("script", ["preview.js", "worker.js"])
+def test_a_preview_is_never_shown_from_what_a_site_kept_at_its_address(
+    context: BrowserContext, made: Folder, tmp_path: Path, script: str
+) -> None:
+    """Either of two things sees the worker off: the page's script, and the worker in its place."""
+    shutil.copytree(made.root / "first", tmp_path / "site")
+    host = Host(tmp_path / "site")
+    page, _ = opened(context, host)
+    host.stop()
+    bundled = dict(bundled_files())
+    own = {
+        "preview.css": b"",
+        "preview.js": bundled["js/preview.js"] if script == "preview.js" else b"",
+        "worker.js": page_script(bundled["js/preview-worker.js"]) if script == "worker.js" else b"",
+    }
+    preview = PreviewServer(int(host.url.split(":")[2].strip("/")), Previewed(host.folder), own)
+    preview.start()
+    try:
+        page.goto(host.url + FIRST)
+        left = "navigator.serviceWorker.getRegistrations().then(all => all.length === 0)"
+        until(page, left)
+        if script == "worker.js":
+            until(page, "caches.keys().then(names => names.length === 0)")
+        page.goto(host.url + SECOND)
+        page.wait_for_timeout(2500)
+        assert page.evaluate(left), "a page of a preview registers nothing"
+        assert page.evaluate("navigator.serviceWorker.controller") is None
+    finally:
+        preview.stop()

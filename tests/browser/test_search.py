@@ -1,0 +1,447 @@
+"""The search and its commands in a headless Chromium: by keyboard, from disk, without a script."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import json
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from coursekit import Folder, block
+from labpage import until, watched
+from playwright.sync_api import Browser, BrowserContext, Page
+
+pytestmark = pytest.mark.browser
+
+AXE = Path(__file__).parents[2] / "site" / "node_modules" / "axe-core" / "axe.min.js"
+HOSTILE = '<img src=x onerror="alert(1)"> & <b>bold'
+LESSONS = [
+    """## The inertia tensor {#tensor}
+
+For a rigid body it is $I_{xx}$ and its kin; the angular velocity is $\\omega$.
+
+$$\\boldsymbol{\\tau} = \\dot{\\mathbf{L}}$$
+
+## Drift of Euler's step
+
+Energy grows by a little each step.
+""",
+    "## Stepping\n\n"
+    + block(
+        "step.py", "import math\n\n\ndef mj_forward(model, data):\n    return data\n", info="norun"
+    )
+    + "The `qpos` of `mjData` is read by `data.qpos[0]`.\n",
+    '## Titles of `<img src=x onerror="alert(1)">`\n\n'
+    "Hostile `</script><script>alert(2)</script>`.\n",
+]
+SINGLE = "localStorage.getItem('coursebuild.shortcuts')"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course of three lessons and many short ones, built."""
+    folder = Folder(tmp_path_factory.mktemp("search") / "course")
+    folder.fill(LESSONS, stores)
+    toml = folder.text("content/course.toml").replace(
+        'title = "Lesson three"', f"title = {json.dumps(HOSTILE)}"
+    )
+    for n in range(4, 24):
+        toml += (
+            f'\n[[level.lesson]]\nid = "1.{n}"\nslug = "more{n}"\ntitle = "Pendulum {n}"\n'
+            'status = "complete"\n'
+        )
+        folder.write(f"content/lessons/1.{n}-more{n}.md", f"## Swing\n\nA pendulum, number {n}.\n")
+    folder.write("content/course.toml", toml)
+    done = folder.main("build", "--quiet")
+    assert done.status == 0, done.out + done.err
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(folder: Folder) -> Iterator[str]:
+    handler = functools.partial(Quiet, directory=str(folder.root / "public"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+        thread.join()
+
+
+@pytest.fixture
+def window(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
+    size = {"width": 1000, "height": 800}
+    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
+        yield context
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+Opened = Callable[..., Page]
+
+
+@pytest.fixture
+def opened(window: BrowserContext, site: str) -> Iterator[Opened]:
+    """Opens a page, by default that of lesson 1.1; what it says to the console must be nothing."""
+    said: list[str] = []
+
+    def opened(path: str = "lessons/1.1-one.html", base: str = site) -> Page:
+        page, lines = watched(window)
+        page.goto(base + path)
+        said.extend(lines)
+        page.on("console", lambda message: said.append(message.text))
+        return page
+
+    yield opened
+    blocked = "Service Worker registration blocked by Playwright"
+    assert [line for line in said if line != blocked] == []
+
+
+def ask(page: Page, query: str) -> list[str]:
+    """Type a query into the open dialog; what is found, as it is read."""
+    field = page.locator("#_search-field")
+    field.fill(query)
+    until(page, "() => document.querySelector('#_search-list') !== null")
+    shown = "(q) => document.querySelector('.search-dialog').dataset.shown === q"
+    until(page, shown, query)
+    return [text.replace("\n", " / ") for text in page.locator(".search-option").all_inner_texts()]
+
+
+def status(page: Page) -> str:
+    return page.locator(".search-dialog .search-status").inner_text()
+
+
+def focused(page: Page) -> str:
+    text: str = page.evaluate("() => document.activeElement.className || document.activeElement.id")
+    return text
+
+
+def open_by_key(page: Page, key: str = "/") -> None:
+    page.keyboard.press(key)
+    until(page, "() => document.querySelector('.search-dialog')?.open === true")
+    until(page, "() => document.querySelectorAll('.search-option').length > 0")
+
+
+def test_nothing_is_loaded_before_it_is_asked_for(opened: Opened) -> None:
+    page = opened()
+    page.wait_for_timeout(300)
+    loaded = page.evaluate("() => performance.getEntriesByType('resource').map((e) => e.name)")
+    assert not [name for name in loaded if "search" in name]
+    open_by_key(page)
+    loaded = page.evaluate("() => performance.getEntriesByType('resource').map((e) => e.name)")
+    names = [name.rpartition("/")[2] for name in loaded if "search" in name]
+    assert len(names) == 2 and names[1] == "index.js", "its script, and the list of pages"
+
+
+@pytest.mark.parametrize(
+    ("query", "first"),
+    [
+        ("inertia tensor", "1.1 Lesson one"),
+        ("inretia tensro", "1.1 Lesson one"),
+        ("euler drfit", "1.1 Lesson one"),
+        ("Iₓₓ", "1.1 Lesson one"),
+        ("ω", "1.1 Lesson one"),
+        ("omega", "1.1 Lesson one"),
+        ("\\boldsymbol{\\tau}", "1.1 Lesson one"),
+        ("mj_forward", "1.2 Lesson two"),
+        ("forward", "1.2 Lesson two"),
+        ("data.qpos", "1.2 Lesson two"),
+        ("mjdata", "1.2 Lesson two"),
+        ("1.2", "1.2 Lesson two"),
+        ("onerror", "1.3 <img"),
+    ],
+)
+def test_what_a_learner_types(opened: Opened, query: str, first: str) -> None:
+    page = opened("lessons/1.5-more5.html")
+    open_by_key(page)
+    found = ask(page, query)
+    assert found[0].startswith(first), found
+    assert page.locator(".search-option mark").count() > 0 or query == "1.2"
+
+
+def test_a_misspelt_word_is_set_right_and_it_is_said(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    ask(page, "drfit")
+    assert status(page) == "1 page. Shown for “drift”."
+    assert ask(page, "qzxwv") == []
+    assert status(page).startswith("Nothing is found for “qzxwv”. ")
+
+
+def test_by_keyboard_alone(opened: Opened) -> None:
+    page = opened("lessons/1.5-more5.html")
+    page.locator(".search-open").focus()
+    page.keyboard.press("Enter")
+    until(page, "() => document.querySelectorAll('.search-option').length > 0")
+    field = page.locator("#_search-field")
+    assert field.get_attribute("role") == "combobox"
+    page.keyboard.type("inertia tensor")
+    until(page, "() => document.querySelector('.search-dialog').dataset.shown === 'inertia tensor'")
+    active = "() => document.getElementById(document.querySelector('#_search-field')"
+    active += ".getAttribute('aria-activedescendant')).innerText.split('\\n')[0]"
+    assert page.evaluate(active) == "1.1 Lesson one"
+    page.keyboard.press("ArrowDown")
+    assert page.evaluate(active) == "The inertia tensor"
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowUp")
+    last = page.locator(".search-option").last
+    assert last.get_attribute("aria-selected") == "true", "before the first comes the last"
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/lessons/1.1-one.html#tensor")
+
+
+def test_escape_closes_and_the_focus_goes_back(opened: Opened) -> None:
+    page = opened()
+    page.locator(".search-open").click()
+    until(page, "() => document.querySelectorAll('.search-option').length > 0")
+    assert focused(page) == "search-input"
+    page.keyboard.press("Tab")
+    assert focused(page) == "search-close"
+    page.keyboard.press("Escape")
+    assert not page.locator(".search-dialog").is_visible()
+    assert focused(page) == "search-open"
+    page.keyboard.press("Control+k")
+    until(page, "() => document.querySelector('.search-dialog').open")
+    page.keyboard.press("Escape")
+    assert focused(page) == "search-open"
+
+
+def test_enter_waits_for_what_was_typed_last(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    page.keyboard.type("mj_forward")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/lessons/1.2-two.html")
+
+
+def test_single_keys_can_be_switched_off(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    page.locator(".search-keys input").uncheck()
+    page.keyboard.press("Escape")
+    page.reload()
+    page.keyboard.press("/")
+    page.wait_for_timeout(200)
+    assert page.locator(".search-dialog").count() == 0
+    assert page.evaluate(f"() => {SINGLE}") == "off"
+    open_by_key(page, "Control+k")
+    page.locator(".search-keys input").check()
+    assert page.evaluate(f"() => {SINGLE}") is None
+
+
+def test_keys_that_belong_to_a_field_or_a_lab_stay_there(opened: Opened) -> None:
+    page = opened()
+    page.evaluate(
+        """() => {
+          const field = document.createElement('input')
+          const lab = document.createElement('div')
+          lab.className = 'lab'
+          lab.tabIndex = 0
+          document.querySelector('main').prepend(field, lab)
+          field.focus()
+        }"""
+    )
+    page.keyboard.type("a/b")
+    assert page.evaluate("() => document.querySelector('main > input').value") == "a/b"
+    page.evaluate("() => document.querySelector('main > .lab').focus()")
+    page.keyboard.press("/")
+    page.wait_for_timeout(200)
+    assert page.locator(".search-dialog").count() == 0
+
+
+def test_commands(opened: Opened) -> None:
+    page = opened("lessons/1.2-two.html")
+    open_by_key(page)
+    listed = ask(page, ">")
+    for title in ("Next lesson: 1.3 <img", "Previous lesson: 1.1 Lesson one", "Print this page"):
+        assert any(option.startswith(title) for option in listed), listed
+    assert "Course map" in listed and "Search" in listed
+    assert ask(page, "> dark") == ["Colours: Dark"]
+    page.keyboard.press("Enter")
+    assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"
+    open_by_key(page)
+    assert ask(page, "> prev les") == ["Previous lesson: 1.1 Lesson one"]
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/lessons/1.1-one.html")
+
+
+def test_a_link_to_the_section_is_copied_and_it_is_said(
+    opened: Opened, window: BrowserContext
+) -> None:
+    window.grant_permissions(["clipboard-read", "clipboard-write"])
+    page = opened("lessons/1.1-one.html#tensor")
+    open_by_key(page)
+    ask(page, "> copy link")
+    page.keyboard.press("Enter")
+    until(page, "() => document.querySelector('.search-said')?.textContent")
+    assert page.locator(".search-said").inner_text() == "The link is copied."
+    copied = page.evaluate("() => navigator.clipboard.readText()")
+    assert copied.endswith("/lessons/1.1-one.html#tensor")
+
+
+def test_lessons_by_the_beginning_of_their_number(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    found = ask(page, "1.1")
+    assert found[:2] == ["1.1 Lesson one", "1.10 Pendulum 10"]
+    assert page.locator(".search-group").first.get_attribute("aria-label") == "Go to"
+
+
+def test_what_was_searched_before_is_offered_and_can_be_forgotten(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    ask(page, "mj_forward")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/lessons/1.2-two.html")
+    open_by_key(page)
+    options = page.locator(".search-option")
+    assert options.all_inner_texts()[:2] == ["mj_forward", "Forget these"]
+    options.first.click()
+    until(page, "() => document.querySelector('.search-dialog').dataset.shown === 'mj_forward'")
+    assert focused(page) == "search-input"
+    ask(page, "")
+    options.nth(1).click()
+    until(page, "() => !document.querySelector('.search-option').textContent.includes('mj_')")
+    assert page.evaluate("() => Object.keys(localStorage).filter((k) => /search/.test(k))") == []
+
+
+def test_hostile_titles_and_texts_are_text(opened: Opened) -> None:
+    page = opened()
+    page.on("dialog", lambda dialog: pytest.fail(dialog.message))
+    open_by_key(page)
+    for query in ("bold", "hostile script", "onerror", "<script>alert(3)</script>"):
+        ask(page, query)
+        assert page.locator(".search-dialog :is(img, script, b)").count() == 0
+    assert HOSTILE in ask(page, "bold")[0]
+
+
+def test_from_a_disk(folder: Folder, opened: Opened) -> None:
+    page = opened(base=(folder.root / "public").as_uri() + "/")
+    open_by_key(page)
+    assert ask(page, "mj_forwrad")[0].startswith("1.2 Lesson two")
+    page.keyboard.press("Enter")
+    page.wait_for_url("file://**/lessons/1.2-two.html")
+    page.goto((folder.root / "public" / "search" / "index.html").as_uri() + "?q=euler+drfit")
+    until(page, "() => document.querySelector('.found-pages > li')")
+    assert page.locator(".found-pages a").first.inner_text() == "1.1 Lesson one"
+
+
+def test_closed_storage_is_no_matter(opened: Opened, window: BrowserContext) -> None:
+    window.add_init_script(
+        "Object.defineProperty(window, 'localStorage', { get() { throw new Error('closed') } })"
+    )
+    page = opened()
+    open_by_key(page)
+    page.locator(".search-keys input").uncheck()
+    assert ask(page, "mj_forward")[0].startswith("1.2 Lesson two")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/lessons/1.2-two.html")
+
+
+def test_the_page_of_the_search(opened: Opened) -> None:
+    page = opened("search/index.html?q=pendulum")
+    until(page, "() => document.querySelectorAll('.found-pages > li').length === 15")
+    assert page.locator(".search-results .search-status").inner_text() == "20 pages."
+    page.locator(".search-more").click()
+    until(page, "() => document.querySelectorAll('.found-pages > li').length === 20")
+    until(page, "() => document.activeElement.closest('.found-pages > li')")
+    assert not page.locator(".search-more").is_visible()
+    field = page.locator("#_q")
+    assert field.input_value() == "pendulum"
+    field.fill("inertia & tensor")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/search/index.html?q=inertia%20%26%20tensor")
+    first = "() => document.querySelector('.found-pages a').textContent === '1.1 Lesson one'"
+    until(page, first)
+    page.locator(".found-pages ul a").first.click()
+    page.wait_for_url("**/lessons/1.1-one.html#tensor")
+    page.go_back()
+    until(page, "() => document.querySelector('#_q').value === 'inertia & tensor'")
+
+
+def test_all_results_lead_from_the_dialog_to_the_page(opened: Opened) -> None:
+    page = opened()
+    open_by_key(page)
+    assert ask(page, "pendulum")[-1] == "All results"
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/search/index.html?q=pendulum")
+
+
+def test_without_a_script_the_page_says_so(browsers: dict[str, Browser], site: str) -> None:
+    with browsers["plain"].new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(site + "search/index.html")
+        assert "needs JavaScript" in page.locator("main").inner_text()
+        assert not page.locator("form").is_visible()
+        page.locator("main a").click()
+        assert page.url == site + "index.html"
+
+
+def test_an_index_that_does_not_come_is_told(opened: Opened, window: BrowserContext) -> None:
+    window.route("**/assets/search/*.js", lambda route: route.abort())
+    page, _ = watched(window)
+    page.goto(opened().url)
+    open_by_key(page)
+    page.locator("#_search-field").fill("inertia")
+    until(page, "() => document.querySelector('.search-dialog .search-status').textContent")
+    assert status(page).startswith("The search cannot be loaded.")
+
+
+def test_a_list_of_pages_from_before_is_loaded_anew(
+    opened: Opened, window: BrowserContext, folder: Folder
+) -> None:
+    """The site was built anew since the browser kept the list, and the files in it have gone."""
+    text = folder.text("public/search/index.js")
+    names = json.loads(text.partition(',"",')[2].rstrip()[:-1])["files"]
+    old = text.replace(names, "0" * len(names))
+    window.route(
+        "**/search/index.js", lambda route: route.fulfill(body=old, content_type="text/javascript")
+    )
+    page, _ = watched(window)
+    page.goto(opened().url)
+    open_by_key(page)
+    assert ask(page, "inertia tensor")[0].startswith("1.1 Lesson one")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [320, 1440])
+def test_accessible_and_within_the_window(
+    browsers: dict[str, Browser], site: str, scheme: Any, width: int
+) -> None:
+    size = {"width": width, "height": 700}
+    with browsers["plain"].new_context(viewport=size, color_scheme=scheme, bypass_csp=True) as c:
+        page = c.new_page()
+        page.goto(site + "lessons/1.1-one.html")
+        open_by_key(page)
+        for query in ("", "inertia tensor", ">", "qzxwv", "pendulum"):
+            ask(page, query)
+            check(page)
+        page.goto(site + "search/index.html?q=pendulum")
+        until(page, "() => document.querySelectorAll('.found-pages > li').length === 15")
+        check(page)
+
+
+def check(page: Page) -> None:
+    """Axe finds nothing, and nothing is wider than the window."""
+    page.add_script_tag(path=str(AXE))
+    found = page.evaluate(
+        "async () => (await axe.run()).violations.map((v) => [v.id, v.nodes[0].html])"
+    )
+    assert found == []
+    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    small = page.evaluate(
+        """() => [...document.querySelectorAll('dialog[open] :is(button, label, [role=option])')]
+          .map((e) => e.getBoundingClientRect())
+          .filter((box) => box.height < 24 || box.width < 24).length"""
+    )
+    assert small == 0

@@ -1,0 +1,395 @@
+"""Quizzes as a package of IMS QTI 2.1: every kind of question, whatever stands in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from urllib.parse import unquote
+
+import pytest
+from archives import entries, formula_mistakes, mistakes, packaging_schema, referred
+from coursekit import GOOD, Done, Folder
+from lxml import etree
+from qti_rules import MATHML, QTI
+from qti_rules import mistakes as item_mistakes
+from zoo import ANY, SCRIPT, SVG, quiz
+
+from coursebuild.render.packages.xml import identifier
+
+Make = Callable[..., Folder]
+ZIP = "quizzes-qti.zip"
+SPACES = {"q": QTI, "m": MATHML}
+
+
+def export(folder: Folder, *arguments: str) -> Done:
+    return folder.main("export", "qti", *arguments)
+
+
+def package(folder: Folder) -> dict[str, bytes]:
+    """The package, in which everything is as it must be."""
+    done = export(folder)
+    assert done.status == 0, done.out + done.err
+    files = entries(folder.root / ZIP)
+    check(files)
+    return files
+
+
+def check(files: dict[str, bytes]) -> None:
+    """A package is whole: valid, every file listed, every address a file of it."""
+    manifest = files["imsmanifest.xml"]
+    assert mistakes(packaging_schema(), manifest) == []
+    assert set(referred(manifest)) == set(files) - {"imsmanifest.xml"}
+    for path, data in files.items():
+        if path.startswith(("items/", "tests/")):
+            assert item_mistakes(data) == [], path
+            root = etree.fromstring(data)
+            for math in root.iter(f"{{{MATHML}}}math"):
+                assert formula_mistakes(math) == [], path
+            for address in root.xpath("//@href | //@src"):
+                if not re.match(r"[a-z]+:", address):
+                    assert unquote(address).removeprefix("../") in files
+
+
+def items(files: dict[str, bytes]) -> list[etree._Element]:
+    """The items in the order of their tests."""
+    tests = [etree.fromstring(files[path]) for path in files if path.startswith("tests/")]
+    names = [ref.get("href") for test in tests for ref in test.iter(f"{{{QTI}}}assessmentItemRef")]
+    return [etree.fromstring(files[unquote(name).removeprefix("../")]) for name in names]
+
+
+def item(make: Make, question: dict[str, object], **given: str) -> etree._Element:
+    folder = make(GOOD + SCRIPT + quiz("a", question), **given)
+    [found] = items(package(folder))
+    return found
+
+
+def shape(node: etree._Element, path: str) -> list[str]:
+    """Texts or attributes."""
+    found = node.xpath(path, namespaces=SPACES)
+    return [part if isinstance(part, str) else "".join(part.itertext()) for part in found]
+
+
+def test_every_kind_of_question(make: Make) -> None:
+    folder = make(GOOD + SCRIPT + quiz("1.1-check", *ANY.values()))
+    done = export(folder)
+    assert done.status == 0, done.out + done.err
+    assert done.out.count("warning[package-reduced]") == 1, "the simulation"
+    assert "wrote 14 files to quizzes-qti.zip, 0.0 MB" in done.out
+    files = entries(folder.root / ZIP)
+    check(files)
+    found = dict(zip(ANY, items(files), strict=True))
+    kinds = {name: shape(one, "//q:responseDeclaration/@baseType") for name, one in found.items()}
+    assert kinds == {
+        "mcq": ["identifier"], "several": ["identifier"], "predict": ["identifier"],
+        "numeric": ["float"], "zero": ["float"], "large": ["float"], "output": ["string"],
+        "marks": ["string"], "open": ["string"], "order": ["identifier"],
+    }  # fmt: skip
+    assert files["files/lessons/sketch.svg"] == SVG.encode()
+    titles = [one.get("title") for one in found.values()]
+    assert titles == [f"Check: Question {n}" for n in range(1, 11)]
+
+
+def right(one: etree._Element) -> list[str]:
+    return shape(one, "//q:correctResponse/q:value")
+
+
+def test_a_choice(make: Make) -> None:
+    one = item(make, ANY["mcq"])
+    assert right(one) == ["B"]
+    assert shape(one, "//q:choiceInteraction/@maxChoices") == ["1"]
+    assert shape(one, "//q:simpleChoice") == ["1 < 2", "two", "three"]
+    assert shape(one, "//q:infoControl/@title") == ["Hint 1", "Hint 2"]
+    assert shape(one, "//q:modalFeedback/@identifier") == ["A", "C", "EXPLANATION"]
+    assert shape(one, "//q:itemBody/q:pre") == ["if x < 1:\n    y = '&'"]
+    assert shape(one, "//q:itemBody//q:img/@src") == ["../files/lessons/sketch.svg"]
+    assert shape(one, "//q:itemBody//q:td/@class") == ["align-center", "align-right"]
+    assert shape(one, "//q:itemBody/q:ul/q:li") == ["☑ done", "☐ not"]
+
+
+def test_choose_all(make: Make) -> None:
+    one = item(make, ANY["several"])
+    assert right(one) == ["A", "C"]
+    assert shape(one, "//q:responseDeclaration/@cardinality") == ["multiple"]
+    assert shape(one, "//q:choiceInteraction/@maxChoices") == ["0"]
+    assert "Choose all that are right." in shape(one, "//q:itemBody/q:p")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "within"),
+    [("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)],
+)
+def test_numbers(make: Make, name: str, value: float, within: float) -> None:
+    one = item(make, ANY[name])
+    assert [float(text) for text in right(one)] == [value]
+    [tolerance] = shape(one, "//q:equal/@tolerance")
+    assert [float(text) for text in tolerance.split()] == pytest.approx([within, within])
+
+
+def test_units_are_text(make: Make) -> None:
+    one = item(make, ANY["numeric"])
+    assert shape(one, "//q:p[q:textEntryInteraction]") == [" kg m2"]
+    assert shape(one, "//q:sup") == ["2"]
+
+
+def test_what_a_script_prints(make: Make) -> None:
+    folder = make(GOOD + SCRIPT + quiz("a", ANY["output"], ANY["marks"]))
+    files = package(folder)
+    assert [right(one) for one in items(files)] == [["drift  +6.6 %"], ["<b>&amp;"]]
+    one = items(files)[0]
+    assert shape(one, "//q:stringMatch/@caseSensitive") == ["true"]
+    assert "What does examples/fall.py print in line 1 of its output?" in shape(one, "//q:p")
+
+
+def test_a_question_whose_script_was_not_run_is_left_out_and_said(make: Make) -> None:
+    script = SCRIPT.replace("fall.py", "fall.py requires=no_such_module")
+    folder = make(GOOD + script + quiz("a", ANY["output"], ANY["zero"]))
+    done = export(folder)
+    assert done.status == 0, done.out + done.err
+    assert "it is left out: its script was not run, so nobody knows the key" in done.out
+    assert len(items(entries(folder.root / ZIP))) == 1
+
+
+def test_an_open_question_is_for_people_to_score(make: Make) -> None:
+    one = item(make, ANY["open"])
+    assert right(one) == []
+    assert shape(one, "//q:rubricBlock/@view") == ["scorer"]
+    assert shape(one, "//q:rubricBlock/q:p[1]") == ["A good answer"]
+    assert shape(one, "//q:responseCondition") == []
+    [said] = shape(one, "//q:modalFeedback")
+    assert said.startswith("A good answer") and said.endswith("Because.")
+
+
+def test_an_order_is_not_given_away(make: Make) -> None:
+    one = item(make, ANY["order"])
+    texts = dict(zip(shape(one, "//q:simpleChoice/@identifier"), shape(one, "//q:simpleChoice"),
+                     strict=True))  # fmt: skip
+    assert [texts[name] for name in right(one)] == ["first", "second", "3", "fourth"]
+    assert right(one) != sorted(right(one)) and list(texts) == sorted(texts)
+    assert shape(one, "//q:responseDeclaration/@cardinality") == ["ordered"]
+
+
+def test_a_simulation_is_linked_where_the_course_has_an_address(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["predict"]))
+    assert "its simulation is on its page alone, and left out" in export(folder).out
+    folder.replace(
+        "content/course.toml",
+        'title = "Scratch"\n',
+        'title = "Scratch"\nbase_url = "https://example.org/c/"\n',
+    )
+    assert "and the item links it" in export(folder).out
+    [one] = items(package(folder))
+    [address] = shape(one, "//q:modalFeedback//q:a/@href")
+    assert re.fullmatch(r"https://example\.org/c/lessons/1\.1-one\.html#a\.[0-9a-f]{8}", address)
+
+
+# --- names
+
+
+def test_names_hang_on_the_question_and_not_on_its_place(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["zero"], ANY["several"]))
+    before = set(package(folder))
+    folder.write(folder.lesson(), GOOD + quiz("a", ANY["large"], ANY["several"], ANY["zero"]))
+    after = set(package(folder))
+    assert before < after and len(after - before) == 1
+    named = {**ANY["open"], "id": "why"}
+    folder.write(folder.lesson(), GOOD + quiz("a", named))
+    assert "items/q.a.why.xml" in package(folder)
+
+
+@pytest.mark.parametrize("id", ["4.2-check", "x-" * 40, "con", "a_b", "A..b", "7"])
+def test_names_are_short_and_of_xml(make: Make, id: str) -> None:
+    folder = make(GOOD + quiz(id, ANY["zero"], {**ANY["zero"], "q": "Again?"}))
+    files = package(folder)
+    names = [one.get("identifier") for one in items(files)]
+    assert len(set(names)) == 2
+    for name in (*names, *(path.rpartition("/")[2][:-4] for path in files if "/" in path)):
+        assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}", name)
+
+
+def test_like_names_stay_apart(make: Make) -> None:
+    ids = ["a-b", "a_b", "a.b", "ab", "x" * 60 + "1", "x" * 60 + "2"]
+    folder = make(GOOD + "".join(quiz(id, ANY["zero"]) for id in ids))
+    files = package(folder)
+    assert len([path for path in files if path.startswith("tests/")]) == 6
+    assert len([path for path in files if path.startswith("items/")]) == 6
+
+
+@pytest.mark.parametrize("most", [0, 32])
+def test_names_out_of_any_text(most: int) -> None:
+    texts = [
+        "",
+        "ä",
+        "ä ",
+        "_e4_",
+        "Проверка",
+        "問題",
+        "a/b",
+        "..",
+        "a\0b",
+        "é" * 60,
+        "é" * 61,
+        "a b",
+    ]
+    names = [identifier("q.", text, most=most) for text in texts]
+    assert len(set(names)) == len(texts)
+    for name in names:
+        assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", name) and len(name) <= (most or 1000)
+
+
+# --- hostile texts
+
+HOSTILE = [
+    "<b>bold <i>both</i></b> & <br> text",
+    "<div><p>a</p>loose <span lang='de'>Wort</span></div>",
+    "<ul><li>one<li>two</ul>",
+    "<table><tr><td>1<td>2<tr><th colspan=2>3</table>",
+    "<table></table><ul></ul><ol></ol><dl></dl>",
+    "<table><caption>C</caption><thead><tr><th>h</th></tr></thead></table>",
+    "<dl><dt>t<dd>d<div><dt>u</dt><dd>v</dd></div></dl>",
+    "<blockquote>text <b>and</b> more</blockquote>",
+    "<h4>head <div>in</div></h4>",
+    "<p>a<sub>1</sub><sup>2</sup> <kbd>k</kbd> <abbr title='X < Y'>xy</abbr></p>",
+    "<pre>a\n <sub>b</sub> <b>c</b></pre>",
+    "<del>no</del> <ins>yes</ins> <mark>m</mark> <u>u</u> <s>s</s>",
+    "<ruby>漢<rp>(</rp><rt>kan</rt><rp>)</rp></ruby>",
+    "<svg width='1'><title>t</title><circle r='1'/></svg> after",
+    "<details><summary>More</summary>hidden $x$</details>",
+    "<a href='https://example.org/?a=1&amp;b=2'>out</a> <a href='#x'>in</a>",
+    "<ol start='5'><li>five</li></ol>",
+    "<img src='sketch.svg' alt='raw'>",
+    "a\u200f\u202eb \ufffe \x0b end",
+    "<math><mi>x</mi><mo>=</mo><mn>1</mn></math>",
+    "<p style='color:red' onclick='alert(1)' data-x='1' id='y'>p</p>",
+    "<b>bold\n\n<div>block</div>\n\n</b>",
+    "</textarea ><i>x</i>]]>&#0; &bogus; &lt;script&gt;",
+    "<custom-element a=1>text</custom-element>",
+    "<figure><img src='sketch.svg' alt=''><figcaption>cap</figcaption></figure>",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_whatever_stands_in_a_text_the_package_is_valid(make: Make, text: str) -> None:
+    question = {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
+                "options": [text, "b"], "answer": 0, "feedback": [text, text]}  # fmt: skip
+    folder = make(GOOD + quiz("a", question, title=text[:60]))
+    done = export(folder)
+    if done.status == 0:
+        check(entries(folder.root / ZIP))
+    else:  # what a page cannot hold either is a mistake of the author's
+        assert "error[" in done.out, done.out + done.err
+
+
+def test_nothing_is_left_out_in_silence(make: Make) -> None:
+    texts = {
+        "<video src='a.mp4'>words</video>": "`<video>` has no place in QTI and is left out",
+        "<ol start='5'><li>five</li></ol>": "a numbered list counts from 1",
+        "<del>no</del>": "crossed-out text is marked by a class",
+        "[there](#hello)": "the link to `#hello` is text, as the course has no `base_url`",
+        "<details><summary>More</summary>x</details>": "`<details>` is open",
+    }
+    questions = [{**ANY["zero"], "q": text} for text in texts]
+    folder = make(GOOD + quiz("a", *questions))
+    done = export(folder)
+    assert done.status == 0, done.out + done.err
+    for number, said in enumerate(texts.values(), 1):
+        assert f"this question is not whole in the QTI package: {said}" in done.out, number
+    assert "5 warnings" in done.out
+    check(entries(folder.root / ZIP))
+    folder.replace(
+        "content/course.toml", "[[level]]",
+        '[[silence]]\nrule = "package-reduced"\nreason = "the platform has none"\n\n[[level]]',
+    )  # fmt: skip
+    assert "package-reduced" not in export(folder).out
+
+
+def test_mathml_is_of_version_2(make: Make) -> None:
+    formulas = (
+        r"\frac{a}{b} \boxed{E=mc^2} \color{red}x \cancel{y} \vec{v} \sqrt[3]{x} \overbrace{a}^{n}"
+        r" \begin{aligned}a&=b\\c&=d\end{aligned} \text{if } \left(\frac12\right] \mathbb{R}"
+        r" \raisebox{2pt}{x} \phantom{x} \binom{n}{k} \xrightarrow{abc} x'' \not= \lim_{x\to0}"
+    )
+    question = {**ANY["zero"], "q": f"Inline ${formulas}$ and\n\n$${formulas}$$"}
+    one = item(make, question)
+    found = one.findall(f".//{{{MATHML}}}math")
+    assert len(found) == 2, "a formula that a page cuts in pieces is whole"
+    assert not [key for math in found for node in math.iter() for key in node.attrib
+                if key in ("class", "style") or key.startswith("data-")]  # fmt: skip
+    assert "mathcolor" in {key for node in found[0].iter() for key in node.attrib}
+    assert [n.get("notation") for n in found[0].iter(f"{{{MATHML}}}menclose")] == [
+        "box", "updiagonalstrike"
+    ]  # fmt: skip
+
+
+# --- the command
+
+
+def test_the_same_course_gives_the_same_bytes(make: Make) -> None:
+    folder = make(GOOD + SCRIPT + quiz("a", *ANY.values()), GOOD.replace("hello.py", "b.py"))
+    package(folder)
+    once = folder.read(ZIP)
+    folder.main("export", "qti")
+    assert folder.read(ZIP) == once, "from what is kept"
+    folder.main("export", "qti", "--no-cache", "--jobs", "1", "--out", "sub/other.zip")
+    assert folder.read("sub/other.zip") == once
+
+
+def test_a_course_without_quizzes_has_no_package(make: Make) -> None:
+    folder = make(GOOD)
+    done = export(folder)
+    assert (done.status, done.err.splitlines()[-1]) == (
+        1,
+        "coursebuild: the course has no quiz with a question, so there is no QTI package",
+    )
+    assert not (folder.root / ZIP).exists()
+
+
+def test_nothing_is_written_where_something_is_wrong(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["zero"]))
+    package(folder)
+    once = folder.read(ZIP)
+    folder.replace(folder.lesson(), "hello 3.14159\n", "hello 3.14158\n")
+    done = export(folder)
+    assert done.status == 1 and "nothing was written" in done.out
+    assert folder.read(ZIP) == once
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [
+        ("content/q.zip", "lies in content/ of the project, where no archive goes"),
+        ("notes.txt", "is there, and is no such archive"),
+        (".", "is a folder"),
+    ],
+)
+def test_where_no_package_goes(make: Make, out: str, said: str) -> None:
+    folder = make(GOOD + quiz("a", ANY["zero"]))
+    folder.write("notes.txt", "mine")
+    done = export(folder, "--out", out)
+    assert done.status == 2 and said in done.err
+    assert folder.text("notes.txt") == "mine"
+
+
+def test_a_picture_that_is_replaced_is_replaced_in_the_package(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["mcq"]))
+    package(folder)
+    folder.write("content/lessons/sketch.svg", SVG.replace("4", "5"))
+    assert package(folder)["files/lessons/sketch.svg"] == SVG.replace("4", "5").encode()
+
+
+def test_pages_have_quizzes_too(make: Make) -> None:
+    folder = make(GOOD)
+    folder.write("content/pages/about.md", "## About\n\n" + quiz("b", ANY["mcq"]))
+    folder.write("content/pages/sketch.svg", SVG)
+    folder.replace(
+        "content/course.toml",
+        "[[level]]",
+        '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n\n[[level]]',
+    )
+    files = package(folder)
+    assert "tests/quiz.b.xml" in files and "files/pages/sketch.svg" in files
+
+
+def test_the_title_of_a_quiz_is_text(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["zero"], title='<i>"T" & co</i>'))
+    [test] = [data for path, data in package(folder).items() if path.startswith("tests/")]
+    assert etree.fromstring(test).get("title") == '<i>"T" & co</i>'

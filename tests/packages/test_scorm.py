@@ -1,0 +1,203 @@
+"""The course as a package of SCORM 1.2: its manifest, its files, and where it may be written."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from archives import entries, mistakes, referred, scorm_schema
+from coursekit import GOOD, Folder
+from lxml import etree
+from zoo import ANY, SCRIPT, quiz
+
+from coursebuild.render.links import check_links
+from coursebuild.results import OutputFile
+
+Make = Callable[..., Folder]
+ZIP = "course-scorm.zip"
+CP = "{http://www.imsproject.org/xsd/imscp_rootv1p1p2}"
+KIND = "{http://www.adlnet.org/xsd/adlcp_rootv1p2}scormtype"
+
+
+def package(folder: Folder) -> dict[str, bytes]:
+    """The package, in which everything is as it must be."""
+    done = folder.main("export", "scorm")
+    assert done.status == 0, done.out + done.err
+    files = entries(folder.root / ZIP)
+    check(files)
+    return files
+
+
+def check(files: dict[str, bytes]) -> None:
+    manifest = files["imsmanifest.xml"]
+    assert mistakes(scorm_schema(), manifest) == []
+    listed = set(referred(manifest))
+    assert listed == set(files) - {"imsmanifest.xml"}
+    root = etree.fromstring(manifest)
+    resources = {node.get("identifier"): node for node in root.iter(f"{CP}resource")}
+    for item in root.iter(f"{CP}item"):
+        target = item.get("identifierref")
+        assert (target is None) == (item.find(f"{CP}item") is not None), "a level opens nothing"
+        assert target is None or resources[target].get(KIND) == "sco"
+    for sco in (node for node in resources.values() if node.get(KIND) == "sco"):
+        needs = [node.get("identifierref") for node in sco.iter(f"{CP}dependency")]
+        assert needs == ["shared"] and resources["shared"].get(KIND) == "asset"
+        assert sco[0].get("href") == sco.get("href"), "what is opened is the first of its files"
+    hrefs = [node.get("href") for node in root.iter(f"{CP}file")]
+    assert len(set(hrefs)) == len(hrefs), "a file in two resources"
+
+
+def items(files: dict[str, bytes]) -> list[tuple[int, str]]:
+    """Titles of the organisation, by depth."""
+    root = etree.fromstring(files["imsmanifest.xml"])
+    return [
+        (len(list(node.iterancestors(f"{CP}item"))), node.findtext(f"{CP}title"))
+        for node in root.iter(f"{CP}item")
+    ]
+
+
+def test_levels_and_written_lessons(make: Make) -> None:
+    folder = make(GOOD, SCRIPT + quiz("a", *ANY.values()))
+    folder.replace(
+        "content/course.toml",
+        '[[level]]\nid = "1"\ntitle = "Level"\n',
+        '[[level]]\nid = "0"\ntitle = "Empty"\n[[level.lesson]]\nid = "0.1"\nslug = "later"\n'
+        'title = "Later"\nstatus = "planned"\n\n[[level]]\nid = "1"\ntitle = "Level"\n',
+    )
+    files = package(folder)
+    assert items(files) == [(0, "1 Level"), (1, "1.1 Lesson one"), (1, "1.2 Lesson two")]
+    assert "lessons/0.1-later.html" in files, "its page is there, since others link to it"
+    assert {path for path in files if path.startswith("sco/")} == {
+        "sco/1.1-one.html", "sco/1.2-two.html", "sco/scorm.css", "sco/scorm.js"
+    }  # fmt: skip
+
+
+def test_files_that_a_platform_has_no_use_for_are_left_out(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["predict"]))
+    assert folder.main("build").status == 0
+    site, files = folder.tree("public"), package(folder)
+    left_out = {path for path in site if path not in files} - {".coursebuild-site"}
+    assert {path for path in left_out if not path.endswith((".br", ".gz"))} == {
+        "404.html", "files.json", "robots.txt", "service-worker.js"
+    }  # fmt: skip
+    same = [path for path in files if path in site]
+    assert all(files[path] == site[path] for path in same), "pages are those of the site"
+    assert len(same) == len(files) - 4, "the manifest, a lesson's start and what starts share"
+    assert len([path for path in files if path.endswith(".wasm")]) == 1
+
+
+def test_no_address_leads_nowhere(make: Make) -> None:
+    folder = make(GOOD + quiz("a", *ANY.values()) + SCRIPT)
+    files = package(folder)
+    without = {**files, "404.html": b""}
+    broken = list(check_links((OutputFile(p, d) for p, d in without.items()), ""))
+    assert [(found.page, found.url) for found in broken] == []
+    for path in (path for path in files if path.startswith("sco/") and path.endswith(".html")):
+        for address in addresses(files[path].decode()):
+            assert posixpath.normpath(f"sco/{unquote(address)}") in files
+
+
+def addresses(html: str) -> list[str]:
+    found: list[str] = []
+
+    class Reader(HTMLParser):
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+            found.extend(value or "" for key, value in attrs if key in ("href", "src", "data-src"))
+
+    Reader().feed(html)
+    return [urlsplit(address).path for address in found]
+
+
+def test_titles_are_text_and_fit(make: Make) -> None:
+    folder = make(GOOD)
+    long = 'A <b>"title"</b> & ' + "ü" * 300
+    folder.replace("content/course.toml", 'title = "Scratch"', f"title = '{long}'")
+    folder.replace("content/course.toml", 'title = "Lesson one"', "title = '</title>&amp;<i>'")
+    files = package(folder)
+    root = etree.fromstring(files["imsmanifest.xml"])
+    title = root.findtext(f"{CP}organizations/{CP}organization/{CP}title")
+    assert title == long[:199] + "…"
+    assert items(files)[1] == (1, "1.1 </title>&amp;<i>")
+    page = files["sco/1.1-one.html"].decode()
+    assert '<iframe title="1.1 &lt;/title&gt;&amp;amp;&lt;i&gt;"></iframe>' in page
+
+
+def test_names_are_of_xml_and_apart(make: Make) -> None:
+    folder = make(GOOD, GOOD.replace("hello.py", "b.py"))
+    files = package(folder)
+    root = etree.fromstring(files["imsmanifest.xml"])
+    names = [node.get("identifier") for node in root.iter() if node.get("identifier")]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", name) for name in names)
+
+
+def test_the_launch_page_keeps_to_the_policy_of_pages(make: Make) -> None:
+    page = package(make(GOOD))["sco/1.1-one.html"].decode()
+    assert "default-src &#39;self&#39;" in page and "object-src &#39;none&#39;" in page
+    assert re.findall(r"<script[^>]*>", page) == ['<script src="scorm.js" defer>']
+    assert " style=" not in page and " onload=" not in page
+    assert '<a href="../lessons/1.1-one.html">' in page, "without JavaScript"
+
+
+def test_languages_from_the_right(make: Make) -> None:
+    folder = make(GOOD)
+    folder.replace("content/course.toml", 'title = "Scratch"', 'title = "دورة"\nlanguage = "ar"')
+    files = package(folder)
+    assert '<html lang="ar" dir="rtl"' in files["sco/1.1-one.html"].decode()
+    assert "دورة" in files["imsmanifest.xml"].decode()
+
+
+def test_the_same_course_gives_the_same_bytes(make: Make) -> None:
+    folder = make(GOOD + quiz("a", *ANY.values()) + SCRIPT)
+    package(folder)
+    once = folder.read(ZIP)
+    package(folder)
+    assert folder.read(ZIP) == once, "from what is kept"
+    assert folder.main("export", "scorm", "--no-cache", "--out", "b.zip").status == 0
+    assert folder.read("b.zip") == once
+
+
+def test_a_course_that_grew_has_a_new_package(make: Make) -> None:
+    folder = make(GOOD)
+    before = package(folder)
+    folder.write(folder.lesson(), GOOD + "More.\n\n" + quiz("a", ANY["zero"]))
+    after = package(folder)
+    assert before["lessons/1.1-one.html"] != after["lessons/1.1-one.html"]
+    assert b"data-quiz" in after["lessons/1.1-one.html"]
+
+
+def test_nothing_is_written_where_something_is_wrong(make: Make) -> None:
+    folder = make(GOOD.replace("hello 3.14159\n```\n\n", "hello 3.1\n```\n\n"))
+    done = folder.main("export", "scorm")
+    assert done.status == 1 and "nothing was written" in done.out
+    assert not (folder.root / ZIP).exists()
+    assert not [name for name in folder.beside() if name.startswith(f".{ZIP}")]
+
+
+def test_it_may_be_named_and_replaces_a_package_only(make: Make) -> None:
+    folder = make(GOOD)
+    assert folder.main("export", "scorm", "--out", "sub/c.zip").status == 0
+    done = folder.main("export", "scorm", "--out", "sub/c.zip", "--quiet")
+    assert (done.status, done.out) == (0, "")
+    folder.write("mine.zip", b"PK\x05\x06" + bytes(18))
+    done = folder.main("export", "scorm", "--out", "mine.zip")
+    assert done.status == 2 and "mine.zip is there, and is no such archive" in done.err
+
+
+def test_a_full_disk_leaves_what_was_there(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = make(GOOD)
+    package(folder)
+    once = folder.read(ZIP)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("zipfile.ZipFile.writestr", full)
+    done = folder.main("export", "scorm")
+    assert done.status == 1 and "cannot be written: no space left on device" in done.err
+    assert folder.read(ZIP) == once
+    assert not [name for name in folder.beside() if name.startswith(f".{ZIP}")]

@@ -1,0 +1,228 @@
+"""The glossary, the index of symbols, backlinks and drawings of lessons, in built sites."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html import unescape
+
+import pytest
+from coursekit import Folder
+
+Make = Callable[..., Folder]
+HEAD = '[course]\ntitle = "<b>Course</b>"\n\n[[level]]\nid = "1"\ntitle = "One"\n'
+
+FIRST = """## Core
+
+For a body of volume $V${symbol="volume" unit="m³"}, the [inertia tensor]{term} is
+
+$$I = \\int_V \\rho\\,\\mathrm dV$$ {#eq:tensor}
+
+and more. First. A [principal *axes*]{term="Principal axis"} is $x$ & `<b>`, [see](lesson:1.2).
+Last.
+
+- An [item]{term} in a list, `1 < 2`.
+
+## Law
+
+By [](#eq:tensor) and [it](term:inertia-tensor), $\\dot q${symbol="rate <i>" unit="1/s"} is
+
+$$\\dot q = 1 \\tag{*}$$ {#eq:rate}
+
+and $$a$$ {#eq:a}.
+"""
+SECOND = """## Uses
+
+The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1.1#eq:rate), the
+[rate](lesson:1.1#eq:rate) and $V${symbol="voltage"}, $z$.
+
+> [!note] Note
+> An [Äther]{term} is no thing; see [here](lesson:1.1).
+"""
+THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
+[`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is,
+[this](term:principal-axis), [that](term:عزم-القصور) and [so](<term:慣性>).
+
+See [one](lesson:1.1).
+"""
+
+
+@pytest.fixture
+def site(make: Make) -> dict[str, str]:
+    """The pages of a course in which all of it occurs."""
+    folder = make(FIRST, SECOND, THIRD)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return {
+        path: data.decode() for path, data in folder.tree("public").items() if path[-5:] == ".html"
+    }
+
+
+def entries(page: str) -> dict[str, str]:
+    """The entries of a glossary, by the id of the term."""
+    parts = re.split(r'<div class="term" id="term:(.*?)">(.*?)</div>', page, flags=re.DOTALL)
+    return dict(zip(map(unescape, parts[1::3]), parts[2::3], strict=True))
+
+
+def text(html: str) -> str:
+    without = re.sub(r"<(annotation)\b.*?</\1>", "", html, flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]*>", "", without)).split())
+
+
+def test_the_terms_are_in_order_whatever_their_script(site: dict[str, str]) -> None:
+    terms = list(entries(site["glossary/index.html"]))
+    signs = ["3-vector", "scriptalert1script"]
+    latin = ["äther", "inertia-tensor", "item", "principal-axis"]
+    assert terms == [*signs, *latin, "عزم-القصور", "慣性"]
+    letters = re.findall(r'<h2 id="letter:(.*?)">(.*?)</h2>', site["glossary/index.html"])
+    assert [letter for _, letter in letters] == ["0–9", "A", "I", "P", "ع", "慣"]
+    assert len({id for id, _ in letters}) == len(letters)
+
+
+def test_an_entry_is_the_sentence_and_the_formula_that_it_leads_to(site: dict[str, str]) -> None:
+    found = entries(site["glossary/index.html"])
+    tensor = found["inertia-tensor"]
+    assert text(tensor).startswith("inertia tensor For a body of volume V, the inertia tensor is I")
+    assert '<math display="block"' in tensor
+    assert text(found["item"]).startswith(
+        "item An item in a list, 1 < 2. Defined in 1.1 Lesson one"
+    )
+    axis = found["principal-axis"]
+    assert text(axis).startswith("Principal axis A principal axes is x & <b>, see. Defined in")
+    assert "<em>axes</em>" in axis and "<code>&lt;b&gt;</code>" in axis
+    assert 'href="../lessons/1.2-two.html"' not in axis, "links stay behind"
+
+
+def test_an_entry_says_where_the_term_is_defined_and_used(site: dict[str, str]) -> None:
+    found = entries(site["glossary/index.html"])
+    assert '<a href="../lessons/1.1-one.html#term%3Ainertia-tensor">' in found["inertia-tensor"]
+    assert text(found["inertia-tensor"]).endswith("Used in 1.2")
+    assert text(found["principal-axis"]).endswith("Used in 1.3")
+    assert "Used in" not in found["item"]
+
+
+def test_a_term_leads_to_its_definition(site: dict[str, str]) -> None:
+    one, two, three = (
+        site[f"lessons/1.{n}-{s}.html"] for n, s in ((1, "one"), (2, "two"), (3, "three"))
+    )
+    assert '<dfn id="term:inertia-tensor">inertia tensor</dfn>' in one
+    assert '<a href="#term%3Ainertia-tensor">it</a>' in one
+    assert '<a href="1.1-one.html#term%3Ainertia-tensor">tensor</a>' in two
+    assert '<dfn id="term:عزم-القصور">' in three
+
+
+def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:
+    for page in site.values():
+        assert "<script>alert" not in page
+        assert "<i>" not in page
+    assert "&lt;script&gt;alert(1)" in site["glossary/index.html"]
+    assert "rate &lt;i&gt;" in site["symbols/index.html"]
+
+
+def test_formulas_have_ids_numbers_and_references(site: dict[str, str]) -> None:
+    one, two = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
+    ids = re.findall(r'<span class="equation" id="(.*?)">', one)
+    assert ids == ["eq:tensor", "eq:rate", "eq:a"]
+    assert re.findall(r'<span class="equation-number">(.*?)</span>', one) == ["(1)", "(2)"]
+    assert '<a href="#eq%3Atensor">(1)</a>' in one or '<a href="#eq:tensor">(1)</a>' in one
+    assert '<a href="1.1-one.html#eq%3Atensor">(1) of Lesson 1.1</a>' in two
+    assert '<a href="1.1-one.html#eq%3Arate">(*) of Lesson 1.1</a>' in two
+    assert '<a href="1.1-one.html#eq%3Arate">rate</a>' in two
+
+
+def test_the_index_of_symbols(site: dict[str, str]) -> None:
+    page = site["symbols/index.html"]
+    declared, _, others = page.partition('<section class="undeclared"')
+    rows = [text(row) for row in declared.split("<tbody>")[1:]]
+    assert rows == [
+        "q˙ rate <i> 1/s 1.1 Law",
+        "V volume (1.1) m³ 1.1 Core, also in 1.2 voltage (1.2)",
+    ]
+    symbols = [text(item) for item in others.partition("</section>")[0].split("<li>")[1:]]
+    assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]
+
+
+def test_lessons_say_who_refers_to_them(site: dict[str, str]) -> None:
+    one, two = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
+    assert "Referred to by 1.2 Lesson two, 1.3 Lesson three" in text(one)
+    assert "Referred to by 1.1 Lesson one" in text(two)
+    assert "Referred to by" not in text(site["lessons/1.3-three.html"])
+
+
+def test_the_foot_has_both_and_marks_the_one_that_is_shown(site: dict[str, str]) -> None:
+    foot = site["glossary/index.html"].partition('class="site-more"')[2]
+    assert '<a href="index.html" aria-current="page">Glossary</a>' in foot
+    assert '<a href="../symbols/index.html">Symbols</a>' in foot
+
+
+def test_a_course_without_terms_and_formulas_has_neither(make: Make) -> None:
+    folder = make("Text.")
+    assert folder.main("build").status == 0
+    site = folder.tree("public")
+    assert not {"glossary/index.html", "symbols/index.html"} & site.keys()
+    assert b"Glossary" not in site["index.html"]
+
+
+# --- drawings
+
+
+def mapped(folder: Folder, lessons: dict[str, list[str]], titles: dict[str, str]) -> None:
+    parts = [HEAD]
+    for number, (id, needs) in enumerate(lessons.items()):
+        title = titles.get(id, f"Title {id}").replace("\\", "\\\\").replace('"', '\\"')
+        if number == 40:
+            parts.append('[[level]]\nid = "2"\ntitle = "Two"\n')
+        parts.append(
+            f'[[level.lesson]]\nid = "{id}"\nslug = "l{number}"\ntitle = "{title}"\n'
+            f"prerequisites = {needs!r}\nstatus = ".replace("'", '"')
+            + ('"complete"\n' if id == "1.1" else '"planned"\n')
+        )
+    folder.write("content/course.toml", "\n".join(parts))
+    (folder.root / folder.lesson()).unlink()
+    folder.write("content/lessons/1.1-l0.md", "Text.")
+
+
+def drawing(page: str, kind: str) -> str:
+    return page.partition(f'<svg class="graph-{kind}"')[2].partition("</svg>")[0]
+
+
+def test_a_lesson_shows_what_it_needs_and_leads_to(make: Make) -> None:
+    folder = make("Text.")
+    lessons = {
+        "1.1": [],
+        "1.2": ["1.1"],
+        "1.3": ["1.1", "1.2"],
+        "1.4": ["1.3"],
+        "1.5": ["1.3", "1.1"],
+    }
+    mapped(folder, lessons, {"1.2": '<img src=x onerror="alert(1)"> & عنوان', "1.4": "x" * 300})
+    done = folder.main("build")
+    assert done.status == 0, done.out
+    site = {
+        path: data.decode()
+        for path, data in folder.tree("public").items()
+        if "." in path[-5:] and path.endswith(".html")
+    }
+    one = drawing(site["lessons/1.1-l0.html"], "wide")
+    assert re.findall(r'class="node-id"[^>]*>(.*?)<', one) == ["1.1", "1.2", "1.3", "1.5"]
+    heads = re.search(r'class="heads" d="(.*?)"', one)
+    # That 1.3 and 1.5 need it follows from the way along 1.2 and 1.3.
+    assert heads is not None and heads[1].count("M") == 3
+    assert "<img" not in site["levels/1.html"]
+    assert "&lt;img src=x" in drawing(site["levels/1.html"], "wide")
+    assert "x" * 300 not in re.sub('aria-label="[^"]*"', "", drawing(site["levels/1.html"], "wide"))
+    for kind in ("wide", "narrow"):
+        assert drawing(site["levels/1.html"], kind).count("<a ") == 5
+
+
+def test_large_levels_and_lessons_with_many_heirs_stay_small(make: Make) -> None:
+    folder = make("Text.")
+    many = {f"1.{n}": ["1.1"] if n > 1 else [] for n in range(1, 41)}
+    many |= {f"2.{n}": ["1.1", f"1.{n % 39 + 2}"] for n in range(1, 61)}
+    mapped(folder, many, {})
+    done = folder.main("build")
+    assert done.status == 0, done.out
+    one = folder.text("public/lessons/1.1-l0.html")
+    assert drawing(one, "wide").count('class="node-id"') == 6
+    assert 'class="graph-' in folder.text("public/levels/1.html")
+    assert 'class="graph-' not in folder.text("public/levels/2.html"), "it has sixty lessons"

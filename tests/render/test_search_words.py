@@ -1,0 +1,76 @@
+"""What texts and formulas are found by; the browser's half of these rules is tested under Node."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.render.search.index import _hash
+from coursebuild.render.search.tex import plain_formula
+from coursebuild.render.search.words import counted, is_fuzzy, shelf_of, terms_of
+
+AGREED = json.loads(
+    (Path(__file__).parents[2] / "site" / "tests" / "search-words.json").read_text("utf-8")
+)
+
+
+@pytest.mark.parametrize(("text", "terms"), AGREED["terms"])
+def test_terms_are_those_that_the_browser_makes(text: str, terms: list[str]) -> None:
+    assert terms_of(text) == terms
+
+
+@pytest.mark.parametrize(("term", "shelf", "fuzzy", "digest"), AGREED["shelves"])
+def test_so_is_their_place(term: str, shelf: str, fuzzy: bool, digest: int) -> None:
+    assert (shelf_of(term), is_fuzzy(term), _hash(shelf)) == (shelf, fuzzy, digest)
+
+
+@given(st.text())
+def test_any_text_has_terms_that_lines_can_hold(text: str) -> None:
+    terms = terms_of(text)
+    assert counted(text) == {term: terms.count(term) for term in terms}
+    for term in terms:
+        assert term and not {" ", "\n", "\0"} & {*term}
+        assert shelf_of(term)
+
+
+@pytest.mark.parametrize(
+    ("tex", "text", "names"),
+    [
+        (r"I_{xx}", "I_xx", ()),
+        (r"\boldsymbol{\tau} = I\dot{\omega} + \omega\times(I\omega)", "τ = I ω + ω × (I ω)", ...),
+        (r"\frac{1}{2} m v^2", "1/2 m v^2", ("frac",)),
+        (r"\frac12", "1/2", ("frac",)),
+        (r"\dfrac{a + b}{\sqrt{c d}}", "(a + b)/(√(c d))", ("dfrac", "sqrt")),
+        (r"\frac{\partial L}{\partial \dot q_i}", "(∂L)/(∂q_i)", ("frac", "partial", "dot")),
+        (r"x(t + \Delta t)", "x(t + Δt)", ()),
+        (r"\begin{pmatrix} a & b \\ c & d \end{pmatrix}", "a b c d", ()),
+        (r"v = 3\,\text{m s}^{-1}", "v = 3 m s^(-1)", ()),
+        (r"\sum_{i=1}^{n} m_i", "∑_(i=1)^n m_i", ("sum",)),
+        (r"\sin\theta \approx \theta % small", "sin θ ≈ θ", ("sin", "approx")),
+        (r"\mathbf{R}^{\mathsf T}", "R^T", ()),
+        (r"\phantom{x} y \label{eq:a}", "y", ()),
+        (r"\unknown{z}", "z", ("unknown",)),
+        (r"\omega'", "ω ′", ()),
+        ("a < b & c", "a < b c", ()),
+        ("", "", ()),
+        ("}{}}", "", ()),
+        ("x^", "x^", ()),
+        (r"\frac{a", "a/", ("frac",)),
+        ("{" * 3000 + "x" + "}" * 3000, "x", ()),
+    ],
+)
+def test_a_formula_as_text(tex: str, text: str, names: tuple[str, ...]) -> None:
+    found, said = plain_formula(tex)
+    assert found == text
+    assert names is ... or said == names
+
+
+@given(st.text(alphabet=r"\{}_^&~'% abαomegfrct1-+=()", max_size=60))
+def test_no_formula_is_too_odd(tex: str) -> None:
+    text, names = plain_formula(tex)
+    assert "{" not in text or r"\{" in tex
+    assert all(name.isalpha() for name in names)
