@@ -3,7 +3,7 @@
 Entry point: `write_wordy(folder, lessons)`.
 
 1. A vocabulary of made-up words, by rank as in a language: how often a word comes goes by
-   1 / (rank + 2.7) (Mandelbrot's form of Zipf's law), so that new words keep coming with every page.
+   1 / (rank + 2.7) (Mandelbrot's form of Zipf's law), so that new words keep coming.
 2. A lesson has a topic: some fifty words of the whole vocabulary that come often in it.
 3. About 15 kB: nine sections with prose, formulas, tables and code with names of its own.
 """
@@ -16,7 +16,9 @@ import random
 from pathlib import Path
 
 WORDS = 60_000
-_STARTS = "b c d f g h j k l m n p r s t v w br ch cl cr dr fl fr gr pl pr sc sh sl sp st str th tr".split()
+_STARTS = (
+    "b c d f g h j k l m n p r s t v w br ch cl cr dr fl fr gr pl pr sc sh sl sp st str th tr"
+).split()
 _MIDDLES = "a e i o u ai ea ee ia io oa ou".split()
 _ENDS = "l m n r s t ck ct nd ng nt rd rm rt st".split()
 _KNOWN = (

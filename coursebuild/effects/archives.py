@@ -16,6 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
+from coursebuild.effects.site_swap import MARKER
 from coursebuild.results import OutputFile, SiteFile
 
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -38,6 +39,11 @@ def check_archive(root: Path, out: Path, within: str) -> Path:
             raise PublishRefusedError(
                 f"{out} lies in {name}/ of the project, where no archive goes"
             )
+    if any((folder / MARKER).is_file() for folder in place.parents):
+        raise PublishRefusedError(
+            f"{out} lies in a published site, which the next build replaces",
+            help="write the archive beside it",
+        )
     if place.is_dir():
         raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
     if os.path.lexists(place) and not _holds(place, within):
@@ -62,11 +68,12 @@ def write_archive(out: Path, files: Iterable[SiteFile]) -> int:
         EffectError: it cannot be written; what was there stays.
     """
     place = Path(os.path.realpath(out))
-    temporary = place.with_name(f".{place.name}.{os.urandom(4).hex()}")
+    # One name, so that what a killed command left is written over by the next.
+    temporary = place.with_name(f".{place.name}.part")
     try:
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
-            with zipfile.ZipFile(temporary, "x") as archive:
+            with zipfile.ZipFile(temporary, "w") as archive:
                 for file in sorted(files, key=lambda file: file.path):
                     _add(archive, file)
             size = temporary.stat().st_size

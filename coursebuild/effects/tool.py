@@ -43,6 +43,7 @@ _LIBRARIES = (
     "mini_racer",
     "msgspec",
     "pygments",
+    "segno",
 )
 """What outputs are made with, as the folders with their versions in the name begin."""
 

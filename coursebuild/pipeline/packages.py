@@ -50,6 +50,8 @@ from coursebuild.values import dataclass, replace
 Kind: TypeAlias = Literal["qti", "scorm"]
 NAMES: dict[Kind, str] = {"qti": "quizzes-qti.zip", "scorm": "course-scorm.zip"}
 """What an archive is called where nothing is said."""
+_AT_ONCE = 256
+"""Documents whose items are waited for before more are made."""
 
 
 def export(options: Options, kind: Kind, out: Path) -> Report:
@@ -133,13 +135,14 @@ class _Items:
         """The files of the package; none where there is no item."""
         listed: list[MadeQuiz] = []
         pictures: set[str] = set()
-        for asked, data in self._made(list(self._asked())):
-            kept = self._aside.put(data)
-            for quiz in self._unpacked(data, asked.source):
+        documents = list(self._asked())
+        made = self._made(documents)
+        for asked in documents:
+            kept = made[asked.key]
+            for quiz in self._unpacked(kept(), asked.source):
                 self.diagnostics += (_reduced(loss) for loss in quiz.losses)
                 if quiz.items:
-                    paths = [file.path for file in qti.quiz_files(quiz)]
-                    yield from (self._later(asked, kept, path) for path in paths)
+                    yield from (self._later(asked, kept, path) for path in qti.quiz_paths(quiz))
                     pictures.update(path for item in quiz.items for path in item.pictures)
                     listed.append(qti.without_bytes(quiz))
         if listed:
@@ -153,8 +156,7 @@ class _Items:
     def _file(self, source: Source, kept: Kept, path: str) -> bytes:
         if self._last is None or self._last[0] is not kept:
             self._last = kept, self._unpacked(kept(), source)
-        files = (file for quiz in self._last[1] for file in qti.quiz_files(quiz))
-        return next(file.data for file in files if file.path == path)
+        return qti.quiz_file(self._last[1], path)
 
     def _pictures(self, found: set[str]) -> Iterator[SiteFile]:
         for path in self._library.course.files:
@@ -184,20 +186,21 @@ class _Items:
     def _document(self, source: Source, make: Callable[[], Sheet]) -> _Asked:
         return _Asked(source, page_key(self._library.course, self._documents, make()), make)
 
-    def _made(self, asked: list[_Asked]) -> Iterator[tuple[_Asked, bytes]]:
-        """The items, kept or made now."""
-        store = self._options.store
-        known = {a.key: None if store.fresh else store.peek(ITEMS, a.key) for a in asked}
-        known = {
-            a.key: data
-            for a in asked
-            if (data := known[a.key]) is not None and unpack(data, a.source) is not None
-        }
-        new = [a for a in asked if a.key not in known]
-        later = [Later(a.source.path, functools.partial(self._request, a)) for a in new]
-        made = dict(zip((a.key for a in new), self._documents.draw(later), strict=True))
+    def _made(self, asked: list[_Asked]) -> dict[str, Kept]:
+        """The items of documents, kept or made now, by the keys of these."""
+        store, made, new = self._options.store, dict[str, Kept](), list[_Asked]()
         for one in asked:
-            yield one, known.get(one.key) or made[one.key]
+            data = None if store.fresh else store.peek(ITEMS, one.key)
+            if data is None or not isinstance(unpack(data, one.source), tuple):
+                new.append(one)
+            else:
+                made[one.key] = self._aside.put(data)
+        for start in range(0, len(new), _AT_ONCE):
+            some = new[start : start + _AT_ONCE]
+            later = [Later(a.source.path, functools.partial(self._request, a)) for a in some]
+            for one, data in zip(some, self._documents.draw(later), strict=True):
+                made[one.key] = self._aside.put(data)
+        return made
 
     def _request(self, asked: _Asked) -> Ask:
         course = self._library.course

@@ -69,8 +69,10 @@ class Names:
     """Of the page about what is kept."""
     reader_script: str
     """Of the pages about the reader's progress."""
+    map_script: str
+    """Of pages that list lessons."""
     quiz_script: str
-    """Of pages with questions."""
+    """Loaded when a reader comes near to questions."""
     search_script: str
     """Loaded when a reader opens the search."""
 
@@ -198,6 +200,8 @@ def _own_script(draft: Draft, names: Names) -> str:
             return names.offline_script
         case "progress" | "review":
             return names.reader_script
+        case "home" | "level":
+            return names.map_script
         case _:
             return ""
 

@@ -175,8 +175,6 @@ def _edges(edges: Iterable[Edge], layout: Layout, look: _Look) -> Iterator[str]:
 
 def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
     kinds = f"node node-{node.status}" + (" node-outside" if node.outside else "")
-    status = words(f"status.{node.status}")
-    name = markup_text(f"{node.id} {node.title} ({status})")
     left, middle = box.x - box.width / 2, box.top + box.height / 2
     texts = _lines(node, box) if look.titles else []
     first = middle + 4.3 - len(texts) * _LINE / 2
@@ -193,10 +191,14 @@ def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
     for number, text in enumerate(texts, 1):
         y = first + number * _LINE
         inner.append(f'<text x="{box.x:.1f}" y="{y:.1f}">{markup_text(text)}</text>')
-    content = "".join(inner)
+    content = " ".join(inner)
     if node.current:
         return f'<g class="{kinds} node-current">{content}</g>'
-    return f'<a class="{kinds}" href="{escape(node.href)}" aria-label="{name}">{content}</a>'
+    name = ""
+    if not look.titles:  # else the texts say it
+        status = words(f"status.{node.status}")
+        name = f' aria-label="{markup_text(f"{node.id} {node.title} ({status})")}"'
+    return f'<a class="{kinds}" href="{escape(node.href)}"{name}>{content}</a>'
 
 
 def _mark(status: str, x: float, y: float) -> Iterator[str]:

@@ -69,7 +69,7 @@ class SymbolMeaning:
 
 @dataclass(frozen=True, slots=True)
 class CourseSymbol:
-    """A symbol of the formulas of a course."""
+    """A symbol of the formulas of the lessons of a course."""
 
     symbol: str
     """See `SymbolUse`."""
@@ -107,7 +107,8 @@ class CrossReferences:
                 users.setdefault(id, []).append(owner)
             for term in said.lexicon.terms:
                 defined.setdefault(term.id, (term, owner))
-            _note_symbols(rows, owner, said.lexicon)
+            if isinstance(owner, Lesson):
+                _note_symbols(rows, owner, said.lexicon)
         terms = {
             id: GlossaryTerm(term, owner, tuple(o for o in users.get(id, ()) if o is not owner))
             for id, (term, owner) in defined.items()

@@ -109,6 +109,7 @@ def shared_files(
         credits=publish("licences.txt", _licences(assets)),
         touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
         offline_script=publish("offline.js", page_script(assets.file("js/offline-page.js"))),
+        map_script=publish("map.js", page_script(assets.file("js/map-page.js"))),
         reader_script=publish("reader.js", page_script(assets.file("js/reader-page.js"))),
         quiz_script=publish("quiz.js", page_script(assets.file("js/quiz.js"))),
         search_script=publish("search.js", page_script(assets.file("js/search.js"))),

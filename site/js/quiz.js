@@ -1,7 +1,4 @@
-/**
- * Quizzes, for the pages that have some: a plain script, since browsers load no modules from a disk. It stands before site.js, which
- * calls what it offers as `coursebuildQuizzes`.
- */
+/** Quizzes, loaded by site.js when one comes near; see page/quizzes.js. */
 
 import { leaveQuizzes, mountQuestion, mountQuizzes } from './quiz/mount.js'
 

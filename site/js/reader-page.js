@@ -1,16 +1,8 @@
-/**
- * The pages about the reader's progress. A script of its own, which only these pages load.
- *
- * site.js hands over what the page has anyhow: the interface's words, the progress, and what brings questions to life.
- */
+/** The pages about the reader's progress. A script of its own, which only these pages load. */
 
 import { showPage } from './progress/page.js'
 import { showReview } from './progress/review.js'
 
-const start = (document, parts) => {
-  if (document.querySelector('[data-progress="overall"]')) return showPage(document, parts)
-  if (document.querySelector('[data-progress="review"]')) return showReview(document, parts)
-  return () => {}
-}
+const start = (document, parts) => (document.querySelector('[data-progress="review"]') ? showReview : showPage)(document, parts)
 
 document.dispatchEvent(new CustomEvent('coursebuild:reader', { detail: start }))

@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
-import { ImportError, matchQuestions, openProgress } from '../js/progress/store.js'
+import { ImportError, importText } from '../js/progress/exchange.js'
+import { matchQuestions, openProgress } from '../js/progress/store.js'
 import { answer, Browser, random } from './progress-helpers.mjs'
 
 const NAME = 'coursebuild.progress.c'
@@ -138,7 +139,7 @@ test('a reset holds against a tab that still remembers, and against an older fil
   two.put('q', 'l', answer())
   two.tab.deliver()
   assert.deepEqual(open(browser).all().map(({ key }) => key), ['l'])
-  assert.deepEqual(one.importText(file), { answers: 0, lessons: 0, restorable: 1 })
+  assert.deepEqual(importText(one, file), { answers: 0, lessons: 0, restorable: 1 })
   assert.equal(one.get('q', 'k'), null)
 })
 
@@ -152,9 +153,9 @@ test('what a reset took can be brought back from a file, once, and is then like 
   one.reset()
   one.put('q', 'new', answer())
   one.markLesson('1.2', false)
-  assert.deepEqual(one.importText(file), { answers: 0, lessons: 0, restorable: 3 })
-  assert.deepEqual(one.importText(file, { restore: true }), { answers: 1, lessons: 2, restorable: 0 })
-  assert.deepEqual(one.importText(file, { restore: true }), { answers: 0, lessons: 0, restorable: 0 })
+  assert.deepEqual(importText(one, file), { answers: 0, lessons: 0, restorable: 3 })
+  assert.deepEqual(importText(one, file, { restore: true }), { answers: 1, lessons: 2, restorable: 0 })
+  assert.deepEqual(importText(one, file, { restore: true }), { answers: 0, lessons: 0, restorable: 0 })
   assert.deepEqual(one.get('q', 'k'), answer({ right: false }))
   assert.equal(one.all().find(({ key }) => key === 'k').trials.length, 1, 'it comes back for review')
   assert.equal(one.lessons().get('1.1').read, true)
@@ -168,7 +169,7 @@ test('a removed answer stays removed where an older state is merged, and can be 
   one.put('q', 'k', answer({ right: false }))
   const file = one.exportText()
   one.forget('q', 'k')
-  assert.equal(one.importText(file).answers, 0)
+  assert.equal(importText(one, file).answers, 0)
   assert.deepEqual(one.all(), [])
   one.put('q', 'k', answer())
   assert.deepEqual(one.all()[0].trials, [])
@@ -180,7 +181,7 @@ test('an answer goes by the new key of its question, with its trials, and the ol
   const file = progress.exportText()
   progress.rename('q', 'old', 'new')
   assert.deepEqual(progress.all().map(({ key, trials }) => [key, trials.length]), [['new', 1]])
-  progress.importText(file)
+  importText(progress, file)
   assert.deepEqual(progress.all().map(({ key }) => key), ['new'])
   progress.put('q', 'third', answer())
   progress.rename('q', 'third', 'new')
@@ -211,13 +212,13 @@ test('two devices exchange files', () => {
   desk.markLesson('1.1', true)
   phone.put('q', 'both', answer({ given: 'phone', right: false }))
   phone.readLesson('1.1', { at: 'start', title: 'Start', share: 0.1 })
-  assert.deepEqual(desk.importText(phone.exportText()), { answers: 1, lessons: 1, restorable: 0 })
-  assert.deepEqual(phone.importText(desk.exportText()), { answers: 1, lessons: 1, restorable: 0 })
+  assert.deepEqual(importText(desk, phone.exportText()), { answers: 1, lessons: 1, restorable: 0 })
+  assert.deepEqual(importText(phone, desk.exportText()), { answers: 1, lessons: 1, restorable: 0 })
   assert.equal(desk.exportText(), phone.exportText())
   assert.equal(phone.lessons().get('1.1').read, true, 'opening a lesson elsewhere does not make it unread')
   // The phone’s clock is years ahead; what is done later on the desk counts all the same.
   desk.put('q', 'both', answer({ given: 'desk again' }))
-  phone.importText(desk.exportText())
+  importText(phone, desk.exportText())
   assert.equal(phone.get('q', 'both').given, 'desk again')
 })
 
@@ -244,7 +245,7 @@ test('files that are none of this course’s progress are refused by name, and c
   }
   for (const [code, texts] of Object.entries(cases)) {
     for (const text of texts) {
-      assert.throws(() => progress.importText(text), (error) => error instanceof ImportError && error.code === code, `${code}: ${text.slice(0, 90)}`)
+      assert.throws(() => importText(progress, text), (error) => error instanceof ImportError && error.code === code, `${code}: ${text.slice(0, 90)}`)
     }
   }
   assert.equal(progress.exportText(), own)
@@ -258,7 +259,7 @@ test('names that objects have anyhow are names like others', () => {
   for (const name of ['__proto__', 'constructor', 'toString', '']) progress.put(name, name, answer({ lesson: name }))
   progress.markLesson('__proto__', true)
   assert.equal(open(browser).all().length, 4)
-  assert.equal(open(new Browser()).importText(progress.exportText()).answers, 4)
+  assert.equal(importText(open(new Browser()), progress.exportText()).answers, 4)
   assert.ok(open(browser).lessons().get('__proto__').read)
 })
 
@@ -272,7 +273,7 @@ test('a storage that is closed, in every way, keeps for this page', () => {
     progress.put('q', 'k', answer())
     progress.markLesson('1.1', true)
     assert.deepEqual(progress.get('q', 'k'), answer())
-    assert.equal(progress.importText(progress.exportText()).answers, 0)
+    assert.equal(importText(progress, progress.exportText()).answers, 0)
     progress.reset()
     assert.deepEqual(progress.all(), [])
     assert.equal(progress.aside(), null)
@@ -308,7 +309,7 @@ test('an import for which there is no room changes nothing', () => {
   browser.room = before.length + 100
   const heard = []
   progress.onChange(() => heard.push(1))
-  assert.throws(() => progress.importText(other.exportText()), { code: 'full' })
+  assert.throws(() => importText(progress, other.exportText()), { code: 'full' })
   assert.equal(progress.exportText(), before)
   assert.equal(progress.trouble(), null)
   assert.deepEqual(heard, [])
@@ -407,11 +408,11 @@ test('random histories of tabs and devices end in the same state everywhere', ()
       else if (act < 7) tab.readLesson(key, { at: String(step), share: draw() })
       else if (act < 8 && draw() < 0.2) tab.reset()
       else if (act < 10) tab.tab.deliver()
-      else tab.importText(devices[1 - devices.indexOf(device)].tabs[0].exportText())
+      else importText(tab, devices[1 - devices.indexOf(device)].tabs[0].exportText())
     }
     const [one, two] = devices.map(({ tabs }) => tabs[0])
-    one.importText(two.exportText())
-    two.importText(one.exportText())
+    importText(one, two.exportText())
+    importText(two, one.exportText())
     for (let n = 0; n < 3; n++) devices.forEach(({ tabs }) => tabs.forEach(({ tab }) => tab.deliver()))
     const texts = devices.flatMap(({ browser, tabs }) => [browser.items.get(NAME), ...tabs.map((tab) => tab.exportText())])
     assert.equal(new Set(texts).size, 1)

@@ -24,7 +24,8 @@ test('choices', () => {
 })
 
 test('a number in every way that is right', () => {
-  for (const text of ['0.08', '0,08', '8e-2', '8·10^-2', '2*1*0.2^2', '0.08 kg m^2', '0.08 kg·m²', '800 kg cm^2', '8e5 g cm²', '80 g m^2', '0.08 N m s^2', '0.0801', '0.0799', '=0.08', 'I = 0.08', '1/12.5']) {
+  for (const text of ['0.08', '0,08', '8e-2', '8·10^-2', '2*1*0.2^2', '0.08 kg m^2', '0.08 kg·m²', '800 kg cm^2', '8e5 g cm²', '80 g m^2',
+    '0.08 N m s^2', '0.0801', '0.0799', '=0.08', 'I = 0.08', '1/12.5']) {
     assert.equal(say(text, INERTIA), 'right', text)
   }
   assert.equal(gradeNumber('0.08', INERTIA).converted, false)
@@ -34,10 +35,11 @@ test('a number in every way that is right', () => {
 
 test('a near miss is named', () => {
   const cases = {
-    '-0.08': 'sign', '0.8': 'ten', '80': 'ten', '8e-5': 'ten', '0.16': 'two', '0.04': 'two', '12.5': 'reciprocal', '0.5027': 'turn', '0.0803': 'close', '0.1': 'rounded',
+    '-0.08': 'sign', '0.8': 'ten', '80': 'ten', '8e-5': 'ten', '0.16': 'two', '0.04': 'two', '12.5': 'reciprocal', '0.5027': 'turn',
+      '0.0803': 'close', '0.1': 'rounded',
     '0.08 kg m': 'unit', '0.08 m': 'unit', '0.08 g cm^2': 'scale', '0.0123': '', '0': '', '5000': '', '0.2': '',
   }
-  for (const [text, expected] of Object.entries(cases)) assert.equal(say(text, INERTIA), ['wrong', expected].filter(Boolean).join(' '), text)
+  for (const [text, expected] of Object.entries(cases)) assert.equal(say(text, INERTIA), `wrong ${expected}`.trim(), text)
 })
 
 test('degrees for radians, and radians for degrees', () => {
@@ -72,7 +74,8 @@ test('a numeral that is the answer with fewer digits is rounded', () => {
 })
 
 test('what cannot be read is no try', () => {
-  const cases = { '1,200': 'comma', '0.08 foo': 'unit', '2 3': 'numbers', kg: 'sign', '': 'empty', '1/0': 'finite', '0.08 kg + m': 'sign', '0.08 kg 3': 'unit', '1e300*1e300': 'finite' }
+  const cases = { '1,200': 'comma', '0.08 foo': 'unit', '2 3': 'numbers', kg: 'sign', '': 'empty', '1/0': 'finite', '0.08 kg + m': 'sign',
+    '0.08 kg 3': 'unit', '1e300*1e300': 'finite' }
   for (const [text, problem] of Object.entries(cases)) assert.equal(say(text, INERTIA), `unread ${problem}`, text)
   assert.equal(say('5 kg', { answer: 5, tolerance: 0.1, unit: '' }), 'unread no_unit')
   assert.equal(say('50 %', { answer: 0.5, tolerance: 0.01, unit: '' }), 'right')
@@ -129,7 +132,8 @@ test('a slip is found whatever the number, and what is right is never called one
     for (const [name, slip] of Object.entries(slips)) {
       const { state, near } = gradeNumber(`${slip(answer)}+0`, asked)
       // Two slips can give the same number; then one of them is named.
-      const again = state === 'right' || Object.values(slips).some((other) => other !== slip && within(other(answer), slip(answer), Math.abs(slip(answer)) * 0.002))
+      const alike = (other) => other !== slip && within(other(answer), slip(answer), Math.abs(slip(answer)) * 0.002)
+      const again = state === 'right' || Object.values(slips).some(alike)
       assert.ok(near === name || again || near === 'ten' || near === 'close', `${answer}: ${slip(answer)} is ${near}, not ${name}`)
     }
   }
@@ -141,16 +145,19 @@ test('no message gives the answer away', () => {
   const near = words.split('[quiz.live.near]')[1].split('\n[')[0]
   assert.ok(!near.includes('{'))
   const named = [...near.matchAll(/^(\w+) = /gm)].map(([, name]) => name)
-  const source = readFileSync(new URL('../js/quiz/diagnose.js', import.meta.url), 'utf8') + readFileSync(new URL('../js/quiz/grade.js', import.meta.url), 'utf8')
+  const files = ['diagnose', 'grade'].map((name) => new URL(`../js/quiz/${name}.js`, import.meta.url))
+  const source = files.map((file) => readFileSync(file, 'utf8')).join('')
   for (const name of named) assert.ok(source.includes(`'${name}'`), name)
 })
 
 test('every problem and every slip has its words', () => {
   const words = readFileSync(new URL('../../templates/strings/en.toml', import.meta.url), 'utf8')
   const table = (name) => words.split(`[quiz.live.${name}]`)[1].split('\n[')[0]
-  for (const problem of ['empty', 'long', 'end', 'sign', 'numeral', 'numbers', 'comma', 'product', 'parenthesis', 'argument', 'log', 'finite', 'unit', 'no_unit'])
+  for (const problem of ['empty', 'long', 'end', 'sign', 'numeral', 'numbers', 'comma', 'product', 'parenthesis', 'argument', 'log',
+    'finite', 'unit', 'no_unit'])
     assert.match(table('unread'), new RegExp(`^${problem} = `, 'm'))
-  for (const near of ['rounded', 'close', 'sign', 'degrees', 'radians', 'ten', 'two', 'turn', 'reciprocal', 'unit', 'scale']) assert.match(table('near'), new RegExp(`^${near} = `, 'm'))
+  for (const near of ['rounded', 'close', 'sign', 'degrees', 'radians', 'ten', 'two', 'turn', 'reciprocal', 'unit',
+    'scale']) assert.match(table('near'), new RegExp(`^${near} = `, 'm'))
   for (const near of ['case', 'space', 'digits', 'numbers']) assert.match(table('printed'), new RegExp(`^${near} = `, 'm'))
 })
 
@@ -203,7 +210,8 @@ test('numbers are compared as the recording is', () => {
 })
 
 test('the last place of a printed number', () => {
-  for (const [text, place] of [['2.0061', 1e-4], ['12', 1], ['1e-6', 1e-6], ['1.50e3', 10], ['-.5', 0.1], ['3.', 1]]) assert.ok(Math.abs(lastPlace(text) / place - 1) < 1e-12, text)
+  for (const [text, place] of [['2.0061', 1e-4], ['12', 1], ['1e-6', 1e-6], ['1.50e3', 10], ['-.5', 0.1],
+    ['3.', 1]]) assert.ok(Math.abs(lastPlace(text) / place - 1) < 1e-12, text)
 })
 
 test('any text is right for itself', () => {
@@ -215,7 +223,8 @@ test('any text is right for itself', () => {
   const pieces = [...'01.-+e[](),:= \t"\'ab', 'é', '💥', '\u0000', '1.5', '-2', 'nan', '1e-06', '\ud800']
   for (let i = 0; i < 5000; i++) {
     const text = Array.from({ length: random(14) }, () => pieces[random(pieces.length)]).join('')
-    for (const rule of ['exact', 'digits', 'rtol=1e-06 atol=0.0', '']) assert.equal(printed(text, text, rule), 'right', JSON.stringify(text))
+    for (const rule of ['exact', 'digits', 'rtol=1e-06 atol=0.0',
+      '']) assert.equal(printed(text, text, rule), 'right', JSON.stringify(text))
     assert.equal(printed(` ${text.replaceAll(' ', '   ')} `, text, 'exact'), 'right', JSON.stringify(text))
   }
 })

@@ -25,7 +25,8 @@ const near = (text, expected) => assert.ok(Math.abs(value(text) - expected) <= 1
 
 test('numerals', () => {
   const cases = {
-    0.08: ['0.08', '0,08', '.08', ',08', '8e-2', '8E-2', '8·10^-2', '8 × 10⁻²', '8*10**-2', '8x10^-2', '0.8e-1', '0.080', '٠٫٠٨', '０．０８', ' 0.08 '],
+    0.08: ['0.08', '0,08', '.08', ',08', '8e-2', '8E-2', '8·10^-2', '8 × 10⁻²', '8*10**-2', '8x10^-2', '0.8e-1', '0.080', '٠٫٠٨', '０．０８',
+      ' 0.08 '],
     1200: ['1200', '1 200', '1\u202f200', '1\u00a0200', '1\u2009200', "1'200", '1’200', '1200.', '1.200e3', '1200,0', '1.2e+3', '1 200.0'],
     1234567.5: ['1234567.5', '1 234 567,5', '1,234,567.5', '1.234.567,5', "1'234'567.5", '12345675e-1'],
     1234567: ['1,234,567', '1.234.567', '1 234 567'],
@@ -44,8 +45,10 @@ test('a comma that may separate thousands is asked about, and no other one', () 
 })
 
 test('what is no numeral is said to be none', () => {
-  for (const text of ['1.2.3', '1,2,3', '1,23,456', '1.2,3.4', '1,234.5.6', '1.234,567,8', '12.34.567']) assert.equal(problem(text), 'numeral', text)
-  for (const text of ['1 2', '1 20', '12 34 567', '1200 000', '2 3.5', '0.12 34 5', '2 pi 3', '1e-3.5', '(2)3']) assert.equal(problem(text), 'numbers', text)
+  for (const text of ['1.2.3', '1,2,3', '1,23,456', '1.2,3.4', '1,234.5.6', '1.234,567,8',
+    '12.34.567']) assert.equal(problem(text), 'numeral', text)
+  for (const text of ['1 2', '1 20', '12 34 567', '1200 000', '2 3.5', '0.12 34 5', '2 pi 3', '1e-3.5',
+    '(2)3']) assert.equal(problem(text), 'numbers', text)
 })
 
 test('calculations', () => {
@@ -102,9 +105,12 @@ test('what can be read in two ways is not guessed', () => {
 
 test('what is wrong with a calculation is named', () => {
   const cases = {
-    '': 'empty', '   ': 'empty', '=': 'empty', '2*': 'end', '-': 'end', '2^': 'end', '(': 'end', '(1': 'parenthesis', '((1)': 'parenthesis', '1)': 'parenthesis',
-    'sqrt 2': 'argument', 'sqrt2': 'argument', 'sin 30°': 'argument', 'sqrt()': 'sign', '2**': 'end', '*2': 'sign', '2//3': 'sign', 'kg': 'sign',
-    '1/0': 'finite', 'sqrt(-1)': 'finite', 'ln(0)': 'finite', '0/0': 'finite', '1e400': 'finite', '10^999': 'finite', '(-8)^(1/3)': 'finite',
+    '': 'empty', '   ': 'empty', '=': 'empty', '2*': 'end', '-': 'end', '2^': 'end', '(': 'end', '(1': 'parenthesis',
+      '((1)': 'parenthesis', '1)': 'parenthesis',
+    'sqrt 2': 'argument', 'sqrt2': 'argument', 'sin 30°': 'argument', 'sqrt()': 'sign', '2**': 'end', '*2': 'sign', '2//3': 'sign',
+      'kg': 'sign',
+    '1/0': 'finite', 'sqrt(-1)': 'finite', 'ln(0)': 'finite', '0/0': 'finite', '1e400': 'finite', '10^999': 'finite',
+      '(-8)^(1/3)': 'finite',
     '2;3': 'sign', '2!': 'sign', '2 & 3': 'sign', '0x10': undefined,
   }
   for (const [text, expected] of Object.entries(cases)) if (expected) assert.equal(problem(text), expected, text)
@@ -113,8 +119,10 @@ test('what is wrong with a calculation is named', () => {
 
 test('the unit is what is left, and begins with the first name that is no function', () => {
   const cases = {
-    '0.08 kg m^2': 'kg m^2', '0.08kg·m²': 'kg*m^2', '0.08 * kg': 'kg', '5 m/s': 'm/s', '5/s': '/s', '5 / s': '/ s', '5 1/s': '1/s', '30°': '°', "45'": "'",
-    '12 %': '%', '2 pi rad/s': 'rad/s', '3 eV': 'eV', '3 e V': 'V', '2 µm': 'μm', '(1+2) m': 'm', 'sin(30°) m': 'm', '1e-3kg': 'kg', '5 exp': 'none', '2 x': 'x',
+    '0.08 kg m^2': 'kg m^2', '0.08kg·m²': 'kg*m^2', '0.08 * kg': 'kg', '5 m/s': 'm/s', '5/s': '/s', '5 / s': '/ s', '5 1/s': '1/s',
+      '30°': '°', "45'": "'",
+    '12 %': '%', '2 pi rad/s': 'rad/s', '3 eV': 'eV', '3 e V': 'V', '2 µm': 'μm', '(1+2) m': 'm', 'sin(30°) m': 'm', '1e-3kg': 'kg',
+      '5 exp': 'none', '2 x': 'x',
     '7': '', '3 N / 2 kg': 'N / 2 kg',
   }
   for (const [text, unit] of Object.entries(cases)) if (unit !== 'none') assert.equal(readQuantity(text).unit, unit, text)
@@ -122,16 +130,21 @@ test('the unit is what is left, and begins with the first name that is no functi
 
 test('the last place that was written is known for numerals alone', () => {
   const step = (text) => readQuantity(text).step
-  const cases = { '0.08': 0.01, '0,080': 0.001, '80': 1, '1 200': 1, '1e-3': 1e-3, '1.2e-3': 1e-4, '1.2·10^-3': 1e-4, '1.2*10^(-3) m': 1e-4, '-3.5 kg': 0.1, '1.2 x 10^3': 100 }
+  const cases = { '0.08': 0.01, '0,080': 0.001, '80': 1, '1 200': 1, '1e-3': 1e-3, '1.2e-3': 1e-4, '1.2·10^-3': 1e-4,
+    '1.2*10^(-3) m': 1e-4, '-3.5 kg': 0.1, '1.2 x 10^3': 100 }
   for (const [text, expected] of Object.entries(cases)) assert.ok(Math.abs(step(text) / expected - 1) < 1e-12, `${text}: ${step(text)}`)
   for (const text of ['2*3', 'pi', '(0.08)', '1/4', 'sqrt(2)', '2·3^2']) assert.equal(step(text), null, text)
 })
 
 test('nothing is run as code, whatever is entered', () => {
   const hostile = [
-    'alert(1)', 'constructor', 'toString', '__proto__', 'hasOwnProperty(1)', 'valueOf', 'process.exit(1)', 'globalThis', '${1+1}', '`1`', '<img src=x onerror=alert(1)>',
-    '"1"', "'; drop table", '1;2', '\u0000', '\ud800', '\u202e12', '💥', '∞', 'NaN', 'Infinity', '1e999999999', '9'.repeat(200), '-'.repeat(199) + '1', '('.repeat(199),
-    '('.repeat(100) + '1' + ')'.repeat(99), '√'.repeat(199), '2^'.repeat(99) + '2', 'sin('.repeat(49), '1'.repeat(201), 'é'.repeat(200), '1 '.repeat(99), ','.repeat(200), '.', '..', ',', '1.,', '1,.', 'e-', 'e+5', '1e', '1e+', '²', '^2', '2^²', '٫', '°', '%',
+    'alert(1)', 'constructor', 'toString', '__proto__', 'hasOwnProperty(1)', 'valueOf', 'process.exit(1)', 'globalThis', '${1+1}', '`1`',
+      '<img src=x onerror=alert(1)>',
+    '"1"', "'; drop table", '1;2', '\u0000', '\ud800', '\u202e12', '💥', '∞', 'NaN', 'Infinity', '1e999999999',
+      '9'.repeat(200), '-'.repeat(199) + '1', '('.repeat(199),
+    '('.repeat(100) + '1' + ')'.repeat(99), '√'.repeat(199), '2^'.repeat(99) + '2',
+      'sin('.repeat(49), '1'.repeat(201), 'é'.repeat(200), '1 '.repeat(99), ','.repeat(200), '.', '..', ',', '1.,', '1,.', 'e-', 'e+5',
+      '1e', '1e+', '²', '^2', '2^²', '٫', '°', '%',
   ]
   for (const text of hostile) {
     const read = readQuantity(text)
@@ -146,7 +159,8 @@ test('nothing is run as code, whatever is entered', () => {
 
 test('any text at all is read or refused', () => {
   const random = chance(7)
-  const pieces = [...'0123456789.,+-*/^() eE\'°πx√', 'sqrt(', 'pi', 'kg', 'm²', '10^-', ' ', '·', '−', '1 200', '1,200', '\u0000', 'ß', '{', '}', '=', 'log', 'deg', '½']
+  const pieces = [...'0123456789.,+-*/^() eE\'°πx√', 'sqrt(', 'pi', 'kg', 'm²', '10^-', ' ', '·', '−', '1 200', '1,200', '\u0000', 'ß',
+    '{', '}', '=', 'log', 'deg', '½']
   for (let i = 0; i < 20000; i++) {
     const text = Array.from({ length: 1 + Math.floor(random() * 14) }, () => pieces[Math.floor(random() * pieces.length)]).join('')
     const read = readQuantity(text)
@@ -185,7 +199,8 @@ test('a number is read back in every way to write it', () => {
     const whole = String(Math.floor(random() * 10 ** (1 + Math.floor(random() * 9))))
     const part = String(Math.floor(random() * 1e6)).padStart(6, '0').slice(0, 1 + Math.floor(random() * 6))
     const expected = Number(`${whole}.${part}`)
-    const ways = [`${whole}.${part}`, `${group(whole, ' ')}.${part}`, `${group(whole, ' ')},${part}`, `${group(whole, "'")}.${part}`, `${expected}e0`]
+    const ways = [`${whole}.${part}`, `${expected}e0`]
+    ways.push(`${group(whole, ' ')}.${part}`, `${group(whole, ' ')},${part}`, `${group(whole, "'")}.${part}`)
     if (whole.length > 3) ways.push(`${group(whole, ',')}.${part}`, `${group(whole, '.')},${part}`, `${whole},${part}`)
     for (const text of ways) if (problem(text) !== 'comma') assert.equal(value(text), expected, text)
     if (problem(`${whole},${part}`) === 'comma') assert.ok(/^[1-9]\d{0,2},\d{3}$/.test(`${whole},${part}`))

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, BrowserContext, sync_playwright
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
 
+import quizpage
 from coursekit import Folder
 from hostkit import Host
 from labcourse import LESSON, PENDULUM, TWIN, ZOO
@@ -90,3 +91,26 @@ def sites(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[di
     yield found
     for site in found.values():
         site.host.stop()
+
+
+@pytest.fixture(scope="session")
+def quiz_files(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
+    """A site with every kind of question."""
+    folder = Folder(tmp_path_factory.mktemp("quizzes") / "course")
+    folder.fill([quizpage.LESSON], stores)
+    folder.write("models/pendulum.xml", PENDULUM)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return folder.root / "public"
+
+
+@pytest.fixture(scope="session")
+def quizzes(quiz_files: Path) -> Iterator[str]:
+    """The address of that site."""
+    handler = functools.partial(Quiet, directory=str(quiz_files))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+        thread.join()

@@ -1,12 +1,20 @@
-"""The courses of the tests of reading: one of what is hard to fit, one in a language from the right."""
+"""The courses of the tests of reading: one of what is hard to fit, one in text from the right."""
 
 from __future__ import annotations
+
+from pathlib import Path
+
+from coursekit import Folder
 
 LONG = "Donaudampfschifffahrtselektrizitätenhauptbetriebswerkbauunterbeamtengesellschaft"
 URL = "https://example.org/a/very/long/address/that/cannot/be/broken/" + "x" * 120
 CODE = "model.opt.integrator=mujoco.mjtIntegrator.mjINT_IMPLICITFAST;" * 3
 WIDE = r"a_1 + a_2 + a_3 + a_4 + a_5 + a_6 + a_7 + a_8 + a_9 = \frac{\partial^2 u}{\partial x^2}"
 MATRIX = r"\begin{pmatrix}" + r"\\".join(["&".join(["1000000"] * 9)] * 3) + r"\end{pmatrix}"
+
+FUNCTIONS = "".join(
+    f"def f{n}(x: float) -> float:\n    # {n}\n    return one(x) + {n}\n\n\n" for n in range(14)
+)
 
 NASTY = f"""## {LONG} and `{CODE}` in a heading
 
@@ -64,7 +72,7 @@ def one(x: float) -> float:
     return math.sqrt(x)
 
 
-{"".join(f"def f{n}(x: float) -> float:{chr(10)}    # {n}{chr(10)}    return one(x) + {n}{chr(10)}{chr(10)}{chr(10)}" for n in range(14))}print(WIDE)
+{FUNCTIONS}print(WIDE)
 print(f1(4.0))
 ```
 
@@ -167,7 +175,7 @@ id = "1.1"
 slug = "one"
 title = "{title}"
 status = "complete"
-summary = "{title}: 10 m."
+summary = "{title} -10 m"
 objectives = ["{title}", "-3 m/s"]
 minutes = 3
 
@@ -180,12 +188,12 @@ prerequisites = ["1.1"]
 """
 
 
-ARABIC = """## الفكرة الأساسية
+ARABIC = r"""## الفكرة الأساسية
 
-تسارع الجاذبية -9.81 m/s² تقريبًا.[^1] المسافة $s = \\\\frac12 g t^2$ والدالة `mj_step(model, data)`.
+تسارع الجاذبية -9.81 m/s² تقريبًا.[^1] المسافة $s = \frac12 g t^2$ والدالة `mj_step(model, data)`.
 
 $$
-E = \\\\tfrac12 m v^2
+E = \tfrac12 m v^2
 $$
 
 > [!established] أين تُحفظ الكتلة
@@ -205,6 +213,8 @@ Output (الناتج):
 t = 1.25 s
 ```
 
+الزمن `1.25`{out=examples/falling.py} s.
+
 ```lab simlab
 {"title": "صندوق", "model": "box", "dock": true,
  "readouts": [{"label": "الارتفاع", "expr": "data.qpos[2]"}]}
@@ -212,5 +222,21 @@ t = 1.25 s
 
 بعد المختبر.
 
+## النهاية
+
+هذا كل شيء.
+
 [^1]: حاشية.
-""".replace("\\\\\\\\", "\\\\")
+"""
+
+
+def build(folder: Folder, stores: Path, text: str, title: str, language: str) -> Path:
+    """A course of one lesson, built; gives the folder of its site."""
+    folder.write("content/course.toml", course_map(title, language))
+    folder.borrow(stores)
+    folder.write("content/lessons/1.1-one.md", text)
+    folder.write("content/pages/about.md", f"{title}\n")
+    folder.write("models/box.xml", BOX)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return folder.root / "public"

@@ -2,128 +2,37 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
-import json
-import shutil
-import subprocess
-import threading
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
-from coursekit import Folder, block
-from labcourse import PENDULUM
-from labpage import until, watched
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
-from test_serving import serving
+from labpage import until
+from playwright.sync_api import BrowserContext, Page, expect
+from quizpage import (
+    ANGLE,
+    MCQ,
+    NUMBER,
+    OPEN,
+    ORDER,
+    OUTPUT,
+    PREDICT,
+    SEVERAL,
+    answer_all,
+    clean_page,
+    folded,
+    items,
+    kept,
+    press,
+    question,
+    verdict,
+    visit,
+)
 
 pytestmark = pytest.mark.browser
-
-ROOT = Path(__file__).resolve().parents[2]
-MODULES = ROOT / "site" / "node_modules"
-PATH = "lessons/1.1-one.html"
-MCQ, SEVERAL, NUMBER, ANGLE, PREDICT, OPEN, OUTPUT, ORDER, BARE = range(9)
-"""The questions, by number."""
-
-QUESTIONS: list[dict[str, Any]] = [
-    {"kind": "mcq", "label": "Length", "q": "Four times as long:",
-     "options": ["the same, $T$", "twice as long, $2T$", "`4*T` or $\\frac{4T}{1}$",
-                 '<b>longer</b> by a <a href="#hello">factor</a>'],
-     "answer": 1, "feedback": ["Not the same.", "The root of four.", "", ""],
-     "hints": ["First $x$.", "Second."], "explain": "Since $T = 2\\pi\\sqrt{\\ell/g}$."},
-    {"kind": "mcq", "q": "What counts?", "options": ["length", "mass", "gravity"],
-     "answer": [0, 2], "feedback": ["", "It cancels.", ""], "explain": "Not mass."},
-    {"kind": "numeric", "id": "inertia", "q": "How much?\n\nAbout $z$.", "answer": 0.08,
-     "tol": 0.0001, "unit": "kg m^2", "hints": ["Where is its centre?"], "explain": "So much."},
-    {"kind": "numeric", "q": "Half of $\\pi$?", "answer": 1.5708, "tol": 0.001, "unit": "rad"},
-    {"kind": "predict", "q": "Released at 2 rad:", "options": ["it rests", "it swings"],
-     "answer": 1, "feedback": ["It does not.", "It does."], "explain": "Gravity pulls.",
-     "sim": {"model": "pendulum", "key": "up", "title": "The swing", "height": 200,
-             "readouts": [{"label": "angle", "expr": "data.qpos[0]"}]}},
-    {"kind": "open", "q": "Why?", "reference": "Since **so**.", "explain": "That is why."},
-    {"kind": "output", "q": "Before you run it:", "of": "examples/a.py", "line": 2,
-     "explain": "Four places."},
-    {"kind": "order", "q": "From short to long:", "items": ["1 m", "$2$ m", "`3` m", "4 m"],
-     "explain": "By length."},
-    {"kind": "predict", "q": "<div><p>Without one?</p></div>", "options": ["yes", "no"],
-     "answer": 0},
-]  # fmt: skip
-LESSON = (
-    "## Hello\n\n"
-    + block("a.py", 'print("one")\nprint("T =", 2.0061, "s")', "one\nT = 2.0061 s", "digits")
-    + "## Check\n\n```quiz\n"
-    + json.dumps({"id": "check", "title": "Check", "questions": QUESTIONS})
-    + "\n```\n\nAfter it.\n"
-)
-KEY = "() => Object.keys(localStorage).find((key) => key.startsWith('coursebuild.progress.'))"
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
-@pytest.fixture(scope="module")
-def public(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
-    """A site with every kind of question."""
-    folder = Folder(tmp_path_factory.mktemp("quizzes") / "course")
-    folder.fill([LESSON], stores)
-    folder.write("models/pendulum.xml", PENDULUM)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
-    return folder.root / "public"
-
-
-@pytest.fixture(scope="module")
-def quizzes(public: Path) -> Iterator[str]:
-    """The address of that site."""
-    handler = functools.partial(Quiet, directory=str(public))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
 
 
 @pytest.fixture
 def page(context: BrowserContext, quizzes: str) -> Iterator[Page]:
-    """The lesson; nothing may go wrong in it."""
-    page, said = watched(context)
-    page.goto(quizzes + PATH)
-    yield page
-    assert said == []
-
-
-def question(page: Page, number: int) -> Locator:
-    return page.locator(".question").nth(number)
-
-
-def verdict(page: Page, number: int) -> Locator:
-    return question(page, number).locator(".verdict")
-
-
-def press(page: Page, number: int, name: str = "Check") -> None:
-    question(page, number).get_by_role("button", name=name, exact=True).click()
-
-
-def kept(page: Page, number: int) -> dict[str, Any] | None:
-    """What is kept of a question."""
-    key = question(page, number).get_attribute("data-question")
-    text = page.evaluate(f"localStorage[({KEY})()] ?? null")
-    entry = json.loads(text)["answers"].get("check", {}).get(key) if text else None
-    found: dict[str, Any] | None = entry and entry["answer"]
-    return found
-
-
-def items(page: Page) -> list[str]:
-    return folded(question(page, ORDER).locator(".item-text"))
-
-
-def folded(found: Locator) -> list[str]:
-    return [" ".join(text.split()) for text in found.all_inner_texts()]
+    yield from clean_page(context, quizzes)
 
 
 # ------------------------------------------------------------------------------- every kind
@@ -177,56 +86,59 @@ def test_all_that_are_right(page: Page) -> None:
     expect(verdict(page, SEVERAL)).to_contain_text("Right. Not mass.")
 
 
-@pytest.mark.parametrize(
-    ("number", "entered", "said"),
-    [
-        (NUMBER, "0,08", "Right."),
-        (NUMBER, "2*1*0.2^2", "Right.Read as 0.08 kg m2"),
-        (NUMBER, "800 kg cm²", "Right.Read as 0.08 kg m2"),
-        (NUMBER, "-0.08", "Not right. The size is right, the sign is not."),
-        (NUMBER, "80", "the power of ten is not"),
-        (NUMBER, "0.08 kg m", "The unit measures something else"),
-        (NUMBER, "0.08 g cm^2", "not in the one that you wrote"),
-        (NUMBER, "0.16", "A factor of two"),
-        (NUMBER, "12.5", "reciprocal"),
-        (ANGLE, "90", "It looks like degrees"),
-        (ANGLE, "90°", "Right."),
-        (ANGLE, "pi/2", "Right."),
-        (ANGLE, "1.57 rad", "Right."),
-        (ANGLE, "1.5", "rounded too far"),
-        (ANGLE, "1.200", "Not right.Read as 1.2 rad"),
-    ],
-)
-def test_a_number(page: Page, number: int, entered: str, said: str) -> None:
-    field = question(page, number).get_by_label("Your answer")
-    field.fill(entered)
-    field.press("Enter")
-    expect(verdict(page, number)).to_contain_text(said)
-    expect(field).to_be_focused()
-    right = "Right." in said
-    expect(field).to_have_attribute("aria-invalid", "true") if not right else None
-    answer = kept(page, number)
-    assert answer is not None
-    assert (answer["given"], answer["right"], answer["tries"]) == (entered, right, 1)
+NUMBERS = [
+    (NUMBER, "-0.08", "Not right. The size is right, the sign is not."),
+    (NUMBER, "80", "the power of ten is not"),
+    (NUMBER, "0.08 kg m", "The unit measures something else"),
+    (NUMBER, "0.08 g cm^2", "not in the one that you wrote"),
+    (NUMBER, "0.16", "A factor of two"),
+    (NUMBER, "12.5", "reciprocal"),
+    (NUMBER, "0,08", "Right."),
+    (NUMBER, "2*1*0.2^2", "Right.Read as 0.08 kg m2"),
+    (NUMBER, "800 kg cm²", "Right.Read as 0.08 kg m2"),
+    (ANGLE, "90", "It looks like degrees"),
+    (ANGLE, "1.5", "rounded too far"),
+    (ANGLE, "1.200", "Not right.Read as 1.2 rad"),
+    (ANGLE, "90°", "Right."),
+    (ANGLE, "pi/2", "Right."),
+    (ANGLE, "1.57 rad", "Right."),
+]
 
 
-@pytest.mark.parametrize(
-    ("entered", "said"),
-    [
-        ("1,200", "“1,200” can be read as 1200 or as 1.200."),
-        ("1/2π", "can be read in two ways"),
-        ("0.08 furlong", "“furlong” is not a unit known here."),
-        ("2 3", "two numbers side by side"),
-        ("<img src=x onerror=alert(1)>", "something unexpected at “<img src=x onerror=alert(1)>”"),
-    ],
-)
-def test_what_cannot_be_read_is_no_try(page: Page, entered: str, said: str) -> None:
+def test_numbers(page: Page) -> None:
+    tries = {NUMBER: 0, ANGLE: 0}
+    for number, entered, said in NUMBERS:
+        field = question(page, number).get_by_label("Your answer")
+        field.fill(entered)
+        field.press("Enter")
+        expect(verdict(page, number)).to_contain_text(said)
+        expect(field).to_be_focused()
+        right = "Right." in said
+        assert field.get_attribute("aria-invalid") == (None if right else "true")
+        tries[number] += 1
+        answer = kept(page, number)
+        assert answer is not None
+        found = (answer["given"], answer["right"], answer["tries"])
+        assert found == (entered, right, tries[number])
+
+
+UNREADABLE = [
+    ("1,200", "“1,200” can be read as 1200 or as 1.200."),
+    ("1/2π", "can be read in two ways"),
+    ("0.08 furlong", "“furlong” is not a unit known here."),
+    ("2 3", "two numbers side by side"),
+    ("<img src=x onerror=alert(1)>", "something unexpected at “<img src=x onerror=alert(1)>”"),
+]
+
+
+def test_what_cannot_be_read_is_no_try(page: Page) -> None:
     field = question(page, NUMBER).get_by_label("Your answer")
-    field.fill(entered)
-    press(page, NUMBER)
-    expect(verdict(page, NUMBER)).to_contain_text("This cannot be read.")
-    expect(verdict(page, NUMBER)).to_contain_text(said)
-    assert kept(page, NUMBER) is None
+    for entered, said in UNREADABLE:
+        field.fill(entered)
+        press(page, NUMBER)
+        expect(verdict(page, NUMBER)).to_contain_text("This cannot be read.")
+        expect(verdict(page, NUMBER)).to_contain_text(said)
+        assert kept(page, NUMBER) is None
     field.fill("0.08")
     press(page, NUMBER)
     answer = kept(page, NUMBER)
@@ -267,7 +179,7 @@ def test_a_prediction_is_committed_to_before_its_simulation_opens(page: Page) ->
     until(page, "() => document.querySelector('.question .lab').dataset.state === 'paused'")
     expect(one.get_by_role("button", name="Play")).to_be_visible()
     # There is no way back by loading the page again.
-    page.reload()
+    visit(page, page.url)
     expect(one.get_by_role("radio", name="it rests")).to_be_checked()
     expect(one.get_by_role("radio", name="it rests")).to_be_disabled()
     expect(one.locator(".lab")).to_be_visible()
@@ -291,7 +203,7 @@ def test_an_open_question_is_compared_and_marked_by_the_learner(page: Page) -> N
         expect(verdict(page, OPEN)).to_contain_text(said)
         answer = kept(page, OPEN)
         assert answer is not None and (answer["right"], answer["tries"]) == (right, 1)
-    page.reload()
+    visit(page, page.url)
     expect(one.get_by_label("Your answer")).to_have_value("It <b>is</b>\nso.")
     expect(one.get_by_role("radio", name="Not yet")).to_be_checked()
     expect(verdict(page, OPEN)).to_contain_text("Marked as not right yet.")
@@ -327,7 +239,7 @@ def test_an_order_by_buttons(page: Page) -> None:
     expect(verdict(page, ORDER)).to_be_empty()
     press(page, ORDER)
     expect(verdict(page, ORDER)).to_contain_text("Right. By length.")
-    page.reload()
+    visit(page, page.url)
     assert items(page) == ["1 m", "2 m", "3 m", "4 m"]
 
 
@@ -414,7 +326,7 @@ def test_hints_come_one_by_one(page: Page) -> None:
     press(page, MCQ)
     answer = kept(page, MCQ)
     assert answer is not None and answer["hints"] == 1
-    page.reload()
+    visit(page, page.url)
     expect(hints.nth(1)).to_be_visible()
 
 
@@ -469,257 +381,3 @@ def test_no_id_is_there_twice_and_every_reference_leads_somewhere(page: Page) ->
           return [twice, named.filter((id) => !ids.includes(id))]
         }"""
     ) == [[], []]  # fmt: skip
-
-
-def answer_all(page: Page) -> None:
-    """Some right, some wrong, some unreadable."""
-    question(page, MCQ).get_by_role("radio").first.check()
-    press(page, MCQ)
-    question(page, SEVERAL).get_by_role("checkbox").nth(0).check()
-    question(page, SEVERAL).get_by_role("checkbox").nth(2).check()
-    press(page, SEVERAL)
-    question(page, NUMBER).get_by_label("Your answer").fill("1,200")
-    press(page, NUMBER)
-    question(page, ANGLE).get_by_label("Your answer").fill("pi/2")
-    press(page, ANGLE)
-    question(page, PREDICT).get_by_role("radio").first.check()
-    press(page, PREDICT, "Commit to this")
-    question(page, OPEN).get_by_label("Your answer").fill("So.")
-    press(page, OPEN, "Compare")
-    question(page, OPEN).get_by_role("radio", name="In part").check()
-    question(page, OUTPUT).get_by_label("What it prints").fill("one")
-    press(page, OUTPUT)
-    press(page, ORDER)
-    press(page, ORDER, "Show the answer")
-
-
-AXE = """axe.run('.quiz', {rules: {"color-contrast-enhanced": {enabled: true}}}).then(found =>
-    found.violations.map(v => [v.id, v.nodes[0].html, v.nodes[0].failureSummary]))"""
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [320, 1440])
-def test_axe_finds_nothing_in_any_state(
-    browsers: dict[str, Browser], quizzes: str, scheme: Any, width: int
-) -> None:
-    viewport: Any = {"width": width, "height": 800}
-    with browsers["webgl"].new_context(
-        viewport=viewport, color_scheme=scheme, bypass_csp=True
-    ) as context:
-        page, said = watched(context)
-        page.goto(quizzes + PATH)
-        page.evaluate((MODULES / "axe-core" / "axe.min.js").read_text(encoding="utf-8"))
-        assert page.evaluate(AXE) == []
-        answer_all(page)
-        assert page.evaluate(AXE) == []
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        small = page.locator(".quiz :is(button, input, summary):not(.lab *):visible").evaluate_all(
-            """elements => elements.filter((element) => {
-              const box = (element.closest('label') ?? element).getBoundingClientRect()
-              return box.height < 24 || box.width < 24
-            }).map((element) => element.outerHTML)"""
-        )
-        assert small == []
-        assert said == []
-
-
-def test_the_nu_checker_finds_nothing_in_the_live_page(page: Page, tmp_path: Path) -> None:
-    answer_all(page)
-    html = page.locator("main").evaluate("element => element.outerHTML")
-    file = tmp_path / "live.html"
-    head = '<!DOCTYPE html><html lang="en"><head><title>Live</title></head><body>'
-    file.write_text(f"{head}{html}</body></html>", encoding="utf-8")
-    java = shutil.which("java")
-    assert java is not None, "no java: install Debian's package `default-jre-headless`"
-    jar = MODULES / "vnu-jar" / "build" / "dist" / "vnu.jar"
-    command = [java, "-jar", str(jar), "--format", "json", "--stdout", "--exit-zero-always"]
-    done = subprocess.run([*command, str(file)], capture_output=True, text=True, check=True)
-    messages = [
-        (message["message"], message["extract"])
-        for message in json.loads(done.stdout)["messages"]
-        if "question" in message.get("extract", "") or "quiz" in message.get("extract", "")
-    ]
-    assert messages == []
-
-
-# ----------------------------------------------------------------------- what is kept of it
-
-
-def test_answers_are_there_again(page: Page) -> None:
-    answer_all(page)
-    page.reload()
-    expect(question(page, MCQ).get_by_role("radio").first).to_be_checked()
-    expect(verdict(page, MCQ)).to_contain_text("Not the same.")
-    expect(verdict(page, SEVERAL)).to_contain_text("Right.")
-    expect(question(page, NUMBER).get_by_label("Your answer")).to_have_value("")
-    expect(question(page, ANGLE).get_by_label("Your answer")).to_have_value("pi/2")
-    expect(verdict(page, PREDICT)).to_contain_text("It happens otherwise.")
-    expect(verdict(page, OUTPUT)).to_contain_text("Not right.")
-    # Loading a page answers nothing again.
-    answer = kept(page, MCQ)
-    assert answer is not None and answer["tries"] == 1
-
-
-def test_an_event_tells_of_each_answer(page: Page) -> None:
-    page.evaluate(
-        """() => {
-          window.told = []
-          document.addEventListener('coursebuild:answered', ({ detail }) => told.push(detail))
-        }"""
-    )
-    question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-    press(page, NUMBER)
-    told = page.evaluate("told")
-    assert [(one["quiz"], one["key"], one["answer"]["right"]) for one in told] == [
-        ("check", "inertia", True)
-    ]
-
-
-def test_another_tab_follows(page: Page, context: BrowserContext) -> None:
-    other = context.new_page()
-    other.goto(page.url)
-    other.get_by_label("Your answer").nth(1).fill("half")
-    question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-    press(page, NUMBER)
-    expect(verdict(other, NUMBER)).to_contain_text("Right.")
-    expect(question(other, ANGLE).get_by_label("Your answer")).to_have_value("half")
-
-
-CLOSED = """Object.defineProperty(window, 'localStorage', {
-  get() { throw new DOMException('closed', 'SecurityError') }
-})"""
-FULL = "Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError') }"
-
-
-@pytest.mark.parametrize("broken", [CLOSED, FULL])
-def test_quizzes_work_where_nothing_can_be_kept(
-    context: BrowserContext, quizzes: str, broken: str
-) -> None:
-    page, said = watched(context)
-    page.add_init_script(broken)
-    page.goto(quizzes + PATH)
-    answer_all(page)
-    expect(verdict(page, SEVERAL)).to_contain_text("Right.")
-    assert said == []
-
-
-def test_quizzes_work_from_a_disk(browsers: dict[str, Browser], public: Path) -> None:
-    with browsers["plain"].new_context() as context:
-        page = context.new_page()
-        page.goto(f"file://{public / PATH}")
-        question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-        press(page, NUMBER)
-        expect(verdict(page, NUMBER)).to_contain_text("Right.")
-        question(page, PREDICT).get_by_role("radio").last.check()
-        press(page, PREDICT, "Commit to this")
-        expect(verdict(page, PREDICT)).to_contain_text("It happens as you predicted.")
-        expect(question(page, PREDICT).locator(".lab-message")).to_be_visible()
-        page.reload()
-        expect(verdict(page, NUMBER)).to_contain_text("Right.")
-
-
-@pytest.mark.parametrize(
-    "given",
-    ['["gone"]', '"text"', "null", "{}", "5", '[["a"]]', '{"text":5,"mark":"x"}', '[null,{"a":1}]'],
-)
-def test_answers_that_do_not_fit_their_question_are_left_out(page: Page, given: str) -> None:
-    answer_all(page)
-    expect(verdict(page, ORDER)).to_contain_text("The answer:")
-    page.evaluate(
-        f"""() => {{
-          const key = ({KEY})()
-          const state = JSON.parse(localStorage[key])
-          for (const entry of Object.values(state.answers.check)) entry.answer.given = {given}
-          localStorage[key] = JSON.stringify(state)
-        }}"""
-    )
-    page.reload()
-    expect(question(page, MCQ).get_by_role("radio")).to_have_count(4)
-    expect(verdict(page, MCQ)).to_be_empty()
-    assert sorted(items(page)) == ["1 m", "2 m", "3 m", "4 m"]
-    question(page, MCQ).get_by_role("radio").nth(1).check()
-    press(page, MCQ)
-    expect(verdict(page, MCQ)).to_contain_text("Right.")
-
-
-# -------------------------------------------------------------- without a script, on paper
-
-
-def test_without_javascript_everything_is_there(browsers: dict[str, Browser], quizzes: str) -> None:
-    with browsers["plain"].new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(quizzes + PATH)
-        quiz = page.locator(".quiz")
-        assert quiz.locator("form, fieldset, input, button, textarea").count() == 0
-        folds = quiz.locator("details.answer")
-        expect(folds).to_have_count(len(QUESTIONS))
-        for number in range(len(QUESTIONS)):
-            folds.nth(number).locator("> summary").click()
-        for text in (
-            "B. twice as long, 2T", "Since", "If you chose A", "A. length", "C. gravity",
-            "0.08 kg m2", "it swings", "Since so.", "T = 2.0061 s", "The right order", "By length.",
-        ):  # fmt: skip
-            expect(quiz.get_by_text(text).first).to_be_visible()
-        expect(quiz.locator(".lab")).to_be_visible()
-        expect(quiz.locator(".hint")).to_have_count(3)
-
-
-def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> None:
-    answer_all(page)
-    page.emulate_media(media="print")
-    page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    quiz = page.locator(".quiz")
-    expect(quiz.locator("button:visible")).to_have_count(0)
-    for text in ("twice as long, 2T", "So much.", "0.08 kg m2", "It happens otherwise."):
-        expect(quiz.get_by_text(text).locator("visible=true").first).to_be_visible()
-    expect(verdict(page, NUMBER)).to_be_hidden()  # that it could not be read
-    page.evaluate("dispatchEvent(new Event('afterprint'))")
-    page.emulate_media(media="screen")
-    # Folds that were opened for the printer are no hints that were taken.
-    expect(question(page, MCQ).locator(".hint").nth(1)).to_be_hidden()
-
-
-# ------------------------------------------------------------------------------ the preview
-
-
-def test_a_half_typed_answer_survives_the_author(
-    tmp_path: Path, stores: Path, browsers: dict[str, Browser]
-) -> None:
-    folder = Folder(tmp_path / "course")
-    folder.fill([LESSON], stores)
-    folder.write("models/pendulum.xml", PENDULUM)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with browsers["plain"].new_context() as context:
-            page = context.new_page()
-            page.goto(f"http://127.0.0.1:{preview.port}/{PATH}")
-            page.evaluate("window.same = true")
-            field = question(page, NUMBER).get_by_label("Your answer")
-            field.fill("half of")
-            field.focus()
-            question(page, MCQ).get_by_role("radio").nth(2).check()
-            order = shifted(page)
-            field.focus()
-            folder.replace(folder.lesson(), "After it.", "After it, more.")
-            expect(page.locator("main")).to_contain_text("After it, more.", timeout=30_000)
-            expect(field).to_have_value("half of")
-            expect(field).to_be_focused()
-            assert items(page) == order
-            # Another question changes, and this one's explanation: what was entered stays.
-            folder.replace(folder.lesson(), "Not mass.", "No, not mass.")
-            folder.replace(folder.lesson(), "So much.", "So much, then.")
-            until(
-                page,
-                "() => document.querySelectorAll('.explain')[2].textContent.includes('then')",
-            )
-            expect(field).to_have_value("half of")
-            expect(question(page, MCQ).get_by_role("radio").nth(2)).to_be_checked()
-            field.fill("0.08")
-            press(page, NUMBER)
-            expect(verdict(page, NUMBER)).to_contain_text("So much, then.")
-            assert page.evaluate("window.same")
-
-
-def shifted(page: Page) -> list[str]:
-    question(page, ORDER).get_by_role("button", name="Move down").first.click()
-    return items(page)

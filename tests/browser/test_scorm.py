@@ -6,6 +6,9 @@ The platform's half is the npm package scorm-again, which refuses what the data 
 from __future__ import annotations
 
 import functools
+import json
+import shutil
+import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -18,6 +21,7 @@ from playwright.sync_api import Browser, BrowserContext, FrameLocator, Page
 
 pytestmark = pytest.mark.browser
 
+MODULES = ROOT / "site/node_modules"
 RUNTIME = ROOT / "site/node_modules/scorm-again/dist/scorm12.min.js"
 QUIZ = """
 ## Questions
@@ -252,3 +256,34 @@ def test_a_platform_in_a_window_of_its_own(context: BrowserContext, base: str) -
     until(opener, "API.cmi.core.lesson_status === 'incomplete'")
     window.close(run_before_unload=True)
     until(opener, "API.isTerminated()")
+
+
+def test_the_launch_page_meets_the_standards(context: BrowserContext, base: str) -> None:
+    address = f"{base}package/sco/1.1-one.html"
+    java = shutil.which("java")
+    assert java is not None, "no java: install Debian's package `default-jre-headless`"
+    jar = MODULES / "vnu-jar/build/dist/vnu.jar"
+    allow = "-Dnu.validator.servlet.allow-forbidden-hosts=true"
+    command = [java, allow, "-jar", str(jar), "--format", "json", "--stdout", address]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert json.loads(done.stdout)["messages"] == []
+    page = context.new_page()
+    page.goto(address)
+    page.get_by_role("status").wait_for()
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        found = page.evaluate(
+            f"{(MODULES / 'axe-core/axe.min.js').read_text('utf-8')};"
+            # The heading is that of the lesson, in the frame.
+            "axe.run(document, {iframes: false, rules: {'page-has-heading-one': {enabled: false}}})"
+            ".then(({violations}) => violations)"
+        )
+        assert [(one["id"], len(one["nodes"])) for one in found] == []
+
+
+def test_the_keyboard_reaches_into_the_lesson(visit: Open) -> None:
+    page = visit()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Tab")
+    inside = "document.querySelector('iframe').contentDocument.querySelector('iframe')"
+    assert page.evaluate(f"{inside}.contentDocument.activeElement.tagName") == "A"

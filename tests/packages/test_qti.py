@@ -359,11 +359,13 @@ def test_nothing_is_written_where_something_is_wrong(make: Make) -> None:
         ("content/q.zip", "lies in content/ of the project, where no archive goes"),
         ("notes.txt", "is there, and is no such archive"),
         (".", "is a folder"),
+        ("public/q.zip", "lies in a published site, which the next build replaces"),
     ],
 )
 def test_where_no_package_goes(make: Make, out: str, said: str) -> None:
     folder = make(GOOD + quiz("a", ANY["zero"]))
     folder.write("notes.txt", "mine")
+    assert folder.main("build").status == 0
     done = export(folder, "--out", out)
     assert done.status == 2 and said in done.err
     assert folder.text("notes.txt") == "mine"

@@ -201,10 +201,29 @@ def test_the_number_of_a_formula_draws_who_refers_to_it(course: Course) -> None:
     assert drawn(course.folder) == {lesson("1.1")}
 
 
+QUIZ = """```quiz
+{"id": "asked", "title": "Check", "questions": [
+  {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}]}
+```
+
+"""
+
+
+def test_a_question_draws_the_lists_of_lessons(course: Course) -> None:
+    course.edit("1.2", "Prose", QUIZ + "Prose")
+    lists = {"index.html", "levels/1.html", "progress/index.html", "review/index.html"}
+    assert drawn(course.folder) == {lesson("1.2"), *lists}
+    course.edit("1.2", "Why?", "Why not?")
+    assert drawn(course.folder) == {lesson("1.2")}, "its key is the same"
+    course.edit("1.2", '"why"', '"why-not"')
+    assert drawn(course.folder) == {lesson("1.2"), *lists}
+
+
 def test_a_title_draws_all_that_name_it(course: Course) -> None:
     course.titles["1.2"] = "New title"
     course.save()
     around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), "symbols/index.html"}
+    around.add("progress/index.html")
     # Lesson 2.1 needs it, which the level of that one says too.
     assert drawn(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
 
@@ -212,7 +231,7 @@ def test_a_title_draws_all_that_name_it(course: Course) -> None:
 def test_the_title_of_a_level_draws_its_lessons_and_its_neighbours(course: Course) -> None:
     course.levels["2"] = "Second"
     course.save()
-    levels = {"levels/1.html", "levels/2.html"}
+    levels = {"levels/1.html", "levels/2.html", "progress/index.html"}
     assert drawn(course.folder) == {"index.html", *levels, lesson("2.1"), lesson("2.2")}
 
 
@@ -352,6 +371,15 @@ def label(course: Course, id: str, text: str) -> None:
     course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
 
 
+def ask(course: Course, id: str, text: str) -> None:
+    """A lesson asks something, or something else."""
+    path = course.folder.root / course.path(id)
+    if "```quiz" in path.read_text(encoding="utf-8"):
+        course.edit(id, '"why', '"why-not')
+    else:
+        course.edit(id, "Prose", QUIZ.replace("asked", f"asked-{id}") + "Prose")
+
+
 def model(course: Course, id: str, text: str) -> None:
     course.folder.write("models/box.xml", f"<mujoco><!--{text.replace('-', '')}--></mujoco>\n")
 
@@ -371,7 +399,7 @@ def breakage(course: Course, id: str, text: str) -> None:
 
 EDITS: list[Callable[[Course, str, str], None]] = [
     *(prose, heading, retitle, script, plan, remove, turn, model, page, picture, breakage),
-    *(term, label),
+    *(term, label, ask),
 ]
 WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b>"]
 

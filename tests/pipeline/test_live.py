@@ -158,6 +158,36 @@ def test_a_page_is_new_before_anything_else_is_done(
     assert running.course.find("lessons/1.2-two.html") == other
 
 
+def test_lists_of_lessons_follow_their_questions(
+    make: Make, live: Callable[[Folder], Live], builds: Builds
+) -> None:
+    folder = make(GOOD, GOOD.replace("hello.py", "other.py"))
+    running = live(folder)
+    running.site()
+    path = folder.lesson(2)
+    asking = '```quiz\n{"id": "q", "title": "Q", "questions": [%s]}\n```\n'
+    one, other = (
+        f'{{"kind": "open", "id": "{id}", "q": "{id}?", "reference": "So."}}' for id in "ab"
+    )
+    lists = ("index.html", "levels/1.html", "progress/index.html", "review/index.html")
+
+    def same() -> bool:
+        built = builds(folder)
+        assert built is not None
+        return [running.course.find(p) for p in lists] == [built.get(p) for p in lists]
+
+    for text in (one, f"{one}, {other}", other):
+        folder.write(path, GOOD.replace("hello.py", "other.py") + "\n" + asking % text)
+        assert running.save(path)
+        running.behind.once()
+        assert same()
+    folder.write(path, GOOD.replace("hello.py", "other.py"))
+    assert running.save(path)
+    running.behind.once()
+    assert running.course.find("review/index.html") is None
+    assert same()
+
+
 def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]) -> None:
     folder = make(GOOD)
     running = live(folder)

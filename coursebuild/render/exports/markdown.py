@@ -57,7 +57,7 @@ from coursebuild.model import (
     ThematicBreak,
     plain_text,
 )
-from coursebuild.render.markup import OwnBlock
+from coursebuild.render.markup import OwnBlock, escape
 
 
 class Context(Protocol):
@@ -101,12 +101,13 @@ def hang(mark: str, text: str, indent: int | None = None) -> str:
     """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
     space = " " * (len(mark) if indent is None else indent)
     first, *rest = text.split("\n")
-    return "\n".join([f"{mark}{first}".rstrip(), *(f"{space}{line}".rstrip() for line in rest)])
+    lines = [f"{mark}{first}" if first else mark.rstrip()]
+    return "\n".join([*lines, *(f"{space}{line}" if line.strip() else "" for line in rest)])
 
 
 def quoted(text: str) -> str:
     """Lines in a blockquote."""
-    return "\n".join(f"> {line}".rstrip() for line in text.split("\n"))
+    return "\n".join(f"> {line}" if line.strip() else ">" for line in text.split("\n"))
 
 
 def fence(language: str, text: str) -> str:
@@ -130,7 +131,8 @@ def code_span(text: str, ticks: str = "") -> str:
 
 _TICKS = re.compile("`+").findall
 _MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
-_DOLLAR = re.compile(r"(?<!\\)\$")
+_ALWAYS = re.compile(r"[$`]")
+"""What is escaped wherever it is text: another reader may see more in it than ours did."""
 
 
 def escaped(text: str) -> str:
@@ -207,7 +209,7 @@ class _Writer:
             case Paragraph():
                 return self.inlines(block.children)
             case HtmlFlow():
-                return self.inlines(block.children)
+                return "".join(map(self._in_html, block.children))
             case ListBlock():
                 return self._list(block, other=isinstance(after, ListBlock))
             case BlockQuote():
@@ -226,6 +228,12 @@ class _Writer:
                 return self.context.own(block)
             case _:
                 assert_never(block)
+
+    def _in_html(self, inline: Inline) -> str:
+        """An inline in HTML, where text is no Markdown."""
+        if isinstance(inline, Text):
+            return escape(inline.text)
+        return self._inline(inline, line=False, cell=False)
 
     def _heading(self, heading: Heading) -> str:
         text = " ".join(self.inlines(heading.children, line=True).split("\n")).strip()
@@ -279,7 +287,9 @@ class _Writer:
             case SoftBreak():
                 return " " if line else "\n"
             case HardBreak():
-                return " " if line else "\\\n"
+                if line:
+                    return " "
+                return "\\\n" if inline.span.text.startswith("\\") else "  \n"
             case CodeSpan():
                 ticks = re.match("`*", inline.span.text)
                 return _piped(code_span(inline.text, ticks[0] if ticks else ""), cell=cell)
@@ -335,7 +345,7 @@ def _text(node: Text, *, cell: bool) -> str:
         if text[-1:].isspace() and not source[-1:].isspace():
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
-    text = _DOLLAR.sub(r"\\$", node.text)
+    text = _ALWAYS.sub(lambda match: f"\\{match[0]}", node.text)
     return _piped(text, cell=cell)
 
 
@@ -350,11 +360,11 @@ def _delimiter(source: str, usual: str) -> str:
 def _formula(node: Math, *, cell: bool) -> str:
     tex = node.tex.text
     if cell:  # a pipe would end the cell, and an escaped one is another sign
-        tex = re.sub(r"\|", lambda _: r"\vert ", tex.replace(r"\|", r"\Vert "))
-    if not re.search(r"(?<!\\)%", tex):  # else a line's end ends a comment
-        tex = " ".join(part.strip() for part in tex.split("\n"))
-    else:
+        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
+    if re.search(r"(?<!\\)%", tex):  # a line's end ends a comment
         tex = _no_empty_lines(tex)
+    elif "\n" in tex:
+        tex = " ".join(part.strip() for part in tex.split("\n"))
     return f"$${tex}$$" if node.display else f"${tex}$"
 
 
@@ -363,7 +373,7 @@ def _no_empty_lines(tex: str) -> str:
 
 
 _BEGINS = re.compile(
-    r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
+    r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
     r"|[|:\s-]*-[|:\s-]*$)"
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
     r"|(?P<note>\[\^[^\]]+\]):"

@@ -368,5 +368,5 @@ def _value(base: str, text: str) -> Element:
 
 
 def _double(value: float) -> str:
-    """As XML Schema writes a number, digit by digit."""
-    return repr(float(value))
+    """As XML Schema writes a number, digit by digit; zero has no sign."""
+    return repr(float(value) + 0.0)

@@ -1,6 +1,6 @@
 """Quizzes as a content package of IMS QTI 2.1.
 
-Entry points: `quiz_files`, `style_file`, `manifest`.
+Entry points: `quiz_paths` and `quiz_file`, `style_file`, `manifest`.
 
 One test for each quiz, one item for each question, and the pictures that they show. Paths:
 `imsmanifest.xml`, `style.css`, `tests/….xml`, `items/….xml`, `files/…`.
@@ -38,11 +38,21 @@ def item_path(item: MadeItem) -> str:
     return f"items/{item.identifier}.xml"
 
 
-def quiz_files(quiz: MadeQuiz) -> Iterator[OutputFile]:
+def quiz_paths(quiz: MadeQuiz) -> Iterator[str]:
     """The files of a quiz: its test, and its items."""
-    yield OutputFile(test_path(quiz), _test(quiz))
-    for item in quiz.items:
-        yield OutputFile(item_path(item), item.data)
+    yield test_path(quiz)
+    yield from map(item_path, quiz.items)
+
+
+def quiz_file(quizzes: Iterable[MadeQuiz], path: str) -> bytes:
+    """The bytes of one of the files of quizzes (`KeyError` where it is none)."""
+    for quiz in quizzes:
+        if path == test_path(quiz):
+            return _test(quiz)
+        for item in quiz.items:
+            if path == item_path(item):
+                return item.data
+    raise KeyError(path)
 
 
 def without_bytes(quiz: MadeQuiz) -> MadeQuiz:

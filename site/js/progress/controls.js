@@ -1,6 +1,7 @@
 /** Saving progress as a file, bringing it in, forgetting it. */
 
 import { download, h } from '../lab/page/dom.js'
+import { ImportError, importText } from './exchange.js'
 import { say } from './words.js'
 
 export function addControls(document, words, progress) {
@@ -50,7 +51,7 @@ function addImport(place, words, progress) {
     let text = null
     try {
       text = await file.text()
-      tellImported(told, progress.importText(text), text, words, progress)
+      tellImported(told, importText(progress, text), text, words, progress)
     } catch (error) {
       told.replaceChildren(h('span', { class: 'wrong' }, errorText(error, text, words)))
     }
@@ -61,7 +62,7 @@ function addImport(place, words, progress) {
 
 function errorText(error, text, words) {
   if (text === null) return words('progress.live.error_unread')
-  if (error.name !== 'ImportError') throw error
+  if (!(error instanceof ImportError)) throw error
   return say(words, `progress.live.error_${error.code}`, { detail: error.detail })
 }
 
@@ -70,7 +71,7 @@ function tellImported(told, { answers, lessons, restorable }, text, words, progr
   told.textContent = answers || lessons ? say(words, 'progress.live.imported', amounts) : words('progress.live.imported_none')
   if (!restorable) return
   const restore = () => {
-    tellImported(told, progress.importText(text, { restore: true }), text, words, progress)
+    tellImported(told, importText(progress, text, { restore: true }), text, words, progress)
     told.tabIndex = -1
     told.focus()
   }
@@ -93,7 +94,7 @@ function addReset(place, key, words, progress) {
     progress.reset()
     dialog.close()
     const undo = () => {
-      progress.importText(before, { restore: true })
+      importText(progress, before, { restore: true })
       told.textContent = words('progress.live.undone')
       open.focus()
     }

@@ -1,11 +1,10 @@
 /**
- * Texts of progress from elsewhere: files that a reader brings, and what the browser's storage holds.
+ * Progress from a file: taken whole or not at all.
  *
- * Entry points: `readFile`, which takes a file whole or not at all; `understood`, which takes of a kept text what it can; `restored`,
- * `changes` and `missing`, what bringing in a file means.
+ * Entry point: `importText(progress, text)`. A part of its own, since only the page of the reader's progress brings in files.
  */
 
-import { decode, StateError, VERSION } from './state.js'
+import { decode, merge, StateError, VERSION } from './state.js'
 
 const SIZE = 32 * 2 ** 20
 
@@ -13,14 +12,13 @@ const SIZE = 32 * 2 ** 20
 export class ImportError extends Error {
   constructor(code, detail = '') {
     super(detail ? `${code}: ${detail}` : code)
-    this.name = 'ImportError' // by which another script knows it, which has a class of its own
     this.code = code
     this.detail = detail
   }
 }
 
 /** The state that a file holds. @throws {ImportError} */
-export function readFile(text, course) {
+function readFile(text, course) {
   if (text.length > SIZE) throw new ImportError('size')
   let data
   try {
@@ -41,24 +39,29 @@ export function readFile(text, course) {
   }
 }
 
-/** What a text says, as far as it can be read. */
-export function understood(text, course) {
-  let whole = true
-  try {
-    const data = JSON.parse(text)
-    if (data?.coursebuild === 'progress' && data.version > VERSION) return { state: null, trouble: 'newer' }
-    if (data?.coursebuild !== 'progress' || data.version !== VERSION || data.course !== course) return { state: null, trouble: 'damaged' }
-    const state = decode(data, () => {
-      whole = false
-    })
-    return { state, trouble: whole ? null : 'damaged' }
-  } catch {
-    return { state: null, trouble: 'damaged' }
-  }
+/**
+ * Merge what `exportText` gave, here or on another device. Nothing is changed where it throws.
+ * @param {ReturnType<import('./store.js').openProgress>} progress
+ * @param {{restore?: boolean}} options `restore`: bring back what was there before a reset
+ * @returns {{answers: number, lessons: number, restorable: number}} so many answers and lessons are new or other than before; so many
+ *   in the file are not there since they were reset or removed
+ * @throws {ImportError}
+ */
+export function importText(progress, text, { restore = false } = {}) {
+  const file = readFile(text, progress.course)
+  let told = null
+  const done = progress.replace((state, tick) => {
+    const merged = merge(state, file)
+    const made = restore ? restored(merged, file, tick) : merged
+    told = { ...changes(made, state), restorable: missing(made, file) }
+    return made
+  })
+  if (!done) throw new ImportError('full')
+  return told
 }
 
 /** A state in which what a file has and the state has not, since it was reset or removed, is new; `tick` gives its stamps. */
-export function restored(state, file, tick) {
+function restored(state, file, tick) {
   const renew = (have, old) => {
     const entry = { gone: have?.gone ?? 0, values: new Map(have?.values), trials: have?.trials ?? [] }
     for (const [name, value] of old.values) {
@@ -82,7 +85,7 @@ export function restored(state, file, tick) {
 const isMissing = (have, entry) => [...entry.values.keys()].some((name) => !have?.values.has(name))
 
 /** So many answers and lessons of a file are not in a state. */
-export function missing(state, file) {
+function missing(state, file) {
   let count = 0
   for (const [quiz, entries] of file.answers) {
     for (const [key, entry] of entries) count += isMissing(state.answers.get(quiz)?.get(key), entry)
@@ -92,7 +95,7 @@ export function missing(state, file) {
 }
 
 /** So many answers and lessons of a state are new, or other than before. */
-export function changes(state, before) {
+function changes(state, before) {
   const found = { answers: 0, lessons: 0 }
   for (const [quiz, entries] of state.answers) {
     for (const [key, entry] of entries) found.answers += differs(entry, before.answers.get(quiz)?.get(key))

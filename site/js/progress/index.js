@@ -1,15 +1,15 @@
 /**
- * The reader's progress in the pages: marks on maps, the end of lessons, and the pages that are about it.
+ * The reader's progress in the pages: the end of lessons, marks on maps, and the pages that are about it.
  *
  * Entry point: `showProgress(document, words, progress, improve)`. Everything that it shows is drawn again after each change, also one
- * that was made in another tab.
+ * that was made in another tab. What maps and the pages about the reader need comes in scripts of their own, which hand over what is to
+ * be called: `document.dispatchEvent(new CustomEvent('coursebuild:reader', { detail: start }))`.
  */
 
 import { followLesson, showLesson } from './lesson.js'
-import { showMap } from './map.js'
 
-/** What brings the pages about the reader to life, once their own script has come; see reader-page.js. */
-let reader = null
+/** What the page's own script has handed over. */
+let start = null
 
 /**
  * @param {(key: string) => string} words
@@ -21,26 +21,21 @@ export function showProgress(document, words, progress, improve) {
   const ends = []
   const lesson = document.querySelector('[data-progress="lesson"]')
   const id = document.querySelector('main')?.dataset.lesson
-  const begin = () => ends.push(reader(document, { words, progress, improve }))
-  if (document.querySelector(':is([data-progress="overall"], [data-progress="review"])')) {
-    if (reader) begin()
-    else {
-      const start = ({ detail }) => {
-        reader = detail
-        begin()
-      }
-      document.addEventListener('coursebuild:reader', start, { once: true })
-      ends.push(() => document.removeEventListener('coursebuild:reader', start))
-    }
-  } else if (lesson && id) {
+  const begin = () => ends.push(start(document, { words, progress, improve }))
+  if (lesson && id) {
     const draw = () => showLesson(lesson, id, words, progress)
     draw()
     ends.push(progress.onChange(draw), followLesson(document, id, progress))
-  } else if (document.querySelector('[data-mark]')) {
-    const draw = () => showMap(document, words, progress)
-    draw()
-    ends.push(progress.onChange(draw))
-  } else return () => {}
+  } else if (!document.querySelector(':is([data-mark], [data-progress])')) return () => {}
+  else if (start) begin()
+  else {
+    const take = ({ detail }) => {
+      start = detail
+      begin()
+    }
+    document.addEventListener('coursebuild:reader', take, { once: true })
+    ends.push(() => document.removeEventListener('coursebuild:reader', take))
+  }
   // A page that the browser has set aside hears of nothing.
   const again = new AbortController()
   addEventListener('pageshow', ({ persisted }) => persisted && progress.refresh(), { signal: again.signal })

@@ -1,4 +1,8 @@
-/** Marks on the course map and on the pages of levels, and where to go on. */
+/**
+ * Marks on the course map and on the pages of levels, and where to go on.
+ *
+ * Entry point: `showMap(document, { words, progress })`. It gives a function that ends it.
+ */
 
 import { h } from '../lab/page/dom.js'
 import { markOf, nextUp, overview, readQuizzes, totals } from './course.js'
@@ -16,8 +20,13 @@ export function readRows(part) {
   }))
 }
 
-/** Show what is kept in a page that lists lessons; called again after each change. */
-export function showMap(document, words, progress) {
+export function showMap(document, { words, progress }) {
+  const draw = () => drawMap(document, words, progress)
+  draw()
+  return progress.onChange(draw)
+}
+
+function drawMap(document, words, progress) {
   const lessons = readRows(document).filter(({ id }) => id)
   const kept = progress.lessons()
   const { lessons: done } = overview(lessons, progress.all(), kept)

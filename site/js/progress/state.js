@@ -180,6 +180,22 @@ export function decode(data, bad) {
   return merge(state, emptyState())
 }
 
+/** What a kept text says, as far as it can be read, and what is wrong with it: `newer`, `damaged` or `null`. */
+export function understood(text, course) {
+  let whole = true
+  try {
+    const data = JSON.parse(text)
+    if (data?.coursebuild === 'progress' && data.version > VERSION) return { state: null, trouble: 'newer' }
+    if (data?.coursebuild !== 'progress' || data.version !== VERSION || data.course !== course) return { state: null, trouble: 'damaged' }
+    const state = decode(data, () => {
+      whole = false
+    })
+    return { state, trouble: whole ? null : 'damaged' }
+  } catch {
+    return { state: null, trouble: 'damaged' }
+  }
+}
+
 // --- checks
 
 const isObject = (value) => value !== null && typeof value === 'object' && !Array.isArray(value)

@@ -11,12 +11,10 @@
  *    `trouble()` says so. A damaged text is put aside before anything is written; what can be read of it is taken over.
  */
 
-import { changes, ImportError, missing, readFile, restored, understood } from './exchange.js'
 import { counts } from './schedule.js'
-import { answerOf, canonical, emptyState, encode, latest, latestTrials, merge, NOTHING, placeOf, readOf } from './state.js'
+import { answerOf, canonical, emptyState, encode, latest, latestTrials, merge, NOTHING, placeOf, readOf, understood } from './state.js'
 
 export { matchQuestions } from './match.js'
-export { ImportError }
 
 const PREFIX = 'coursebuild.progress.'
 
@@ -222,27 +220,25 @@ class Progress {
     return encode(this.#state, this.#course)
   }
 
+  get course() {
+    return this.#course
+  }
+
   /**
-   * Merge what `exportText` gave, here or on another device. Nothing is changed where it throws.
-   * @param {{restore?: boolean}} options `restore`: bring back what was there before a reset
-   * @returns {{answers: number, lessons: number, restorable: number}} so many answers and lessons are new or other than before; so many
-   *   in the file are not there since they were reset or removed
-   * @throws {ImportError}
+   * Take another state, made of the one that is: `make(state, tick)`, where `tick` gives stamps. See exchange.js.
+   * @returns {boolean} `false` where there is no room for it: then nothing is changed
    */
-  importText(text, { restore = false } = {}) {
-    const file = readFile(text, this.#course)
+  replace(make) {
     this.#read()
     const [state, known, trouble] = [this.#state, this.#text, this.#trouble]
-    let merged = merge(state, file)
-    if (restore) merged = restored(merged, file, () => this.#tick())
-    this.#take(merged)
-    if (encode(merged, this.#course) !== known && !this.#tryWrite() && this.#trouble === 'full') {
+    this.#take(make(state, () => this.#tick()))
+    if (encode(this.#state, this.#course) !== known && !this.#tryWrite() && this.#trouble === 'full') {
       this.#take(state)
       this.#trouble = trouble
-      throw new ImportError('full')
+      return false
     }
     this.#tell(true)
-    return { ...changes(merged, state), restorable: missing(merged, file) }
+    return true
   }
 
   /** Forget everything, here and in other tabs. */

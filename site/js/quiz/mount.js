@@ -31,7 +31,8 @@ export function mountQuestion(element, words, progress = null, { fresh = false }
   const keep = (answer) => {
     const whole = { kind: place.kind, ...answer, number: place.number, lesson: place.lesson }
     progress?.put(place.quiz, place.key, whole)
-    element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail: { quiz: place.quiz, key: place.key, answer: whole } }))
+    const detail = { quiz: place.quiz, key: place.key, answer: whole }
+    element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail }))
   }
   const question = new Question(element, words, keep)
   const kept = fresh ? null : progress?.get(place.quiz, place.key)

@@ -14,9 +14,11 @@ export class Open {
     const id = question.id('entry')
     const changed = () => this.question.result?.finished && this.#marked()
     this.input = h('textarea', { id, class: 'quiz-entry-field', rows: 4, maxLength: 20_000, onchange: changed })
-    this.body = h('div', { class: 'quiz-entry' }, h('label', { class: 'quiz-entry-label', for: id }, this.words('quiz.live.words')), this.input)
+    const label = h('label', { class: 'quiz-entry-label', for: id }, this.words('quiz.live.words'))
+    this.body = h('div', { class: 'quiz-entry' }, label, this.input)
     this.radios = MARKS.map((value) => h('input', { type: 'radio', name: 'mark', value, onchange: () => this.#marked() }))
-    const labels = this.radios.map((radio, i) => h('label', { class: 'option' }, radio, h('span', {}, this.words(`quiz.live.self.${MARKS[i]}`))))
+    const name = (mark) => h('span', {}, this.words(`quiz.live.self.${mark}`))
+    const labels = this.radios.map((radio) => h('label', { class: 'option' }, radio, name(radio.value)))
     this.below = h('fieldset', { class: 'self-mark', hidden: true }, h('legend', {}, this.words('quiz.live.self.how')), ...labels)
   }
 

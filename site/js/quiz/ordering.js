@@ -39,7 +39,8 @@ export class Ordering {
     const up = mover('up', -1)
     const down = mover('down', 1)
     const grip = h('span', { class: 'item-grip', onpointerdown: (event) => this.#draw(key, event) }, shape('grip'))
-    const item = h('li', { class: 'item', onkeydown: (event) => this.#key(key, event) }, h('div', { class: 'item-row' }, grip, text, up, down))
+    const row = h('div', { class: 'item-row' }, grip, text, up, down)
+    const item = h('li', { class: 'item', onkeydown: (event) => this.#key(key, event) }, row)
     item.dataset.key = key
     return { item, text, up, down, grip }
   }

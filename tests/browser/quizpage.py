@@ -1,0 +1,115 @@
+"""What the tests of quizzes share: a lesson with every kind of question, and how it is answered."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from coursekit import block
+from labpage import watched
+from playwright.sync_api import BrowserContext, Locator, Page, expect
+
+PATH = "lessons/1.1-one.html"
+MCQ, SEVERAL, NUMBER, ANGLE, PREDICT, OPEN, OUTPUT, ORDER, BARE = range(9)
+"""The questions, by number."""
+
+QUESTIONS: list[dict[str, Any]] = [
+    {"kind": "mcq", "label": "Length", "q": "Four times as long:",
+     "options": ["the same, $T$", "twice as long, $2T$", "`4*T` or $\\frac{4T}{1}$",
+                 '<b>longer</b> by a <a href="#hello">factor</a>'],
+     "answer": 1, "feedback": ["Not the same.", "The root of four.", "", ""],
+     "hints": ["First $x$.", "Second."], "explain": "Since $T = 2\\pi\\sqrt{\\ell/g}$."},
+    {"kind": "mcq", "q": "What counts?", "options": ["length", "mass", "gravity"],
+     "answer": [0, 2], "feedback": ["", "It cancels.", ""], "explain": "Not mass."},
+    {"kind": "numeric", "id": "inertia", "q": "How much?\n\nAbout $z$.", "answer": 0.08,
+     "tol": 0.0001, "unit": "kg m^2", "hints": ["Where is its centre?"], "explain": "So much."},
+    {"kind": "numeric", "q": "Half of $\\pi$?", "answer": 1.5708, "tol": 0.001, "unit": "rad"},
+    {"kind": "predict", "q": "Released at 2 rad:", "options": ["it rests", "it swings"],
+     "answer": 1, "feedback": ["It does not.", "It does."], "explain": "Gravity pulls.",
+     "sim": {"model": "pendulum", "key": "up", "title": "The swing", "height": 200,
+             "readouts": [{"label": "angle", "expr": "data.qpos[0]"}]}},
+    {"kind": "open", "q": "Why?", "reference": "Since **so**.", "explain": "That is why."},
+    {"kind": "output", "q": "Before you run it:", "of": "examples/a.py", "line": 2,
+     "explain": "Four places."},
+    {"kind": "order", "q": "From short to long:", "items": ["1 m", "$2$ m", "`3` m", "4 m"],
+     "explain": "By length."},
+    {"kind": "predict", "q": "<div><p>Without one?</p></div>", "options": ["yes", "no"],
+     "answer": 0},
+]  # fmt: skip
+LESSON = (
+    "## Hello\n\n"
+    + block("a.py", 'print("one")\nprint("T =", 2.0061, "s")', "one\nT = 2.0061 s", "digits")
+    + "## Check\n\n```quiz\n"
+    + json.dumps({"id": "check", "title": "Check", "questions": QUESTIONS})
+    + "\n```\n\nAfter it.\n"
+)
+KEY = "() => Object.keys(localStorage).find((key) => key.startsWith('coursebuild.progress.'))"
+
+
+def clean_page(context: BrowserContext, site: str) -> Iterator[Page]:
+    """The lesson, with its quiz alive; nothing may go wrong in it."""
+    page, said = watched(context)
+    visit(page, site + PATH)
+    yield page
+    # A page that is left while a lab loads loads no further.
+    assert [text for text in said if "/assets/labs/" not in text] == []
+
+
+def visit(page: Page, address: str) -> None:
+    """Load the page, and come near to its quiz."""
+    page.goto("about:blank")
+    page.goto(address)
+    page.locator(".question").first.scroll_into_view_if_needed()
+    expect(page.locator(".question.is-live")).to_have_count(len(QUESTIONS))
+
+
+def question(page: Page, number: int) -> Locator:
+    return page.locator(".question").nth(number)
+
+
+def verdict(page: Page, number: int) -> Locator:
+    return question(page, number).locator(".verdict")
+
+
+def press(page: Page, number: int, name: str = "Check") -> None:
+    question(page, number).get_by_role("button", name=name, exact=True).click()
+
+
+def kept(page: Page, number: int) -> dict[str, Any] | None:
+    """What is kept of a question."""
+    key = question(page, number).get_attribute("data-question")
+    text = page.evaluate(f"localStorage[({KEY})()] ?? null")
+    entry = json.loads(text)["answers"].get("check", {}).get(key) if text else None
+    found: dict[str, Any] | None = entry and entry["answer"]
+    return found
+
+
+def items(page: Page) -> list[str]:
+    return folded(question(page, ORDER).locator(".item-text"))
+
+
+def folded(found: Locator) -> list[str]:
+    return [" ".join(text.split()) for text in found.all_inner_texts()]
+
+
+def answer_all(page: Page) -> None:
+    """Some right, some wrong, some unreadable."""
+    question(page, MCQ).get_by_role("radio").first.check()
+    press(page, MCQ)
+    question(page, SEVERAL).get_by_role("checkbox").nth(0).check()
+    question(page, SEVERAL).get_by_role("checkbox").nth(2).check()
+    press(page, SEVERAL)
+    question(page, NUMBER).get_by_label("Your answer").fill("1,200")
+    press(page, NUMBER)
+    question(page, ANGLE).get_by_label("Your answer").fill("pi/2")
+    press(page, ANGLE)
+    question(page, PREDICT).get_by_role("radio").first.check()
+    press(page, PREDICT, "Commit to this")
+    question(page, OPEN).get_by_label("Your answer").fill("So.")
+    press(page, OPEN, "Compare")
+    question(page, OPEN).get_by_role("radio", name="In part").check()
+    question(page, OUTPUT).get_by_label("What it prints").fill("one")
+    press(page, OUTPUT)
+    press(page, ORDER)
+    press(page, ORDER, "Show the answer")

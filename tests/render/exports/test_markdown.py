@@ -1,0 +1,151 @@
+"""Blocks written as Markdown read as the same blocks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coursebuild.model import Callout, Document, PlainCode, Target
+from coursebuild.render.exports.markdown import (
+    code_span,
+    escaped,
+    fence,
+    guarded,
+    link,
+    picture,
+    quoted,
+    write_blocks,
+    write_footnotes,
+    write_inlines,
+)
+from coursebuild.render.markup import OwnBlock
+from coursebuild.render.plain import PlainContext, plain_html
+from coursebuild.source import Source
+from coursebuild.syntax.document import parse_document
+
+ROOT = Path(__file__).parents[3]
+SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
+EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
+DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
+
+
+class Context:
+    """Addresses stay as they are written."""
+
+    def href(self, target: Target) -> str:
+        return PlainContext().href(target)
+
+    def url(self, url: str) -> str:
+        return url
+
+    def reference(self, note: int) -> str:
+        return f"[^{note}]"
+
+    def own(self, block: OwnBlock) -> str:
+        if isinstance(block, Callout):
+            title = guarded(write_inlines(block.title, self))
+            return quoted("\n\n".join(filter(None, (title, write_blocks(block.blocks, self)))))
+        assert isinstance(block, PlainCode), f"no test has a {type(block).__name__}"
+        return fence("python", block.code.text)
+
+
+def read(markdown: str) -> Document:
+    return parse_document(Source("a.md", markdown), frozenset({"note"}), lesson=False).value
+
+
+def written(markdown: str) -> str:
+    document = read(markdown)
+    blocks = write_blocks(document.blocks, Context())
+    notes = write_footnotes(document.footnotes, Context())
+    return "\n\n".join(filter(None, (blocks, notes))) + "\n"
+
+
+def meaning(markdown: str) -> str:
+    """Its HTML, as far as white space does not count."""
+    return re.sub(r"\s+", " ", plain_html(read(markdown)))
+
+
+def test_the_examples_of_commonmark_mean_the_same() -> None:
+    examples = EXAMPLE.findall(SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t"))
+    assert len(examples) == 652
+    wrong = [
+        f"{number}: {text!r} became {written(text)!r}"
+        for number, (text, _) in enumerate(examples, 1)
+        if (meaning(text) != meaning(written(text))) is not (number in DIFFERENT)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+PIECES = st.sampled_from(
+    "a|b c|*|**|_|`|``|~~|[|]|(|)|<|>|!|\\*|&amp;|&lt;|$x$|# |- |1. |2) |+ |> |\n|\n\n|  |    |---"
+    "|===|[a](b)|[a](<b c> 't')|![a](b)|<b>|</b>|<!-- c -->|é|字|:|<http://a.b>|%|^|\\\n|```\n"
+    "|> [!note] t\n|[^1]|\n\n[^1]: n\n".split("|")
+)
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.lists(PIECES, max_size=10).map("".join))
+def test_any_text_means_the_same(text: str) -> None:
+    assert plainly(text) == plainly(written(text)), written(text)
+
+
+def plainly(markdown: str) -> str:
+    """Its meaning, but for empty paragraphs and for the word after a fence."""
+    html = re.sub(r' class="language-[^"]*"|<p>\s*</p>', "", meaning(markdown))
+    return re.sub(r"[\s\\]+|<br />", " ", html).strip()
+
+
+@pytest.mark.parametrize(
+    ("markdown", "expected"),
+    [
+        ("# A `b` #\n", "# A `b`\n"),
+        ("C #\n===\n", "# C \\#\n"),
+        ("- a\n- b\n\n* c\n", "- a\n- b\n\n* c\n"),
+        ("3. a\n\n   b\n4. c\n", "3. a\n\n   b\n\n4. c\n"),
+        ("- [x] done\n- [ ] not\n", "- [x] done\n- [ ] not\n"),
+        ("    code\n", "```\ncode\n```\n"),
+        ("````\n```\n````\n", "````\n```\n````\n"),
+        ("a\n***\nb\n", "a\n\n___\n\nb\n"),
+        ("costs \\$5 and `$x`\n", "costs \\$5 and `$x`\n"),
+        ("$$\na\n\\\\ b\n$$\n", "$$\na\n\\\\ b\n$$\n"),
+        ("so $a\n= b$ it\n", "so $a = b$ it\n"),
+        (
+            "| a \\| b | $\\lVert x \\| y$ |\n|:--|--:|\n| `c` | |\n",
+            "| a \\| b | $\\lVert x \\vert{} y$ |\n| :--- | ---: |\n| `c` |  |\n",
+        ),
+        ("a[^x]\n\n[^x]: One.\n\n    Two.\n", "a[^1]\n\n[^1]: One.\n\n    Two.\n"),
+        ("<https://a.example/b>\n", "<https://a.example/b>\n"),
+        ("1986\\. A year\n", "1986\\. A year\n"),
+        ("&lt;b&gt; &amp;amp; \\*\n", "\\<b> \\&amp; \\*\n"),
+    ],
+)
+def test_how_it_is_written(markdown: str, expected: str) -> None:
+    assert written(markdown) == expected
+
+
+def test_lines_that_would_begin_another_block_are_escaped() -> None:
+    text = "# a\n> b\n- c\n+ d\n1. e\n2) f\n===\n---\n~~~\n```\n* * *\n[^1]: g\n-h\n1986 i\n#j"
+    assert guarded(text) == (
+        "\\# a\n\\> b\n\\- c\n\\+ d\n1\\. e\n2\\) f\n\\===\n\\---\n\\~~~\n\\```\n\\* * *\n[^1]\\: g"
+        "\n-h\n1986 i\n#j"
+    )
+
+
+def test_hostile_titles_stay_text() -> None:
+    hostile = "](javascript:alert(1)) <script>&lt; `x` $y$ | ![a](b)"
+    html = plain_html(read(f"{escaped(hostile)}\n"))
+    assert "<script" not in html and "<a" not in html and "<img" not in html
+    assert link(escaped("a]b"), "x y(1).html") == "[a\\]b](<x%20y(1).html>)"
+    assert picture("a]b\nc", "x>y.png", 'say "q"') == '![a\\]b c](<x%3Ey.png> "say \\"q\\"")'
+
+
+@pytest.mark.parametrize(
+    ("text", "span"), [("a", "`a`"), ("a`b", "``a`b``"), ("`", "`` ` ``"), (" a ", "`  a  `")]
+)
+def test_code_spans_hold_any_code(text: str, span: str) -> None:
+    assert code_span(text) == span
+    assert f"<code>{text}</code>" in plain_html(read(f"{span}\n"))

@@ -1,0 +1,229 @@
+"""Contrast of every pair of colours that the style sheets can put together, in both themes.
+
+The style sheets are read as they are written. A text's ground is the background of its own rule
+where that has one, else each of the grounds that boxes have; a tint lies over these. Text must be
+at 7 : 1, all else that carries meaning at 4.5 : 1.
+
+The formulas are those of WCAG 2.2 (relative luminance, contrast ratio) and CSS Color 4 and 5
+(compositing, `color-mix` in sRGB).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+CSS = Path(__file__).parents[2] / "site" / "css"
+SHEETS = sorted(path for path in CSS.glob("*.css") if path.name != "preview.css")
+THEMES = ("light", "dark")
+GROUNDS = ("var(--paper)", "var(--sheet)")
+TRACES = tuple(f"var(--trace-{n})" for n in range(1, 8))
+MEANT = ("var(--rule-firm)", *TRACES)
+"""Colours of lines and marks that tell something."""
+
+Colour = tuple[float, float, float, float]
+"""Red, green, blue and opacity, each from 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    file: str
+    selector: str
+    around: str
+    """The at-rules that it stands in."""
+    declarations: dict[str, str]
+
+
+def rules(text: str, file: str, around: str = "", outer: str = "") -> Iterator[Rule]:
+    """The rules of a style sheet, those inside others after them."""
+    declared = ""
+    at = 0
+    while (start := text.find("{", at)) >= 0:
+        before, _, head = text[at:start].rpartition(";")
+        declared += f"{before};"
+        end, depth = start + 1, 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[end], 0)
+            end += 1
+        body, head = text[start + 1 : end - 1], head.strip()
+        if head.startswith("@"):
+            yield from rules(body, file, f"{around} {head}".strip(), outer)
+        else:
+            yield from rules(body, file, around, f"{outer} {head}".strip())
+        at = end
+    pairs = (part.partition(":") for part in (declared + text[at:]).split(";"))
+    found = {name.strip(): value.strip() for name, _, value in pairs if value.strip()}
+    if outer and found:
+        yield Rule(file, outer, around, found)
+
+
+def without_comments(path: Path) -> str:
+    return re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+ALL = [rule for path in SHEETS for rule in rules(without_comments(path), path.name)]
+PROPERTIES: dict[str, list[str]] = {}
+for _rule in ALL:
+    for _name, _value in _rule.declarations.items():
+        if _name.startswith("--") and "print" not in _rule.around:
+            PROPERTIES.setdefault(_name, []).append(_value)
+
+
+def colours(value: str, theme: str) -> list[Colour]:
+    """What a value can be in a theme: custom properties may be set in several places."""
+    value = value.strip()
+    if match := re.fullmatch(r"var\((--[\w-]+)\)", value):
+        assert match[1] in PROPERTIES, f"{match[1]} is set nowhere"
+        return [found for given in PROPERTIES[match[1]] for found in colours(given, theme)]
+    if match := re.fullmatch(r"light-dark\((.*)\)", value):
+        light, dark = arguments(match[1])
+        return colours(light if theme == "light" else dark, theme)
+    if match := re.fullmatch(r"color-mix\(in srgb, (.*) (\d+)%, transparent\)", value):
+        share = int(match[2]) / 100
+        return [(r, g, b, a * share) for r, g, b, a in colours(match[1], theme)]
+    if match := re.fullmatch(r"#([0-9a-f]{3}|[0-9a-f]{6})", value):
+        digits = match[1] if len(match[1]) == 6 else "".join(2 * digit for digit in match[1])
+        red, green, blue = (int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4))
+        return [(red, green, blue, 1.0)]
+    if match := re.fullmatch(r"rgb\((\d+) (\d+) (\d+) / (\d+)%\)", value):
+        red, green, blue, alpha = (int(part) for part in match.groups())
+        return [(red / 255, green / 255, blue / 255, alpha / 100)]
+    raise AssertionError(f"a colour that this test does not understand: {value}")
+
+
+def arguments(text: str) -> list[str]:
+    parts, depth = [""], 0
+    for character in text:
+        depth += {"(": 1, ")": -1}.get(character, 0)
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def over(top: Colour, ground: Colour) -> Colour:
+    a = top[3]
+    red, green, blue = (a * top[i] + (1 - a) * ground[i] for i in range(3))
+    return red, green, blue, 1.0
+
+
+def luminance(colour: Colour) -> float:
+    parts = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour[:3]]
+    return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+
+def contrast(text: Colour, ground: Colour) -> float:
+    bright, dim = sorted((luminance(over(text, ground)), luminance(ground)), reverse=True)
+    return (bright + 0.05) / (dim + 0.05)
+
+
+def plain(theme: str) -> list[Colour]:
+    return [colour for ground in GROUNDS for colour in colours(ground, theme)]
+
+
+_NO_COLOUR = re.compile(
+    r"inherit|currentcolor|transparent|none|unset|[A-Z]\w+|(url|linear-gradient)\(.*", re.DOTALL
+)
+
+
+def named(rule: Rule, *names: str) -> str | None:
+    """The colour that a rule gives; `None` for none, and for one of the system's."""
+    for name in names:
+        value = rule.declarations.get(name)
+        if value is not None and not _NO_COLOUR.fullmatch(value):
+            return value
+    return None
+
+
+def test_the_formulas() -> None:
+    """Values of the W3C's own examples."""
+    white, black, grey = (colours(value, "light")[0] for value in ("#fff", "#000", "#767676"))
+    assert contrast(black, white) == pytest.approx(21.0)
+    assert contrast(grey, white) == pytest.approx(4.54, abs=0.005)
+    assert over((0, 0, 0, 0.5), white)[:3] == (0.5, 0.5, 0.5)
+    mixed = colours("color-mix(in srgb, light-dark(#fff, #000) 25%, transparent)", "dark")
+    assert mixed == [(0.0, 0.0, 0.0, 0.25)]
+
+
+def test_there_is_something_to_test() -> None:
+    assert sum(named(rule, "color") is not None for rule in ALL) > 60
+    assert {rule.file for rule in ALL} >= {"tokens.css", "code.css", "quiz.css", "lab-live.css"}
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_text(theme: str) -> None:
+    found = []
+    for rule in ALL:
+        text = named(rule, "color")
+        if text is None or "print" in rule.around:
+            continue
+        own = named(rule, "background", "background-color")
+        grounds = plain(theme)
+        if own is not None:
+            grounds = [over(top, below) for top in colours(own, theme) for below in grounds]
+        least = min(contrast(one, ground) for one in colours(text, theme) for ground in grounds)
+        if least < 7:
+            found.append((rule.file, rule.selector, text, own, round(least, 2)))
+    assert found == []
+
+
+WITHOUT_TEXT = ("::before", "::after", "::backdrop", "::-webkit-progress", "::-moz-progress")
+"""Of boxes that are marks themselves."""
+LEAST = {"var(--ink)": 7.0, "var(--ink-soft)": 4.5}
+"""On what is marked for a while: a selection, the target of a link, a line."""
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_text_on_tints(theme: str) -> None:
+    """The text of a box that has a ground of its own and no colour of its own."""
+    found = []
+    for rule in ALL:
+        tint = named(rule, "background", "background-color")
+        if tint is None or "color" in rule.declarations or "print" in rule.around:
+            continue
+        if any(part in rule.selector for part in WITHOUT_TEXT):
+            continue
+        grounds = [over(top, below) for top in colours(tint, theme) for below in plain(theme)]
+        for name, wanted in LEAST.items():
+            least = min(contrast(a, b) for a in colours(name, theme) for b in grounds)
+            if least < wanted:
+                found.append((rule.file, rule.selector, tint, name, round(least, 2)))
+    assert found == []
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_marks_and_lines(theme: str) -> None:
+    """Frames of controls, lines of plots, their labels, the ring around what has the focus."""
+    found = []
+    strokes = {value for rule in ALL for value in _strokes(rule)}
+    assert strokes > {"var(--blue)", "var(--rule-firm)"}
+    for value in sorted({*MEANT, *strokes}):
+        least = min(contrast(a, b) for a in colours(value, theme) for b in plain(theme))
+        if least < 4.5:
+            found.append((value, round(least, 2)))
+    assert found == []
+
+
+def _strokes(rule: Rule) -> Iterator[str]:
+    """Colours of outlines, and of what is drawn, but for quiet rules, which tell nothing."""
+    for name in ("outline", "outline-color", "stroke", "fill", "accent-color"):
+        for value in re.findall(r"var\(--[\w-]+\)", rule.declarations.get(name, "")):
+            if value not in ("var(--rule)", "var(--paper)", "var(--sheet)", "var(--shade)"):
+                yield value
+
+
+def test_print() -> None:
+    """On white paper, in whatever is not black."""
+    found = []
+    for rule in ALL:
+        text = named(rule, "color")
+        if text is not None and "print" in rule.around:
+            least = min(contrast(one, (1, 1, 1, 1)) for one in colours(text, "light"))
+            if least < 7:
+                found.append((rule.file, rule.selector, text, round(least, 2)))
+    assert found == []
