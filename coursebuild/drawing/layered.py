@@ -214,10 +214,10 @@ def _placed(
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
     for placing in range(_PLACINGS):
-        down = placing % 2 == 0
+        down, both = placing % 2 == 0, placing >= _PLACINGS - _BOTH_SIDES
         for level in range(len(rows)) if down else reversed(range(len(rows))):
             row, places = rows[level], steps[level]
-            near = (above, below) if placing >= _PLACINGS - _BOTH_SIDES else ((above if down else below),)
+            near = (above, below) if both else (above,) if down else (below,)
             wanted = [
                 _mean([x[other] for side in near for other in side.get(point, ())], x[point])
                 for point in row

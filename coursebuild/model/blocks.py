@@ -11,8 +11,8 @@ from decimal import Decimal
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from coursebuild.model.inlines import Inline, Label
-from coursebuild.model.lexicon import Lexicon
 from coursebuild.model.interactive import Lab, Quiz
+from coursebuild.model.lexicon import Lexicon
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.values import dataclass, field
 

@@ -342,13 +342,16 @@ def _key(*parts: str) -> str:
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
-    """Links of the built pages that lead nowhere; most are found in the sources already."""
+    """Links of the built pages that lead nowhere; most are found in the sources already.
+
+    What is wrong on a page of the whole course is so on a lesson's page, and is told there.
+    """
     from coursebuild.render.links import check_links
 
     pages = {
         file.path: file.data if isinstance(file, OutputFile) else file.make()
         for file in files
-        if file.path.endswith(".html")
+        if file.path.endswith(".html") and not file.path.startswith(urls.COURSE_PAGES)
     }
     everything = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
     for broken in check_links(everything, base_url):

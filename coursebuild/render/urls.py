@@ -30,8 +30,9 @@ SEARCH_INDEX = "search/index.js"
 """The one file of the search's index whose name is always the same."""
 GLOSSARY = "glossary/index.html"
 SYMBOLS = "symbols/index.html"
-COURSE_PAGE = "course/index.html"
-"""The whole course to be printed, in a folder of the same kind."""
+COURSE_PAGES = "course/"
+"""Where the whole course is, to be printed, in a folder of the same kind."""
+COURSE_PAGE = f"{COURSE_PAGES}index.html"
 EPUB = "course.epub"
 SITEMAP = "sitemap.xml"
 ROBOTS = "robots.txt"
@@ -64,7 +65,7 @@ _WITHOUT_TWIN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
 
 def twin_path(page: str) -> str | None:
     """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
-    if page in _WITHOUT_TWIN or page.startswith("course/"):
+    if page in _WITHOUT_TWIN or page.startswith(COURSE_PAGES):
         return None
     return f"{page.removesuffix('.html')}.md"
 

@@ -17,34 +17,34 @@ test('what was right at the first go does not come back', () => {
 })
 
 test('a missed question comes back the next evening, then later and later, and leaves', () => {
-  let trials = [wrong(START)]
+  let recalls = [wrong(START)]
   let day = START
   const gaps = []
   for (let round = 0; round < 5; round++) {
-    const { box, due } = standing(trials, day)
+    const { box, due } = standing(recalls, day)
     assert.equal(box, round)
     assert.ok(due > day && due < day + WAITS[round] + DAY)
     const next = day + Math.ceil((due - day) / DAY) * DAY
     gaps.push((next - day) / DAY)
     day = next
-    assert.ok(counts(trials, right(day)))
-    trials = [...trials, right(day)]
+    assert.ok(counts(recalls, right(day)))
+    recalls = [...recalls, right(day)]
   }
   assert.deepEqual(gaps, [1, 3, 7, 16, 35])
-  assert.equal(standing(trials, day), null)
+  assert.equal(standing(recalls, day), null)
 })
 
 test('missed again, it starts from the first box', () => {
-  const trials = [wrong(START), right(START + DAY), right(START + 4 * DAY), wrong(START + 11 * DAY)]
-  assert.deepEqual(standing(trials.slice(0, 3), START + 5 * DAY), { box: 2, due: START + 4 * DAY + WAITS[2] })
-  assert.deepEqual(standing(trials, START + 11 * DAY), { box: 0, due: START + 11 * DAY + WAITS[0] })
+  const recalls = [wrong(START), right(START + DAY), right(START + 4 * DAY), wrong(START + 11 * DAY)]
+  assert.deepEqual(standing(recalls.slice(0, 3), START + 5 * DAY), { box: 2, due: START + 4 * DAY + WAITS[2] })
+  assert.deepEqual(standing(recalls, START + 11 * DAY), { box: 0, due: START + 11 * DAY + WAITS[0] })
 })
 
 test('an answer before its day moves nothing and is not kept', () => {
-  const trials = [wrong(START)]
+  const recalls = [wrong(START)]
   const early = right(START + 60_000)
-  assert.deepEqual(standing([...trials, early], START), standing(trials, START))
-  assert.equal(counts(trials, early), false)
+  assert.deepEqual(standing([...recalls, early], START), standing(recalls, START))
+  assert.equal(counts(recalls, early), false)
 })
 
 test('tries that follow each other are one miss; a miss on another day counts', () => {
@@ -73,9 +73,9 @@ test('leaving out what does not count gives the same standing, in random histori
     let [all, kept] = [[], []]
     for (let n = 0; n < 25; n++) {
       at += Math.floor(draw() ** 8 * 30 * DAY)
-      const trial = draw() < 0.6 ? right(at) : wrong(at)
-      all = [...all, trial]
-      if (counts(kept, trial)) kept = [...kept, trial]
+      const recall = draw() < 0.6 ? right(at) : wrong(at)
+      all = [...all, recall]
+      if (counts(kept, recall)) kept = [...kept, recall]
       assert.deepEqual(standing(all, at), standing(kept, at))
     }
   }
@@ -84,13 +84,13 @@ test('leaving out what does not count gives the same standing, in random histori
 test('the agenda has what is due, first boxes first, and counts the rest by day', () => {
   const now = START + 4 * DAY
   const answers = [
-    { key: 'second box', trials: [wrong(START - 9 * DAY), right(START - 3 * DAY)] },
-    { key: 'old', trials: [wrong(START)] },
-    { key: 'older', trials: [wrong(START - DAY)] },
-    { key: 'fresh', trials: [wrong(now)] },
-    { key: 'fresh too', trials: [wrong(now - 1000)] },
-    { key: 'third box', trials: [wrong(START - 9 * DAY), right(START - 3 * DAY), right(now)] },
-    { key: 'never missed', trials: [right(START)] },
+    { key: 'second box', recalls: [wrong(START - 9 * DAY), right(START - 3 * DAY)] },
+    { key: 'old', recalls: [wrong(START)] },
+    { key: 'older', recalls: [wrong(START - DAY)] },
+    { key: 'fresh', recalls: [wrong(now)] },
+    { key: 'fresh too', recalls: [wrong(now - 1000)] },
+    { key: 'third box', recalls: [wrong(START - 9 * DAY), right(START - 3 * DAY), right(now)] },
+    { key: 'never missed', recalls: [right(START)] },
   ]
   const { due, later } = agenda(answers, now)
   assert.deepEqual(due.map(({ key }) => key), ['older', 'old', 'second box'])

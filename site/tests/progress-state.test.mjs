@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
-import { decode, emptyState, encode, LAST_STAMP, latestTrials, merge, NOTHING, StateError, TRIALS } from '../js/progress/state.js'
+import { decode, emptyState, encode, LAST_STAMP, latestRecalls, merge, NOTHING, StateError, RECALLS } from '../js/progress/state.js'
 import { answer, random } from './progress-helpers.mjs'
 
 const text = (state) => encode(state, 'c')
@@ -13,8 +13,8 @@ function anyState(draw) {
   const stamp = () => Math.floor(draw() * 12)
   const entry = (names) => {
     const values = new Map(names.filter(() => draw() < 0.7).map((name) => [name, { stamp: stamp(), ...value(name) }]))
-    const trials = Array.from({ length: Math.floor(draw() * 4) }, () => ({ stamp: stamp(), right: draw() < 0.5, at: stamp() }))
-    return { gone: draw() < 0.2 ? stamp() : 0, values, trials: latestTrials(trials) }
+    const recalls = Array.from({ length: Math.floor(draw() * 4) }, () => ({ stamp: stamp(), right: draw() < 0.5, at: stamp() }))
+    return { gone: draw() < 0.2 ? stamp() : 0, values, recalls: latestRecalls(recalls) }
   }
   const value = (name) => {
     const at = `2026-01-0${1 + Math.floor(draw() * 3)}T00:00:00.000Z`
@@ -53,9 +53,9 @@ test('text is read back as it was, and equal states have equal texts', () => {
   }
 })
 
-test('no more trials are kept than count, and which they are does not depend on the order of merging', () => {
+test('no more recalls are kept than count, and which they are does not depend on the order of merging', () => {
   const many = Array.from({ length: 40 }, (_, n) => ({ stamp: n + 1, right: n % 2 === 0, at: n }))
-  const state = (trials) => ({ ...emptyState(), answers: new Map([['q', new Map([['1', { ...NOTHING, trials }]])]]) })
+  const state = (recalls) => ({ ...emptyState(), answers: new Map([['q', new Map([['1', { ...NOTHING, recalls }]])]]) })
   const parts = [many.slice(0, 15), many.slice(10, 30), many.slice(25)].map(state)
   const all = [
     [0, 1, 2],
@@ -64,7 +64,7 @@ test('no more trials are kept than count, and which they are does not depend on 
   ].map((order) => text(order.map((n) => parts[n]).reduce(merge)))
   assert.equal(new Set(all).size, 1)
   const [kept] = decode(JSON.parse(all[0]), assert.fail).answers.get('q').values()
-  assert.deepEqual(kept.trials.map(({ stamp }) => stamp), Array.from({ length: TRIALS }, (_, n) => 41 - TRIALS + n))
+  assert.deepEqual(kept.recalls.map(({ stamp }) => stamp), Array.from({ length: RECALLS }, (_, n) => 41 - RECALLS + n))
 })
 
 test('an entry that is not as it should be is told by its place, and the others are read', () => {
@@ -85,8 +85,8 @@ test('an entry that is not as it should be is told by its place, and the others 
     { answer: { ...good.answer, given: [[[[['deep']]]]] } },
     { other: { stamp: 1 } },
     { constructor: { stamp: 1 } },
-    { ...good, trials: [[1, true, 1]] },
-    { ...good, trials: 'many' },
+    { ...good, recalls: [[1, true, 1]] },
+    { ...good, recalls: 'many' },
     { ...good, gone: '3' },
   ]
   for (const entry of bad) {

@@ -47,27 +47,27 @@ test('an answer that is none is refused and changes nothing', () => {
   assert.deepEqual(progress.all(), [])
 })
 
-test('a missed question has a trial, tries after it and answers without a verdict have none', () => {
+test('a missed question has a recall, tries after it and answers without a verdict have none', () => {
   const progress = open()
   progress.put('q', 'k', answer({ right: null, tries: 0 }))
   progress.put('q', 'k', answer({ right: false, tries: 1 }))
   progress.now.time += 60_000
   progress.put('q', 'k', answer({ right: false, tries: 1, hints: 1 }))
   progress.put('q', 'k', answer({ right: true, tries: 2, hints: 1 }))
-  const [{ trials, right }] = progress.all()
+  const [{ recalls, right }] = progress.all()
   assert.equal(right, true)
-  assert.deepEqual(trials.map((trial) => trial.right), [false])
+  assert.deepEqual(recalls.map((recall) => recall.right), [false])
 })
 
-test('the same answer again is a trial where the caller says so', () => {
+test('the same answer again is a recall where the caller says so', () => {
   const progress = open()
   progress.put('q', 'k', answer({ right: false }))
   progress.put('q', 'k', answer({ right: true }))
   progress.now.time += 2 * DAY
   progress.put('q', 'k', answer({ right: true }))
-  assert.equal(progress.all()[0].trials.length, 1)
-  progress.put('q', 'k', answer({ right: true }), { trial: true })
-  assert.deepEqual(progress.all()[0].trials.map(({ right }) => right), [false, true])
+  assert.equal(progress.all()[0].recalls.length, 1)
+  progress.put('q', 'k', answer({ right: true }), { recall: true })
+  assert.deepEqual(progress.all()[0].recalls.map(({ right }) => right), [false, true])
 })
 
 test('lessons: how far, where last, read or not', () => {
@@ -157,7 +157,7 @@ test('what a reset took can be brought back from a file, once, and is then like 
   assert.deepEqual(importText(one, file, { restore: true }), { answers: 1, lessons: 2, restorable: 0 })
   assert.deepEqual(importText(one, file, { restore: true }), { answers: 0, lessons: 0, restorable: 0 })
   assert.deepEqual(one.get('q', 'k'), answer({ right: false }))
-  assert.equal(one.all().find(({ key }) => key === 'k').trials.length, 1, 'it comes back for review')
+  assert.equal(one.all().find(({ key }) => key === 'k').recalls.length, 1, 'it comes back for review')
   assert.equal(one.lessons().get('1.1').read, true)
   assert.deepEqual(one.lessons().get('1.2').place.share, 0)
   assert.equal(open(browser).all().length, 2)
@@ -172,15 +172,15 @@ test('a removed answer stays removed where an older state is merged, and can be 
   assert.equal(importText(one, file).answers, 0)
   assert.deepEqual(one.all(), [])
   one.put('q', 'k', answer())
-  assert.deepEqual(one.all()[0].trials, [])
+  assert.deepEqual(one.all()[0].recalls, [])
 })
 
-test('an answer goes by the new key of its question, with its trials, and the old one does not come back', () => {
+test('an answer goes by the new key of its question, with its recalls, and the old one does not come back', () => {
   const progress = open()
   progress.put('q', 'old', answer({ right: false }))
   const file = progress.exportText()
   progress.rename('q', 'old', 'new')
-  assert.deepEqual(progress.all().map(({ key, trials }) => [key, trials.length]), [['new', 1]])
+  assert.deepEqual(progress.all().map(({ key, recalls }) => [key, recalls.length]), [['new', 1]])
   importText(progress, file)
   assert.deepEqual(progress.all().map(({ key }) => key), ['new'])
   progress.put('q', 'third', answer())

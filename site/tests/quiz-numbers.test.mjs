@@ -97,7 +97,7 @@ test('calculations', () => {
 })
 
 test('what can be read in two ways is not guessed', () => {
-  for (const text of ['1/2π', '1/2pi', '1/2 pi', '6/2(1+2)', '1/2 sqrt(3)']) assert.equal(problem(text), 'product', text)
+  for (const text of ['1/2π', '1/2pi', '1/2 pi', '6/2(1+2)', '1/2 sqrt(3)', '3 e-3', '3 e3']) assert.equal(problem(text), 'product', text)
   near('1/(2π)', 1 / (2 * Math.PI))
   near('1/2*pi', Math.PI / 2)
   assert.equal(problem('log(2)'), 'log')

@@ -17,7 +17,7 @@ test('the same unit in many ways', () => {
     'J s²', 'J/(1/s²)', 'kilogram metres^2', 'kg.m^2', 'kg m ^ 2', 'kg m**2', ' kg  m² ']) same(text, 'kg m^2')
   for (const text of ['m/s', 'm s^-1', 'm·s⁻¹', 'm s-1', 'm/s^1', 'm * s^-1', 'meters per second', 'm / s', 'm (s)^-1',
     '(m/s)']) same(text, 'm/s')
-  for (const text of ['rad/s', '1/s', 's^-1', '/s', 'rad s⁻¹', 'radians per second']) same(text, 'rad/s')
+  for (const text of ['rad/s', '1/s', 's^-1', '/s', 'rad s⁻¹', 'rads^-1', 'radians per second']) same(text, 'rad/s')
   for (const text of ['N', 'kg m/s²', 'kg m s^-2', 'newton', 'J/m']) same(text, 'N')
   for (const text of ['Ω', 'Ω', 'ohm', 'V/A', '\\Omega']) same(text, 'Ω')
   for (const text of ['µm', 'μm', 'um', '\\mu m', '\\mu{}m']) same(text, 'm', 1e-6)

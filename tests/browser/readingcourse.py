@@ -152,13 +152,14 @@ BOX = """<mujoco>
 """
 
 
-def course_map(title: str, language: str, base_url: str = "https://example.org/c/") -> str:
+def course_map(title: str, language: str, base_url: str) -> str:
     """A course of one written and one planned lesson."""
+    base = f'base_url = "{base_url}"' if base_url else ""
     return f"""[course]
 title = "{title}"
 summary = "{title} {LONG}"
 language = "{language}"
-base_url = "{base_url}"
+{base}
 
 [[page]]
 id = "about"
@@ -230,9 +231,16 @@ t = 1.25 s
 """
 
 
-def build(folder: Folder, stores: Path, text: str, title: str, language: str) -> Path:
+def build(
+    folder: Folder,
+    stores: Path,
+    text: str,
+    title: str,
+    language: str,
+    base_url: str = "https://example.org/c/",
+) -> Path:
     """A course of one lesson, built; gives the folder of its site."""
-    folder.write("content/course.toml", course_map(title, language))
+    folder.write("content/course.toml", course_map(title, language, base_url))
     folder.borrow(stores)
     folder.write("content/lessons/1.1-one.md", text)
     folder.write("content/pages/about.md", f"{title}\n")

@@ -73,9 +73,13 @@ SAID: dict[Page, list[str]] = {}
 
 
 def quiet(*pages: Page) -> bool:
-    """Nothing was said on the consoles of pages, but that there is no service worker."""
+    """Nothing was said on the consoles of pages, but what a test brings about itself.
+
+    There is no service worker, and an icon may still be loading when the next page is opened.
+    """
     said = [text for page in pages for text in SAID[page]]
-    return [text for text in said if "blocked by Playwright" not in text] == []
+    ours = ("blocked by Playwright", "/assets/icon.")
+    return all(any(part in text for part in ours) for text in said)
 
 
 def mark(page: Page, id: str) -> str:
@@ -89,6 +93,7 @@ def question(page: Page, key: str) -> Locator:
 
 
 def choose(page: Page, found: Locator, option: str) -> None:
+    found.scroll_into_view_if_needed()  # questions come alive when they come near
     found.get_by_label(option, exact=False).check()
     found.locator(".quiz-check").click()
 
@@ -110,8 +115,8 @@ def put(page: Page, *answers: dict[str, object], at: datetime.datetime | None = 
         assert isinstance(quiz, str)
         assert isinstance(key, str)
         entry = {"answer": {"stamp": stamp + number, **answer}}
-        trials = [] if answer["right"] else [[stamp + number, 0, stamp]]
-        quizzes.setdefault(quiz, {})[key] = {**entry, "trials": trials}
+        recalls = [] if answer["right"] else [[stamp + number, 0, stamp]]
+        quizzes.setdefault(quiz, {})[key] = {**entry, "recalls": recalls}
     text = {"coursebuild": "progress", "version": 1, "course": "motion", "reset": 0}
     data = json.dumps({**text, "answers": quizzes, "lessons": {}})
     page.evaluate("([key, data]) => localStorage.setItem(key, data)", [KEY, data])
@@ -125,7 +130,7 @@ def test_at_first_a_page_is_as_it_was_built(calm: BrowserContext, site: str) -> 
     assert page.locator(".start a").inner_text() == "Start with 1.1 Push & <em>pull</em>"
     assert page.locator("[data-mark]").all_text_contents() == [""] * 4
     assert page.evaluate("() => localStorage.length") == 0
-    assert quiet(page)
+    assert quiet(page), SAID[page]
 
 
 def test_answers_and_lessons_show_on_the_map_at_once_in_another_tab(
@@ -323,7 +328,7 @@ def test_wrong_files_change_nothing(
     told = page.locator('[data-control="import"] [role=status]')
     comes(page, lambda: told.inner_text().startswith(message))
     assert kept(page) == before
-    assert quiet(page)
+    assert quiet(page), SAID[page]
 
 
 def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
@@ -384,7 +389,7 @@ def test_without_storage_the_page_works_and_says_so(
     page.goto(site + "progress/")
     page.goto(site)
     assert page.locator(".start a").inner_text().startswith("Start with")
-    assert quiet(page)
+    assert quiet(page), SAID[page]
 
 
 def test_damaged_storage_is_put_aside_and_can_be_saved(
@@ -461,7 +466,7 @@ def test_missed_questions_come_back(calm: BrowserContext, site: str) -> None:
     assert review.locator(".due").inner_text() == "Nothing is due."
     page.goto(site + FALL_PAGE)
     assert question(page, "way").get_by_label("Up").is_checked(), "the lesson shows it too"
-    assert quiet(page)
+    assert quiet(page), SAID[page]
 
 
 def test_a_question_that_cannot_be_fetched_is_linked(calm: BrowserContext, site: str) -> None:

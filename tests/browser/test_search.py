@@ -274,6 +274,16 @@ def test_commands(opened: Opened) -> None:
     page.wait_for_url("**/lessons/1.1-one.html")
 
 
+def test_a_lesson_is_marked_as_read(opened: Opened) -> None:
+    page = opened()
+    button = page.locator('[data-progress="lesson"] button')
+    before = button.inner_text()
+    open_by_key(page)
+    assert ask(page, f"> {before}") == [before]
+    page.keyboard.press("Enter")
+    until(page, "(t) => document.querySelector('[data-progress] button').textContent !== t", before)
+
+
 def test_a_link_to_the_section_is_copied_and_it_is_said(
     opened: Opened, window: BrowserContext
 ) -> None:

@@ -9,6 +9,7 @@ from urllib.parse import unquote
 import pytest
 from archives import entries, formula_mistakes, mistakes, packaging_schema, referred
 from coursekit import GOOD, Done, Folder
+from hostile import HOSTILE, REFUSED
 from lxml import etree
 from qti_rules import MATHML, QTI
 from qti_rules import mistakes as item_mistakes
@@ -238,45 +239,17 @@ def test_names_out_of_any_text(most: int) -> None:
 
 # --- hostile texts
 
-HOSTILE = [
-    "<b>bold <i>both</i></b> & <br> text",
-    "<div><p>a</p>loose <span lang='de'>Wort</span></div>",
-    "<ul><li>one<li>two</ul>",
-    "<table><tr><td>1<td>2<tr><th colspan=2>3</table>",
-    "<table></table><ul></ul><ol></ol><dl></dl>",
-    "<table><caption>C</caption><thead><tr><th>h</th></tr></thead></table>",
-    "<dl><dt>t<dd>d<div><dt>u</dt><dd>v</dd></div></dl>",
-    "<blockquote>text <b>and</b> more</blockquote>",
-    "<h4>head <div>in</div></h4>",
-    "<p>a<sub>1</sub><sup>2</sup> <kbd>k</kbd> <abbr title='X < Y'>xy</abbr></p>",
-    "<pre>a\n <sub>b</sub> <b>c</b></pre>",
-    "<del>no</del> <ins>yes</ins> <mark>m</mark> <u>u</u> <s>s</s>",
-    "<ruby>漢<rp>(</rp><rt>kan</rt><rp>)</rp></ruby>",
-    "<svg width='1'><title>t</title><circle r='1'/></svg> after",
-    "<details><summary>More</summary>hidden $x$</details>",
-    "<a href='https://example.org/?a=1&amp;b=2'>out</a> <a href='#x'>in</a>",
-    "<ol start='5'><li>five</li></ol>",
-    "<img src='sketch.svg' alt='raw'>",
-    "a\u200f\u202eb \ufffe \x0b end",
-    "<math><mi>x</mi><mo>=</mo><mn>1</mn></math>",
-    "<p style='color:red' onclick='alert(1)' data-x='1' id='y'>p</p>",
-    "<b>bold\n\n<div>block</div>\n\n</b>",
-    "</textarea ><i>x</i>]]>&#0; &bogus; &lt;script&gt;",
-    "<custom-element a=1>text</custom-element>",
-    "<figure><img src='sketch.svg' alt=''><figcaption>cap</figcaption></figure>",
-]  # fmt: skip
 
-
-@pytest.mark.parametrize("text", HOSTILE)
-def test_whatever_stands_in_a_text_the_package_is_valid(make: Make, text: str) -> None:
-    question = {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
-                "options": [text, "b"], "answer": 0, "feedback": [text, text]}  # fmt: skip
-    folder = make(GOOD + quiz("a", question, title=text[:60]))
-    done = export(folder)
-    if done.status == 0:
-        check(entries(folder.root / ZIP))
-    else:  # what a page cannot hold either is a mistake of the author's
-        assert "error[" in done.out, done.out + done.err
+def test_whatever_stands_in_a_text_the_package_is_valid(make: Make) -> None:
+    """What a page cannot hold either is a mistake of the author's, and not tried here."""
+    questions = [
+        {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
+         "options": [text, "b"], "answer": 0, "feedback": [text, text]}
+        for text in HOSTILE if text not in REFUSED
+    ]  # fmt: skip
+    folder = make(GOOD + quiz("a", *questions, title="<i>&"))
+    files = package(folder)
+    assert len(items(files)) == len(questions) > 15
 
 
 def test_nothing_is_left_out_in_silence(make: Make) -> None:

@@ -23,6 +23,7 @@ NAMES = Names(
     touch_icon="assets/i.png",
     offline_script="assets/o.js",
     reader_script="assets/r.js",
+    map_script="assets/m.js",
     quiz_script="assets/q.js",
     search_script="assets/f.js",
 )

@@ -140,7 +140,8 @@ def test_the_files(site: dict[str, bytes]) -> None:
 
 def test_names_of_shared_files_are_their_content(site: dict[str, bytes]) -> None:
     for path, data in site.items():
-        if path.startswith("assets/"):
+        # What the search loads is named by what it is made from, before it is made.
+        if path.startswith("assets/") and not path.startswith("assets/search/"):
             assert path.split(".")[-2] == hashlib.sha256(data).hexdigest()[:8]
 
 

@@ -122,4 +122,4 @@ def books(library: Library) -> tuple[Book, ...]:
 
 
 def _level_page(part: Part) -> str:
-    return f"course/{part.id}.html"
+    return f"{urls.COURSE_PAGES}{part.id}.html"

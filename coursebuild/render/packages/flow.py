@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from urllib.parse import urlsplit
 
 from coursebuild.render.packages.formulas import mathml
+from coursebuild.render.packages.pieces import flat, joined, language_of
 from coursebuild.render.packages.tree import BLOCKS, Content, Node, parse_html
 from coursebuild.render.packages.xml import Element, add, element
 from coursebuild.values import dataclass
@@ -38,9 +39,10 @@ _ACTIVE = frozenset(
 )
 _OWN = frozenset({"anchor"})
 """Classes of what a page adds for its own readers."""
+_PARTS = frozenset("caption col colgroup tbody tfoot thead tr".split())
+"""What a table may hold."""
 _SPACE = re.compile(r"[ \t\n\r\f]+")
 _NUMBER = re.compile(r"[0-9]{1,5}")
-_LANGUAGE = re.compile(r"[A-Za-z]{1,8}(?:-[A-Za-z0-9]{1,8})*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,7 @@ class Flow:
         elif name == "p":
             yield from self._blocks(node.children)
         elif name == "pre":
-            made = element("pre", _language(node), *self._line(node.children, pre=True))
+            made = element("pre", language_of(node), *self._line(node.children, pre=True))
             _trim(made)
             yield made
         elif name == "hr":
@@ -112,7 +114,7 @@ class Flow:
             yield from self._table(node)
         elif name == "blockquote":
             inner = list(self._blocks(node.children))
-            yield from [element("blockquote", _language(node), *inner)] if inner else ()
+            yield from [element("blockquote", language_of(node), *inner)] if inner else ()
         elif _holds_form(node):
             self._lose(f"what {tag(node)} holds stays, and does nothing")
             yield from self._blocks(node.children)
@@ -122,12 +124,12 @@ class Flow:
             elif name in _INLINE or name == "a":
                 self._lose(f"{tag(node)} around whole blocks is left out, and they stay")
             inner = list(self._blocks(node.children))
-            yield from [element("div", _language(node), *inner)] if len(inner) > 1 else inner
+            yield from [element("div", language_of(node), *inner)] if len(inner) > 1 else inner
 
     def _lines(self, name: str, node: Node) -> Iterator[Element]:
         """A heading and the like; blocks in it, which HTML does not allow, follow it."""
         inside = [c for c in node.children if not (isinstance(c, Node) and _is_block(c))]
-        made = element(name, _language(node), *self._line(inside))
+        made = element(name, language_of(node), *self._line(inside))
         if len(made) or (made.text or "").strip():
             yield made
         yield from self._blocks(c for c in node.elements if _is_block(c))
@@ -135,7 +137,7 @@ class Flow:
     def _list(self, node: Node) -> Element:
         if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
             self._lose("a numbered list counts from 1")
-        made = element(node.name, _language(node))
+        made = element(node.name, language_of(node))
         for child in node.children:
             if isinstance(child, Node) and child.name == "li":
                 add(made, self._holder("li", child))
@@ -145,7 +147,7 @@ class Flow:
 
     def _holder(self, name: str, node: Node, attributes: dict[str, str] | None = None) -> Element:
         """What may hold lines as well as blocks; a paragraph by itself stands without its box."""
-        made = element(name, _language(node) | (attributes or {}))
+        made = element(name, language_of(node) | (attributes or {}))
         if any(isinstance(c, Node) and _is_block(c) for c in node.children):
             add(made, *self._blocks(node.children))
         else:
@@ -153,8 +155,8 @@ class Flow:
         return made
 
     def _definitions(self, node: Node) -> Iterator[Element]:
-        made = element("dl", _language(node))
-        for child in _flat(node, "div"):
+        made = element("dl", language_of(node))
+        for child in flat(node, "div"):
             if child.name == "dt":
                 add(made, element("dt", {}, *self._line([child])))
             elif child.name == "dd":
@@ -165,30 +167,43 @@ class Flow:
     # --- tables
 
     def _table(self, node: Node) -> Iterator[Element]:
-        """`caption`, `thead`, `tfoot`, then at least one `tbody`, as QTI orders them."""
-        made = element("table", _language(node))
-        parts: dict[str, list[Element]] = {"thead": [], "tfoot": [], "tbody": []}
-        loose: list[Node] = []
-        for child in node.elements:
-            if child.name == "caption":
-                add(made, element("caption", {}, *self._line([child])))
-            elif child.name in parts:
-                rows = [self._row(row) for row in child.elements if row.name == "tr"]
-                parts[child.name] += [element(child.name, {}, *rows)] if rows else []
-            elif child.name == "tr":
-                loose.append(child)
-        if loose:
-            parts["tbody"].append(element("tbody", {}, *map(self._row, loose)))
-        head, foot, body = parts["thead"], parts["tfoot"], parts["tbody"]
-        if not body:  # which QTI requires
-            body, head = [element("tbody", {}, *(row for part in head for row in part))], []
-        if any(len(part) for part in (*head, *foot, *body)):
-            add(made, *head[:1], *foot[:1], *head[1:], *foot[1:], *body)
-            yield made
+        """`caption`, `thead`, `tfoot`, then at least one `tbody`, as QTI orders them.
 
-    def _row(self, row: Node) -> Element:
-        cells = (child for child in row.elements if child.name in ("td", "th"))
-        return element("tr", {}, *(self._cell(cell) for cell in cells))
+        What stands in a table and in none of its cells comes before it, as in a browser.
+        """
+        strays: list[Content] = []
+        captions: list[Node] = []
+        groups: list[tuple[str, list[Element]]] = []
+        for child in node.children:
+            if not isinstance(child, Node) or child.name not in _PARTS:
+                strays.append(child)
+            elif child.name == "caption":
+                captions.append(child)
+            elif child.name == "tr" and (not groups or groups[-1][0] != "tr"):
+                groups.append(("tr", self._rows([child], strays)))
+            elif child.name == "tr":
+                groups[-1][1].extend(self._rows([child], strays))
+            else:
+                groups.append((child.name, self._rows(child.children, strays)))
+        yield from self._blocks([*strays, *captions[1:]])
+        groups = [(name, rows) for name, rows in groups if rows]
+        caption = element("caption", {}, *self._line(captions[:1])) if captions else None
+        if groups:
+            yield element("table", language_of(node), caption, *_grouped(groups))
+        elif caption is not None:
+            yield from self._blocks(captions[:1])
+
+    def _rows(self, content: Iterable[Content], strays: list[Content]) -> list[Element]:
+        """The rows that have cells; what is no row or cell is a stray."""
+        rows: list[Element] = []
+        for row in content:
+            if not isinstance(row, Node) or row.name != "tr":
+                strays.append(row)
+                continue
+            cells = [c for c in row.elements if c.name in ("td", "th")]
+            strays += [c for c in row.children if c not in cells]
+            rows += [element("tr", {}, *map(self._cell, cells))] if cells else []
+        return rows
 
     def _cell(self, cell: Node) -> Element:
         kept = {k: v for k, v in cell.attributes.items() if k in ("colspan", "rowspan")}
@@ -217,7 +232,7 @@ class Flow:
         elif pre and name in _NEVER_IN_PRE and name != "img":
             yield from self._line(inner, pre=pre)
         elif name in _INLINE:
-            yield element(name, _language(node), *self._line(inner, pre=pre))
+            yield element(name, language_of(node), *self._line(inner, pre=pre))
             if name in ("abbr", "acronym", "dfn") and node.attributes.get("title", "").strip():
                 yield f" ({node.attributes['title'].strip()})"
         elif name == "br":
@@ -230,13 +245,13 @@ class Flow:
             self._lose("crossed-out text is marked by a class, which some platforms do not show")
             yield element("span", {"class": STRUCK}, *self._line(inner, pre=pre))
         elif name in _EMPHASIS:
-            yield element("em", _language(node), *self._line(inner, pre=pre))
+            yield element("em", language_of(node), *self._line(inner, pre=pre))
         elif name in _ACTIVE:
             yield from self._active(node)
         elif name in ("ruby", "rt", "rp"):
             yield from self._ruby(node, pre)
-        elif _language(node):
-            yield element("span", _language(node), *self._line(inner, pre=pre))
+        elif language_of(node):
+            yield element("span", language_of(node), *self._line(inner, pre=pre))
         else:
             yield from self._line(inner, pre=pre)
 
@@ -285,6 +300,20 @@ class Flow:
         yield from inner
 
 
+def _grouped(groups: list[tuple[str, list[Element]]]) -> Iterator[Element]:
+    """The rows of a table: one head and one foot at most, and a body, which QTI requires."""
+    found: dict[str, list[Element]] = {}
+    bodies: list[Element] = []
+    bare = all(name in ("thead", "tfoot") for name, _ in groups)
+    for name, rows in groups:
+        if name in ("thead", "tfoot") and name not in found and not bare:
+            found[name] = rows
+        else:
+            bodies.append(element("tbody", {}, *rows))
+    yield from (element(n, {}, *found[n]) for n in ("thead", "tfoot") if n in found)
+    yield from bodies
+
+
 def tag(node: Node) -> str:
     """How an element begins: `<video>`."""
     return f"`<{node.name}>`"
@@ -312,40 +341,3 @@ def _is_block(node: Node) -> bool:
     if node.name in _ACTIVE or node.name in _GONE:
         return False
     return node.name in BLOCKS or any(map(_is_block, node.elements))
-
-
-def _language(node: Node) -> dict[str, str]:
-    said = node.attributes.get("lang", "")
-    return {"xml:lang": said} if _LANGUAGE.fullmatch(said) else {}
-
-
-def _flat(node: Node, name: str) -> Iterator[Node]:
-    """The elements in one, those in groups of a name as well."""
-    for child in node.elements:
-        if child.name == name:
-            yield from _flat(child, name)
-        else:
-            yield child
-
-
-def joined(content: Iterable[Content]) -> list[Content]:
-    """Content in which formulas that were cut so that a line may break in them are whole again."""
-    made: list[Content] = []
-    for child in content:
-        last = made[-1] if made else None
-        if isinstance(child, Node):
-            child = Node(child.name, child.attributes, joined(child.children))
-        if _is_formula(child) and _is_formula(last):
-            assert isinstance(last, Node) and isinstance(child, Node)
-            made[-1] = Node("math", last.attributes, [*last.children, *child.children])
-        else:
-            made.append(child)
-    return made
-
-
-def _is_formula(content: Content | None) -> bool:
-    return (
-        isinstance(content, Node)
-        and content.name == "math"
-        and content.attributes.get("display") != "block"
-    )

@@ -59,14 +59,16 @@ _LENGTH = re.compile(r"[+-]?\d*\.?\d+(?:%|em|ex|px|in|cm|mm|pt|pc)?|\w+mathspace
 
 def mathml(node: Node) -> Element:
     """A formula, with the prefix `m`."""
-    return _made(node)
+    made = element("m:math", _kept(node, "math"))
+    _fill(made, node, "math")
+    return made
 
 
 def _made(node: Node) -> Element:
-    name = node.name if node.name in _ATTRIBUTES else "mrow"
+    name = node.name if node.name in _ATTRIBUTES and node.name != "math" else "mrow"
     made = element(f"m:{name}", _kept(node, name))
     _fill(made, node, name)
-    if "border:" in node.attributes.get("style", "") and name != "math":
+    if "border:" in node.attributes.get("style", ""):
         return element("m:menclose", {"notation": "box"}, made)
     return made
 

@@ -14,7 +14,6 @@ are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Mode
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable, Iterable
 from typing import assert_never
 from urllib.parse import unquote, urlsplit
 
@@ -31,6 +30,20 @@ from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.packages.flow import Flow, Places
 from coursebuild.render.packages.formulas import NAMESPACE as MATHML
+from coursebuild.render.packages.processing import (
+    EXPLANATION,
+    FEEDBACK,
+    RESPONSE,
+    SCORE,
+    Parts,
+    compared,
+    declared,
+    double,
+    feedback,
+    matches,
+    processing,
+    response,
+)
 from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
 from coursebuild.render.quizzes import letter, output_line, shuffle, unit_html
 from coursebuild.source import Span
@@ -41,8 +54,6 @@ SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/imsqti_v2p1.xsd"
 STYLE = "style.css"
 NAME = 32
 """Characters that an identifier should have at most, for systems that keep no more."""
-
-_RESPONSE, _SCORE, _FEEDBACK, _EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,18 +140,18 @@ class _Writer:
         add(root, element("stylesheet", {"href": f"../{STYLE}", "type": "text/css"}))
         add(root, self._body(question, parts))
         explanation = self._explanation(question)
-        says = [_EXPLANATION] if explanation is not None else []
-        add(root, _processing(parts, says))
+        says = [EXPLANATION] if explanation is not None else []
+        add(root, processing(parts, says))
         add(root, *parts.feedback, explanation)
         return MadeItem(name, document(root), tuple(self.pictures))
 
     def _outcomes(self) -> tuple[Element, Element]:
         zero = element("defaultValue", {}, element("value", {}, "0"))
-        score = element("outcomeDeclaration", _declared(_SCORE, "single", "float"), zero)
+        score = element("outcomeDeclaration", declared(SCORE, "single", "float"), zero)
         score.set("normalMaximum", "1")
-        return score, element("outcomeDeclaration", _declared(_FEEDBACK, "multiple", "identifier"))
+        return score, element("outcomeDeclaration", declared(FEEDBACK, "multiple", "identifier"))
 
-    def _body(self, question: AnyQuestion, parts: _Parts) -> Element:
+    def _body(self, question: AnyQuestion, parts: Parts) -> Element:
         body = element("itemBody", {}, *self._blocks(question.text), *parts.before)
         for number, hint in enumerate(question.hints, 1):
             title = self.page.tools.words("package.hint", n=number)
@@ -161,7 +172,7 @@ class _Writer:
                 words = self.page.tools.words("package.simulation")
                 inner.append(element("p", {}, element("a", {"href": address}, words)))
                 self.flow.lost.append("its simulation is on its page alone, and the item links it")
-        return _feedback(_EXPLANATION, inner) if inner else None
+        return feedback(EXPLANATION, inner) if inner else None
 
     # --- texts
 
@@ -197,7 +208,7 @@ class _Writer:
 
     # --- kinds of questions
 
-    def _parts(self, question: AnyQuestion) -> _Parts | None:
+    def _parts(self, question: AnyQuestion) -> Parts | None:
         match question:
             case ChoiceQuestion():
                 return self._choice(question)
@@ -212,72 +223,72 @@ class _Writer:
             case _:
                 assert_never(question)
 
-    def _choice(self, question: ChoiceQuestion) -> _Parts:
+    def _choice(self, question: ChoiceQuestion) -> Parts:
         names = [letter(index) for index in range(len(question.options))]
         choices = [
             element("simpleChoice", {"identifier": name}, *self._text(option.text))
             for name, option in zip(names, question.options, strict=True)
         ]
-        feedback = [
-            _feedback(name, self._blocks(option.feedback), title=name)
+        said = [
+            feedback(name, self._blocks(option.feedback), title=name)
             for name, option in zip(names, question.options, strict=True)
             if option.feedback
         ]
         most = "0" if question.several else "1"
-        given = {"responseIdentifier": _RESPONSE, "shuffle": "false", "maxChoices": most}
+        given = {"responseIdentifier": RESPONSE, "shuffle": "false", "maxChoices": most}
         cardinality = "multiple" if question.several else "single"
         right = [names[index] for index in question.answers]
-        return _Parts(
-            _response(cardinality, "identifier", right),
+        return Parts(
+            response(cardinality, "identifier", right),
             (element("choiceInteraction", given, *choices),),
             before=(self._said("package.choose_all"),) if question.several else (),
-            test=_matches,
-            feedback=tuple(feedback),
-            chosen=bool(feedback),
+            test=matches,
+            feedback=tuple(said),
+            chosen=bool(said),
         )
 
-    def _numeric(self, question: NumericQuestion) -> _Parts:
-        field = element("textEntryInteraction", {"responseIdentifier": _RESPONSE})
+    def _numeric(self, question: NumericQuestion) -> Parts:
+        field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
         field.set("expectedLength", "12")
         line = element("p", {}, field)
         if question.unit:
             add(line, " ", *self.flow.line(unit_html(question.unit)))
-        within = _double(question.tolerance)
+        within = double(question.tolerance)
 
         def test() -> Element:
             how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
-            return element("equal", how, *_compared())
+            return element("equal", how, *compared())
 
-        return _Parts(_response("single", "float", [_double(question.answer)]), (line,), test=test)
+        return Parts(response("single", "float", [double(question.answer)]), (line,), test=test)
 
-    def _output(self, question: OutputQuestion) -> _Parts | None:
+    def _output(self, question: OutputQuestion) -> Parts | None:
         answer = output_line(self.page, question.script, question.line)
         if answer is None:
             self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
             return None
         asked = self._said("package.output_of", path=question.script, line=question.line)
         size = str(min(max(len(answer), 12), 80))
-        field = element("textEntryInteraction", {"responseIdentifier": _RESPONSE})
+        field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
         field.set("expectedLength", size)
-        return _Parts(
-            _response("single", "string", [answer]),
+        return Parts(
+            response("single", "string", [answer]),
             (element("p", {}, field),),
             before=(asked,),
-            test=lambda: element("stringMatch", {"caseSensitive": "true"}, *_compared()),
+            test=lambda: element("stringMatch", {"caseSensitive": "true"}, *compared()),
         )
 
-    def _open(self, question: OpenQuestion) -> _Parts:
+    def _open(self, question: OpenQuestion) -> Parts:
         reference = [self._said("package.reference"), *self._blocks(question.reference)]
-        given = {"responseIdentifier": _RESPONSE, "expectedLines": "6"}
-        return _Parts(
-            _response("single", "string", ()),
+        given = {"responseIdentifier": RESPONSE, "expectedLines": "6"}
+        return Parts(
+            response("single", "string", ()),
             (
                 element("rubricBlock", {"view": "scorer"}, *reference),
                 element("extendedTextInteraction", given),
             ),
         )
 
-    def _order(self, question: OrderQuestion) -> _Parts:
+    def _order(self, question: OrderQuestion) -> Parts:
         shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
         names = {index: letter(place) for place, index in enumerate(shown)}
         choices = [
@@ -287,86 +298,17 @@ class _Writer:
             for index in shown
         ]
         right = [names[index] for index in range(len(question.items))]
-        given = {"responseIdentifier": _RESPONSE, "shuffle": "false"}
-        return _Parts(
-            _response("ordered", "identifier", right),
+        given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
+        return Parts(
+            response("ordered", "identifier", right),
             (element("orderInteraction", given, *choices),),
             before=(self._said("package.order"),),
-            test=_matches,
+            test=matches,
         )
 
     def _text(self, text: tuple[object, ...]) -> list[Element | str]:
         return self.flow.line(self.page.inlines(text))  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    """What differs between the kinds of questions."""
-
-    response: Element
-    interaction: tuple[Element, ...]
-    before: tuple[Element, ...] = ()
-    """What to do, between the question and its hints."""
-    test: Callable[[], Element] | None = None
-    """An expression that is true for a right response; `None`: a person scores."""
-    feedback: tuple[Element, ...] = ()
-    chosen: bool = False
-    """Whether feedback is named by what was chosen."""
-
-
 def _is_file(path: str) -> bool:
     return path.startswith("files/") or path.startswith("models/")
-
-
-def _declared(name: str, cardinality: str, base: str) -> dict[str, str]:
-    return {"identifier": name, "cardinality": cardinality, "baseType": base}
-
-
-def _response(cardinality: str, base: str, right: Iterable[str]) -> Element:
-    """A declaration of the response, with the right one where there is one."""
-    values = [element("value", {}, value) for value in right]
-    made = element("responseDeclaration", _declared(_RESPONSE, cardinality, base))
-    add(made, element("correctResponse", {}, *values) if values else None)
-    return made
-
-
-def _compared() -> tuple[Element, Element]:
-    """The response and the right one, which take part in a comparison."""
-    given = {"identifier": _RESPONSE}
-    return element("variable", given), element("correct", given)
-
-
-def _matches() -> Element:
-    return element("match", {}, *_compared())
-
-
-def _feedback(name: str, content: list[Element], title: str = "") -> Element:
-    given = {"outcomeIdentifier": _FEEDBACK, "identifier": name, "showHide": "show"}
-    return element("modalFeedback", given | ({"title": title} if title else {}), *content)
-
-
-def _processing(parts: _Parts, says: list[str]) -> Element:
-    """The points, and what is said."""
-    made = element("responseProcessing")
-    if parts.test is not None:
-        right = element("responseIf", {}, parts.test(), _set(_SCORE, _value("float", "1")))
-        wrong = element("responseElse", {}, _set(_SCORE, _value("float", "0")))
-        add(made, element("responseCondition", {}, right, wrong))
-    said = [element("variable", {"identifier": _RESPONSE})] if parts.chosen else []
-    said += [_value("identifier", name) for name in says]
-    if said:
-        add(made, _set(_FEEDBACK, element("multiple", {}, *said)))
-    return made
-
-
-def _set(name: str, value: Element) -> Element:
-    return element("setOutcomeValue", {"identifier": name}, value)
-
-
-def _value(base: str, text: str) -> Element:
-    return element("baseValue", {"baseType": base}, text)
-
-
-def _double(value: float) -> str:
-    """As XML Schema writes a number, digit by digit; zero has no sign."""
-    return repr(float(value) + 0.0)

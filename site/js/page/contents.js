@@ -44,7 +44,7 @@ export function followContents(document) {
     marked?.removeAttribute('aria-current')
     link?.setAttribute('aria-current', 'location')
     marked = link
-    if (link) keepInSight(link)
+    keepInSight(link, links[0])
   }
   const later = () => {
     if (!waiting) requestAnimationFrame(mark)
@@ -61,10 +61,11 @@ export function followContents(document) {
 }
 
 /** Scrolls a long list to its entry, but not away from somebody who goes through it by the keyboard. */
-function keepInSight(link) {
-  const list = link.closest('.toc')
+function keepInSight(link, first) {
+  const list = first.closest('.toc')
   if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
-  list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
+  if (link) list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
+  else list.scrollTop = 0
 }
 
 /** At the end of a page the last heading in sight counts, however low it stands. */

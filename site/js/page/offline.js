@@ -48,9 +48,7 @@ export function workingRoot({ document, location, navigator, isSecureContext }) 
  * @param {object} wish see `visit` in service-worker.js
  * @param {(told: object) => void} tell how far it is, and in the end (`end`) what came of it
  */
-export function visit({ document, location, navigator }, worker, wish, tell) {
-  const labs = [...document.querySelectorAll('[data-lab]:has(.lab-live)')].flatMap((lab) => [lab.dataset.script, lab.dataset.config])
-  const pictures = [...document.images].filter((image) => image.complete).map((image) => image.currentSrc)
+export function visit({ location, navigator, performance }, worker, wish, tell) {
   const { port1, port2 } = new MessageChannel()
   port1.onmessage = ({ data }) => {
     if (data.end) port1.close()
@@ -59,7 +57,7 @@ export function visit({ document, location, navigator }, worker, wish, tell) {
   const asked = {
     coursebuild: 'visit',
     pages: [location.href.split('#')[0]],
-    uses: [...labs, ...pictures].filter(Boolean).map((address) => new URL(address, document.baseURI).href),
+    uses: performance.getEntriesByType('resource').map(({ name }) => name),
     sparing: isSparing(navigator.connection),
     look: false,
     ...wish,

@@ -4,7 +4,7 @@
  * Entry points: `readQuizzes`, `overview`, `totals`, `markOf`, `nextUp`. All of it is pure.
  */
 
-import { matchQuestions } from './match.js'
+import { answersByQuiz, matchQuestions } from './match.js'
 
 /**
  * The questions that a page says a lesson has: `ID:KEY,KEY ID:…`, ids percent-encoded.
@@ -37,8 +37,7 @@ export function readQuizzes(text) {
  *   question is there, each with the `page` that has it and the `question` as it is now
  */
 export function overview(lessons, answers, kept) {
-  const byQuiz = new Map()
-  for (const answer of answers) byQuiz.set(answer.quiz, [...(byQuiz.get(answer.quiz) ?? []), answer])
+  const byQuiz = answersByQuiz(answers)
   const done = new Map()
   const placed = []
   const orphans = { answers: [], lessons: [] }

@@ -63,11 +63,11 @@ export function importText(progress, text, { restore = false } = {}) {
 /** A state in which what a file has and the state has not, since it was reset or removed, is new; `tick` gives its stamps. */
 function restored(state, file, tick) {
   const renew = (have, old) => {
-    const entry = { gone: have?.gone ?? 0, values: new Map(have?.values), trials: have?.trials ?? [] }
+    const entry = { gone: have?.gone ?? 0, values: new Map(have?.values), recalls: have?.recalls ?? [] }
     for (const [name, value] of old.values) {
       if (!entry.values.has(name)) entry.values.set(name, { ...value, stamp: tick() })
     }
-    if (!have?.values.size) entry.trials = old.trials.map((trial) => ({ ...trial, stamp: tick() }))
+    if (!have?.values.size) entry.recalls = old.recalls.map((recall) => ({ ...recall, stamp: tick() }))
     return entry
   }
   const answers = new Map(state.answers)

@@ -16,7 +16,7 @@ export function readRows(part) {
     quizzes: readQuizzes(row.dataset.quizzes),
     row,
     link: row.querySelector('a[href]'),
-    planned: row.dataset.status === 'planned',
+    planned: row.classList.contains('row-planned'),
   }))
 }
 

@@ -22,3 +22,14 @@ export function matchQuestions(kept, present) {
   })
   return { found, orphans }
 }
+
+/** Answers by the id of their quiz. @template {{quiz: string}} K @param {K[]} answers @returns {Map<string, K[]>} */
+export function answersByQuiz(answers) {
+  const found = new Map()
+  for (const answer of answers) {
+    const same = found.get(answer.quiz)
+    if (same) same.push(answer)
+    else found.set(answer.quiz, [answer])
+  }
+  return found
+}

@@ -26,7 +26,8 @@ export function showOrphans(place, orphans, words, progress) {
 
 function answerText({ quiz, number, lesson, right }, words) {
   const verdict = words(`progress.live.${right === null ? 'open' : right ? 'right' : 'wrong'}`)
-  return `${say(words, 'progress.live.orphan_answer', { number, quiz, lesson })} (${verdict})`
+  const name = lesson ? 'orphan_answer' : 'orphan_of_page'
+  return `${say(words, `progress.live.${name}`, { number, quiz, lesson })} (${verdict})`
 }
 
 function forgetButton(text, forget, words) {

@@ -105,9 +105,9 @@ class Review {
     if (item.key !== item.question) progress.rename(item.quiz, item.key, item.question)
     const keep = {
       put: (quiz, key, answer) => {
-        const trial = last === null || last.tries !== answer.tries || last.right !== answer.right
+        const recall = last === null || last.tries !== answer.tries || last.right !== answer.right
         last = answer
-        progress.put(quiz, key, { ...answer, lesson: item.lesson }, { trial })
+        progress.put(quiz, key, { ...answer, lesson: item.lesson }, { recall })
         if (answer.right === null) return
         if (first) {
           this.answered += 1

@@ -16,16 +16,16 @@ const DAY = 24 * HOUR
 export const WAITS = Object.freeze([1, 3, 7, 16, 35].map((days) => days * DAY - 4 * HOUR))
 
 /**
- * Where a question stands after some trials, which are in order.
- * @param {{right: boolean, at: number}[]} trials times in ms
+ * Where a question stands after some recalls, which are in order.
+ * @param {{right: boolean, at: number}[]} recalls times in ms
  * @param {number} now ms
  * @returns {{box: number, due: number} | null} box from 0, and when it is due, ms; `null` where it need not come back
  */
-export function standing(trials, now) {
+export function standing(recalls, now) {
   let box = -1
   let due = 0
   let missed = -Infinity
-  for (const { right, at } of trials) {
+  for (const { right, at } of recalls) {
     // A clock was ahead: nobody knows how long ago it was. It has its turn now.
     const time = at > now + DAY ? null : at
     if (right && box >= 0 && (time === null || time >= due)) {
@@ -41,24 +41,24 @@ export function standing(trials, now) {
   return box < 0 ? null : { box, due }
 }
 
-/** Whether another trial changes when its question comes back: others need not be kept. */
-export function counts(trials, trial) {
-  const before = standing(trials, trial.at)
-  const after = standing([...trials, trial], trial.at)
+/** Whether another recall changes when its question comes back: others need not be kept. */
+export function counts(recalls, recall) {
+  const before = standing(recalls, recall.at)
+  const after = standing([...recalls, recall], recall.at)
   return before?.box !== after?.box || before?.due !== after?.due
 }
 
 /**
  * The questions that are due, those of the first boxes first, and how many come later.
  * @template T
- * @param {(T & {trials: {right: boolean, at: number}[]})[]} answers
+ * @param {(T & {recalls: {right: boolean, at: number}[]})[]} answers
  * @returns {{due: (T & {box: number, due: number})[], later: {days: number, count: number}[]}} `later`: in so many days so many
  */
 export function agenda(answers, now) {
   const due = []
   const later = new Map()
   for (const answer of answers) {
-    const place = standing(answer.trials, now)
+    const place = standing(answer.recalls, now)
     if (place === null) continue
     if (place.due <= now) due.push({ ...answer, box: place.box, due: place.due })
     else {

@@ -12,7 +12,7 @@
  */
 
 import { counts } from './schedule.js'
-import { answerOf, canonical, emptyState, encode, latest, latestTrials, merge, NOTHING, placeOf, readOf, understood } from './state.js'
+import { answerOf, canonical, emptyState, encode, latest, latestRecalls, merge, NOTHING, placeOf, readOf, understood } from './state.js'
 
 export { matchQuestions } from './match.js'
 
@@ -88,33 +88,33 @@ class Progress {
   }
 
   /**
-   * Note an answer. A verdict after another number of tries than before, or another verdict, is a trial for the review; `trial` says
+   * Note an answer. A verdict after another number of tries than before, or another verdict, is a recall for the review; `recall` says
    * so where whoever calls knows better.
    * @param {Answer} answer
    */
-  put(quiz, key, answer, { trial } = {}) {
+  put(quiz, key, answer, { recall } = {}) {
     const now = this.#now()
     const value = answerOf({ ...answer, given: structuredClone(answer.given), at: answer.at ?? new Date(now).toISOString() })
     this.#read()
     const entry = this.#state.answers.get(quiz)?.get(key) ?? NOTHING
     const before = entry.values.get('answer')
-    if (before && !trial && canonical({ ...value, at: before.at }) === canonical(plain(before))) return
-    const told = trial ?? (before?.tries !== value.tries || before?.right !== value.right)
+    if (before && !recall && canonical({ ...value, at: before.at }) === canonical(plain(before))) return
+    const told = recall ?? (before?.tries !== value.tries || before?.right !== value.right)
     const made = { stamp: this.#tick(now), right: value.right, at: now }
-    const kept = told && value.right !== null && counts(entry.trials, made)
+    const kept = told && value.right !== null && counts(entry.recalls, made)
     const values = new Map(entry.values).set('answer', { stamp: made.stamp, ...value })
-    const trials = kept ? latestTrials([...entry.trials, made]) : entry.trials
-    this.#setAnswer(quiz, key, { gone: entry.gone, values, trials })
+    const recalls = kept ? latestRecalls([...entry.recalls, made]) : entry.recalls
+    this.#setAnswer(quiz, key, { gone: entry.gone, values, recalls })
     this.#write()
   }
 
-  /** All answers, each with its trials. */
+  /** All answers, each with its recalls. */
   all() {
     const found = []
     for (const [quiz, entries] of this.#known.answers) {
-      for (const [key, { values, trials }] of entries) {
+      for (const [key, { values, recalls }] of entries) {
         const answer = values.get('answer')
-        if (answer) found.push({ quiz, key, ...plain(answer), trials })
+        if (answer) found.push({ quiz, key, ...plain(answer), recalls })
       }
     }
     return found
@@ -135,7 +135,7 @@ class Progress {
     if (!old?.values.size || have.values.size || from === to) return
     const stamped = (value) => ({ ...value, stamp: this.#tick() })
     const values = new Map([...old.values].map(([name, value]) => [name, stamped(value)]))
-    this.#setAnswer(quiz, to, { gone: have.gone, values, trials: old.trials.map(stamped) })
+    this.#setAnswer(quiz, to, { gone: have.gone, values, recalls: old.recalls.map(stamped) })
     this.#setAnswer(quiz, from, { ...NOTHING, gone: this.#tick() })
     this.#write()
   }

@@ -22,7 +22,7 @@ export class Choices {
     const input = h('input', { type: this.several ? 'checkbox' : 'radio', name: 'option', value: item.dataset.key })
     const text = h('span', { class: 'option-text' }, ...item.childNodes)
     const mark = h('span', { class: 'option-mark' })
-    item.append(h('label', { class: 'option' }, input, text, mark))
+    item.append(h('label', { class: 'option' }, input, h('span', { class: 'option-body' }, text, ' ', mark)))
     return { key: item.dataset.key, item, input, text, mark }
   }
 

@@ -18,6 +18,7 @@ class Entry {
     this.input = h('input', {
       id: ids.input,
       type: 'text',
+      dir: 'ltr',
       class: code ? 'quiz-entry-field quiz-entry-code' : 'quiz-entry-field',
       autocomplete: 'off',
       autocapitalize: 'off',
@@ -87,8 +88,8 @@ export class Numeric extends Entry {
 
   /** How the entry was understood. */
   #read(value) {
-    const unit = this.unit ? [' ', h('span', {}, ...copyOf(this.unit))] : []
-    return h('p', { class: 'quiz-entry-read' }, fill(this.words('quiz.live.read_as'), { value: formatLabel(value) }), ...unit)
+    const unit = this.unit ? [' ', ...copyOf(this.unit)] : []
+    return h('p', { class: 'quiz-entry-read' }, `${this.words('quiz.live.read_as')} `, h('bdi', { dir: 'ltr' }, formatLabel(value), ...unit))
   }
 }
 

@@ -8,7 +8,7 @@
  *    as code.
  * 3. The first name that is no function and no constant begins the unit, which goes on to the end.
  *
- * What can be read in two ways is not guessed: `1,200`, and `1/2π`.
+ * What can be read in two ways is not guessed: `1,200`, `1/2π`, and `3 e-3`.
  */
 
 import { normalise, numeralEnd, readNumeral } from './numbers.js'
@@ -112,6 +112,7 @@ class Reader {
         const from = this.#at
         if (/^1 ?\//.test(this.#text.slice(from)) && this.#inside === 0 && this.#startsUnit(from + 1, '/')) return value
         if (numeralEnd(this.#text, from) > from) throw new Unread('numbers', this.#text)
+        if (/^e[-+]?\d/.test(this.#text.slice(from))) throw new Unread('product', this.#text)
         const factor = this.#power()
         if (divided) throw new Unread('product', this.#text.slice(0, this.#at))
         value *= factor

@@ -13,7 +13,7 @@ export class Open {
     this.submit = this.words('quiz.live.compare')
     const id = question.id('entry')
     const changed = () => this.question.result?.finished && this.#marked()
-    this.input = h('textarea', { id, class: 'quiz-entry-field', rows: 4, maxLength: 20_000, onchange: changed })
+    this.input = h('textarea', { id, class: 'quiz-entry-field', dir: 'auto', rows: 4, maxLength: 20_000, onchange: changed })
     const label = h('label', { class: 'quiz-entry-label', for: id }, this.words('quiz.live.words'))
     this.body = h('div', { class: 'quiz-entry' }, label, this.input)
     this.radios = MARKS.map((value) => h('input', { type: 'radio', name: 'mark', value, onchange: () => this.#marked() }))

@@ -140,12 +140,16 @@ export class Question {
       event.preventDefault()
       this.check()
     }
-    const fields = h('fieldset', {}, ...this.#legend(), element.querySelector('.question-how'), control.body)
+    const how = element.querySelector(':scope > .question-how')
+    if (how) how.id = this.id('how')
+    const legend = this.#legend()
+    const described = [how, ...legend].filter((part) => part?.id).map((part) => part.id)
+    const fields = h('fieldset', { 'aria-describedby': described.join(' ') || null }, ...legend, how, control.body)
     fields.addEventListener('input', () => this.touched())
     const actions = h('div', { class: 'question-actions' }, this.checking, this.revealing, this.retrying)
-    const form = h('form', { class: 'question-form', noValidate: true, autocomplete: 'off', onsubmit: submit }, fields)
-    form.append(...this.#takeHints(), actions, this.verdict, ...(control.below ? [control.below] : []))
-    this.fold.before(form)
+    this.form = h('form', { class: 'question-form', noValidate: true, autocomplete: 'off', onsubmit: submit }, fields)
+    this.form.append(...this.#takeHints(), actions, this.verdict, ...(control.below ? [control.below] : []))
+    this.fold.before(this.form)
     element.classList.add('is-live')
     this.#set(null)
   }
@@ -193,12 +197,19 @@ export class Question {
       fold.append(...this.home.filter((part) => !said.includes(part)))
       verdict.replaceChildren(...said)
     }
-    if (this.simulation) (over ? verdict : fold.lastElementChild).after(this.simulation)
+    if (this.simulation) this.#place(over)
     fold.classList.toggle('is-empty', fold.childElementCount === 1)
     control.mark(result)
     this.checking.setAttribute('aria-disabled', String(over))
     setHidden(this.retrying, !over || Boolean(control.final), this.checking)
     setHidden(this.revealing, over || this.tries === 0 || Boolean(control.final || control.stays), over ? this.retrying : this.checking)
+  }
+
+  /** The simulation, outside of the form: what is pressed there answers nothing. It is only moved where it is not yet. */
+  #place(open) {
+    const { simulation, fold, form } = this
+    if (open && form.nextElementSibling !== simulation) form.after(simulation)
+    if (!open && simulation.parentElement !== fold) fold.append(simulation)
   }
 
   #line(result) {

@@ -74,7 +74,7 @@ const UNITS = {
 
 /** Other ways to write a unit. */
 const NAMES = {
-  deg: '°', degree: '°', degrees: '°', arcmin: "'", rads: 'rad', radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
+  deg: '°', degree: '°', degrees: '°', arcmin: "'", radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
   rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
   meter: 'm', meters: 'm', metre: 'm', metres: 'm', kilogram: 'kg', kilograms: 'kg', gram: 'g', grams: 'g', kelvin: 'K',
   sec: 's', secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',

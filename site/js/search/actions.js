@@ -31,6 +31,8 @@ function* doings(document, strings) {
       return strings.command_copied
     },
   }
+  const read = document.querySelector('[data-progress="lesson"] button')
+  if (read) yield { id: 'read', title: plain(read), run: () => read.click() }
   yield { id: 'print', title: strings.command_print, run: () => window.print() }
   const themes = document.querySelector('[data-tools] .theme select')
   for (const option of themes?.options ?? []) {

@@ -15,7 +15,8 @@ const SHARDS = 96 // that are remembered, and so on
 const SPELLINGS = 40
 const PAGES = 80
 const SECTIONS = 3 // of a page that are shown
-const AHEAD = 4 // pages more than are shown, of which the text may change the order
+const AHEAD = 2 // pages more than are shown, of which the text may change the order
+const BREATH = 15 // ms of work after which the page may do something else
 
 /**
  * @param {(path: string) => Promise<unknown>} load gives the value of a file by its path from the site's root
@@ -42,7 +43,14 @@ export async function openSearch(load) {
         }),
       ),
     )
-    const found = shown.map(({ page, score }, at) => described(listing, page, read[at], words, score))
+    const found = []
+    let began = performance.now()
+    for (const [at, { page, score }] of shown.entries()) {
+      found.push(described(listing, page, read[at], words, score))
+      if (performance.now() - began < BREATH) continue
+      await new Promise((go) => setTimeout(go))
+      began = performance.now()
+    }
     found.sort((a, b) => b.score - a.score)
     const instead = words.filter(({ instead }) => instead !== null).map(({ instead }) => instead)
     return { query, pages: found.slice(0, most), count: pages.length, instead, complete }

@@ -112,7 +112,8 @@ function marks(text, words) {
 function cut(text, places, code) {
   const focus = densest(places)
   if (code) {
-    const start = text.lastIndexOf('\n', focus) + 1
+    const begin = text.lastIndexOf('\n', focus) + 1
+    const start = begin + text.slice(begin, focus).search(/\S|$/)
     const line = text.indexOf('\n', focus)
     const end = Math.min(line < 0 ? text.length : line, Math.max(start, focus - BEFORE) + ROOM)
     return { code, parts: split(text, places, Math.max(start, focus - BEFORE), end) }

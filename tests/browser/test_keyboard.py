@@ -1,0 +1,147 @@
+"""A lesson by the keyboard alone: every stop can be seen, none is a trap, all can be done."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from labpage import until
+from playwright.sync_api import Browser, Page
+from standardkit import Site
+
+pytestmark = pytest.mark.browser
+
+LESSONS = (("real", "lessons/4.2-mass-and-inertia.html"), ("full", ""))
+"""A course and one of its lessons; without a name, the largest."""
+MOST = 1000
+
+WHERE = """() => {
+  const at = document.activeElement
+  if (!at || at === document.body || at === document.documentElement) return null
+  window.stops ??= []
+  const before = window.stops.at(-1)
+  const { DOCUMENT_POSITION_FOLLOWING: after } = Node
+  const follows = !before || (before.compareDocumentPosition(at) & after) !== 0
+  window.stops.push(at)
+  const box = at.getBoundingClientRect()
+  const style = getComputedStyle(at)
+  const name = at.closest('label')?.textContent || at.ariaLabel || at.textContent || at.title || ''
+  const inWindow = box.bottom > 0 && box.top < innerHeight && box.right > 0 && box.left < innerWidth
+  const kind = [at.localName, at.type ?? '', ...at.classList, at.parentElement.className].join(' ')
+  return {
+    kind, follows, inWindow, name: name.trim().slice(0, 60) || at.id,
+    size: [box.width, box.height], box: [box.x, box.y, box.width, box.height],
+    tabindex: at.tabIndex, opacity: style.opacity, visibility: style.visibility,
+  }
+}"""
+"""Where the focus is; `null` where it has left the page."""
+
+
+@pytest.fixture
+def page(browsers: dict[str, Browser]) -> Iterator[Page]:
+    viewport: Any = {"width": 1200, "height": 900}
+    with browsers["plain"].new_context(viewport=viewport, reduced_motion="reduce") as context:
+        yield context.new_page()
+
+
+def opened(page: Page, sites: dict[str, Site], name: str, path: str) -> None:
+    site = sites[name]
+    page.goto(site.url(path or site.kinds()["lesson"]))
+    until(page, "document.fonts.status === 'loaded'")
+    for quiz in page.locator(".quiz:visible").all():
+        quiz.scroll_into_view_if_needed()
+        quiz.locator("button:visible").first.wait_for()
+    page.evaluate("scrollTo(0, 0)")
+
+
+def clip_of(stop: dict[str, Any], margin: int = 8) -> Any:
+    x, y, width, height = stop["box"]
+    left, top = max(x - margin, 0), max(y - margin, 0)
+    right, bottom = min(x + width + margin, 1200), min(y + height + margin, 900)
+    return {"x": left, "y": top, "width": right - left, "height": bottom - top}
+
+
+@pytest.mark.parametrize(("name", "path"), LESSONS)
+def test_every_stop_is_seen_and_none_is_a_trap(
+    sites: dict[str, Site], page: Page, name: str, path: str
+) -> None:
+    """In the order of the text, there and back, with a ring around each kind of stop."""
+    opened(page, sites, name, path)
+    stops: list[dict[str, Any]] = []
+    looked: set[str] = set()
+    for _ in range(MOST):
+        page.keyboard.press("Tab")
+        stop = page.evaluate(WHERE)
+        if stop is None:
+            break
+        assert stop["follows"], f"out of order: {stop}"
+        assert stop["inWindow"] and min(stop["size"]) > 0, f"out of sight: {stop}"
+        assert stop["visibility"] == "visible" and stop["opacity"] != "0", stop
+        assert stop["tabindex"] == 0 and stop["name"], stop
+        stops.append(stop)
+        if stop["kind"] not in looked:
+            looked.add(stop["kind"])
+            has_a_ring(page, stop)
+    else:
+        raise AssertionError(f"the focus does not leave the page: {stops[-1]}")
+    assert len(stops) > 30 and len(looked) > 8
+    page.evaluate("window.stops = []")
+    page.keyboard.press("Shift+Tab")
+    back = page.evaluate(WHERE)
+    assert back is not None and back["name"] == stops[-1]["name"], "and back"
+
+
+def has_a_ring(page: Page, stop: dict[str, Any]) -> None:
+    """The pixels around a stop are others while it has the focus, and enough of them."""
+    clip = clip_of(stop)
+    focused = page.screenshot(clip=clip)
+    page.evaluate("() => { window.held = document.activeElement; held.blur() }")
+    bare = page.screenshot(clip=clip)
+    page.evaluate("() => held.focus({ preventScroll: true, focusVisible: true })")
+    assert focused != bare, f"nothing shows where the focus is: {stop}"
+
+
+@pytest.mark.parametrize(("name", "path"), LESSONS)
+def test_everything_that_folds_opens_by_key(
+    sites: dict[str, Site], page: Page, name: str, path: str
+) -> None:
+    opened(page, sites, name, path)
+    summaries = page.locator("main summary:visible")
+    assert summaries.count() >= 2
+    kinds = dict.fromkeys(summaries.evaluate_all("all => all.map(s => s.parentElement.className)"))
+    for kind, key in zip(kinds, itertools.cycle(("Enter", "Space"))):
+        summary = page.locator(f'main details[class="{kind}"] > summary:visible').first
+        was = summary.evaluate("s => s.parentElement.open")
+        summary.focus()
+        page.keyboard.press(key)
+        assert summary.evaluate("s => s.parentElement.open") is not was, kind
+
+
+def test_colours_search_and_a_question_by_key(sites: dict[str, Site], page: Page) -> None:
+    opened(page, sites, *LESSONS[0])
+    page.get_by_label("Colours").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.documentElement.dataset.theme") in ("light", "dark")
+    page.keyboard.press("Control+k")
+    dialog = page.locator("dialog[open]")
+    dialog.wait_for()
+    page.keyboard.type("inertia")
+    dialog.get_by_role("link").or_(dialog.get_by_role("option")).first.wait_for()
+    page.keyboard.press("Escape")
+    page.locator("dialog[open]").wait_for(state="detached")
+    question = page.locator(".question:has(input[type=radio])").first
+    question.locator("input[type=radio]").first.focus()
+    page.keyboard.press("Space")
+    assert question.locator("input[type=radio]:checked").count() == 1
+    page.keyboard.press("ArrowDown")
+    assert not question.locator("input[type=radio]").first.is_checked()
+    for _ in range(5):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.localName") == "button":
+            break
+    page.keyboard.press("Enter")
+    until(page, "document.querySelector('.question .verdict')?.textContent.trim().length > 0")

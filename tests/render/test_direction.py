@@ -1,0 +1,122 @@
+"""Which way a language runs, and how text and numbers of it are set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.render.direction import direction
+from coursebuild.render.quantities import joined, quantities, text_html, unit_length
+
+Make = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    "language",
+    "ar ar-EG AR he iw fa fa-IR ur yi ps sd ug dv ckb ks az-Arab uz-Arab-AF en-Hebr pa-PK"
+    " nqo syr ku-IQ".split(),
+)
+def test_from_the_right(language: str) -> None:
+    assert direction(language) == "rtl"
+
+
+@pytest.mark.parametrize(
+    "language",
+    "en de pt-BR zh-Hant az pa ku uz ur-Latn ar-Latn ks-Deva sr-Cyrl xx en-x-arab de-u-nu-arab"
+    " tr mt so".split(),
+)
+def test_from_the_left(language: str) -> None:
+    assert direction(language) == "ltr"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("a mass of 5 kg falls", "a mass of 5\u00a0kg falls"),
+        ("9.81 m/s² and 3 N·m", "9.81\u00a0m/s² and 3\u00a0N·m"),
+        ("20 % of 3 ms", "20\u00a0% of 3\u00a0ms"),
+        ("3 minutes, 5 metres, 2 of them", "3 minutes, 5 metres, 2 of them"),
+        ("see 4.2 and 4.3", "see 4.2 and 4.3"),
+        ("30 °C, 2 kΩ, 4 µm, 4 μm", "30\u00a0°C, 2\u00a0kΩ, 4\u00a0µm, 4\u00a0μm"),
+        ("in 2 steps a 5 kg\nbox", "in 2 steps a 5\u00a0kg\nbox"),
+    ],
+)
+def test_numbers_keep_their_units(text: str, found: str) -> None:
+    assert joined(text) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("التسارع -9.81 m/s² هنا", ["-9.81 m/s²"]),
+        ("من −3 إلى +4.5", ["−3", "+4.5"]),
+        ("القيمة +3.2×10^-4 فقط", ["+3.2×10^-4"]),
+        ("الكتلة 2 kg، ثم 3", ["2 kg"]),
+        ("MuJoCo 3.14 و MuJoCo 3 kg", []),
+        ("2024-11-20", []),
+    ],
+)
+def test_quantities_in_text_from_the_right(text: str, kept: list[str]) -> None:
+    pieces = list(quantities(text))
+    assert [piece for piece, is_kept in pieces if is_kept] == kept
+    assert "".join(piece for piece, _ in pieces) == text
+
+
+@given(st.text(alphabet="0123456789.,-+−×^ kgms²/°%بة\u00a0<&"))
+def test_no_character_is_lost(text: str) -> None:
+    assert "".join(piece for piece, _ in quantities(text)) == text
+    assert joined(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
+    assert 0 <= unit_length(text) <= len(text)
+
+    class Read(HTMLParser):
+        text = ""
+
+        def handle_data(self, data: str) -> None:
+            self.text += data
+
+    for way in ("ltr", "rtl"):
+        read = Read()
+        read.feed(str(text_html(text, way)))  # type: ignore[arg-type]
+        read.close()
+        assert read.text == joined(text)
+
+
+MAP = """
+[course]
+title = "A"
+language = "{}"
+
+[[level]]
+id = "0"
+title = "B"
+
+[[level.lesson]]
+id = "0.1"
+slug = "c"
+title = "C"
+status = "complete"
+summary = "-3 m"
+"""
+
+
+def test_pages_say_their_direction_only_where_it_is_not_the_usual(make: Make) -> None:
+    sites = {code: make("Text.", course=MAP.format(code)).site() for code in ("en", "he")}
+    page = {code: site["lessons/0.1-c.html"].decode() for code, site in sites.items()}
+    assert '<html lang="he" dir="rtl" ' in page["he"]
+    assert '<html lang="en" data-' in page["en"]
+    assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page["he"]
+    assert '<p class="lead">-3\u00a0m</p>' in page["en"]
+
+
+def test_formulas_and_bound_numbers_hold_their_units(make: Make) -> None:
+    text = "It is $x$ kg and $y$ kilos."
+    math = '<math class="inline"><mi>x</mi></math>'
+    assert f"{math}\u00a0kg and " in make(text).html()
+    html = make(text, course=MAP.format("fa")).html()
+    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in html
+    assert html.count("<bdi") == 1
