@@ -57,11 +57,20 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
         """Requests are not news."""
 
 
+class Server(http.server.ThreadingHTTPServer):
+    """Outlives browsers that hang up."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """A page that is left in the middle of a file is no news."""
+
+
 @contextmanager
 def served(folder: Path) -> Iterator[str]:
     """The address of a folder on this machine."""
     handler = functools.partial(Quiet, directory=str(folder))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+    with Server(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://localhost:{server.server_address[1]}/"
         server.shutdown()
@@ -104,7 +113,6 @@ def pictures(browser: Browser, site: str, kind: str, path: str, folder: Path) ->
                 viewport={"width": width, "height": 900},
                 color_scheme=colours,  # type: ignore[arg-type]
                 reduced_motion="reduce",
-                service_workers="block",
             ) as context:
                 page = context.new_page()
                 page.goto(site + path)

@@ -30,13 +30,15 @@ from coursebuild.source import Span
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
     """Links, mentions, quizzes, labs and terms, checked against each other."""
-    scripts = {
-        block.path: block.norun
-        for document in course.documents
-        for block in document_blocks(document)
-        if isinstance(block, Script)
-    }
-    known = places(course, scripts)
+    scripts: dict[str, bool] = {}
+    terms: dict[str, Span] = {}
+    for document in course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, Script):
+                scripts[block.path] = block.norun
+        for id, span in defined_terms(document).items():
+            terms.setdefault(id, span)
+    known = places(course, scripts, terms)
     anchors_of = remembered_anchors()
     quizzes: dict[str, Span] = {}
     found: list[Diagnostic] = []

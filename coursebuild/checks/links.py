@@ -71,8 +71,15 @@ class Places:
     """Where each is defined, by its id; of two places the first."""
 
 
-def places(course: Course, scripts: Iterable[str] | None = None) -> Places:
-    """What the course offers as targets; `scripts` are their paths, where they are known."""
+def places(
+    course: Course,
+    scripts: Iterable[str] | None = None,
+    terms: Mapping[str, Span] | None = None,
+) -> Places:
+    """What the course offers as targets; `scripts` are their paths, where they are known.
+
+    So are `terms`: where each is defined.
+    """
     if scripts is None:
         blocks = (block for document in course.documents for block in document_blocks(document))
         scripts = (block.path for block in blocks if isinstance(block, Script))
@@ -83,17 +90,24 @@ def places(course: Course, scripts: Iterable[str] | None = None) -> Places:
         frozenset(model.name for model in course.models),
         frozenset(scripts),
         frozenset(course.files),
-        defined_terms(course.documents),
+        _all_terms(course.documents) if terms is None else terms,
     )
 
 
-def defined_terms(documents: Iterable[Document]) -> dict[str, Span]:
-    """The terms that documents define, and where."""
+def _all_terms(documents: Iterable[Document]) -> dict[str, Span]:
     found: dict[str, Span] = {}
     for document in documents:
-        for inline in document_inlines(document) if "]{" in document.source.text else ():
-            if isinstance(inline, Term):
-                found.setdefault(inline.id, inline.span)
+        for id, span in defined_terms(document).items():
+            found.setdefault(id, span)
+    return found
+
+
+def defined_terms(document: Document) -> dict[str, Span]:
+    """The terms that a document defines, and where first."""
+    found: dict[str, Span] = {}
+    for inline in document_inlines(document):
+        if isinstance(inline, Term):
+            found.setdefault(inline.id, inline.span)
     return found
 
 

@@ -1,6 +1,6 @@
 """Layouts of directed graphs without cycles, in layers: what comes first stands above.
 
-Entry points: `layered(nodes, edges, widths, gap)`, `reduced(nodes, edges)`.
+Entry points: `layered(nodes, edges, …)`, `reduced(nodes, edges)`.
 
 The method is that of Sugiyama, Tagawa and Toda (IEEE Trans. Syst., Man, Cybern. 11(2), 1981):
 
@@ -29,11 +29,9 @@ _Point: TypeAlias = str | tuple[str, str, int]
 """A node, or the place of an edge in a layer."""
 
 _SWEEPS = 12
-_PLACINGS = 14
-_BOTH_SIDES = 8
+_PLACINGS = 40
+_BOTH_SIDES = 32
 """Of the placings, the last, which look at the layers above and below at once."""
-_PASSING = 10.0
-"""Room for an edge that passes a layer, in the units of the drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +87,16 @@ def reduced(nodes: Sequence[str], edges: Iterable[Edge]) -> tuple[Edge, ...]:
 
 
 def layered(
-    nodes: Sequence[str], edges: Sequence[Edge], widths: Mapping[str, float], gap: float
+    nodes: Sequence[str], edges: Sequence[Edge], width: float, gap: float, passing: float
 ) -> Layout:
     """The layout of a graph.
 
     Args:
         nodes: in the order that ties go by.
         edges: between these nodes, without a cycle.
-        widths: of the nodes, in the units of the drawing.
+        width: of a node, in the units of the drawing.
         gap: the least room between two things in a layer.
+        passing: room for an edge that passes a layer.
     """
     layer = _layers(nodes, edges)
     rows: list[list[_Point]] = [[] for _ in range(max(layer.values(), default=-1) + 1)]
@@ -113,8 +112,8 @@ def layered(
     above = _neighbours(links, upwards=True)
     below = _neighbours(links, upwards=False)
     rows = _ordered(rows, above, below)
-    x = _placed(rows, above, below, widths, gap)
-    half = {point: _width(point, widths) / 2 for row in rows for point in row}
+    half = {p: (width if isinstance(p, str) else passing) / 2 for row in rows for p in row}
+    x = _placed(rows, above, below, half, gap)
     left = min((x[point] - half[point] for point in x), default=0.0)
     right = max((x[point] + half[point] for point in x), default=0.0)
     return Layout(
@@ -199,7 +198,7 @@ def _placed(
     rows: Sequence[list[_Point]],
     above: Mapping[_Point, list[_Point]],
     below: Mapping[_Point, list[_Point]],
-    widths: Mapping[str, float],
+    half: Mapping[_Point, float],
     gap: float,
 ) -> dict[_Point, float]:
     x: dict[_Point, float] = {}
@@ -207,9 +206,8 @@ def _placed(
     for row in rows:
         at, places = 0.0, []
         for point in row:
-            half = _width(point, widths) / 2
-            places.append(at + half)
-            at += 2 * half + gap
+            places.append(at + half[point])
+            at += 2 * half[point] + gap
         middle = (at - gap) / 2
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
@@ -242,7 +240,3 @@ def _rising(values: Sequence[float]) -> list[float]:
 
 def _mean(values: Sequence[float], otherwise: float) -> float:
     return sum(values) / len(values) if values else otherwise
-
-
-def _width(point: _Point, widths: Mapping[str, float]) -> float:
-    return widths[point] if isinstance(point, str) else _PASSING

@@ -228,8 +228,7 @@ class _Site:
 
     def _list_key(self, listed: FileList) -> str:
         """What the list's bytes depend on: nothing of it is known before all files are."""
-        lines = sorted(f"{key} {file.path}\n" for file, key in self.files)
-        text = "".join((listed.key, "\n", *lines))
+        text = "\n".join((listed.key, *(f"{key} {file.path}" for file, key in self.files)))
         return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
     def _linked(self, path: str, key: str, target: str) -> bool:

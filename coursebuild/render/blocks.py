@@ -7,6 +7,7 @@ shown is worked out here as values; templates in `blocks/` say how it looks.
 from __future__ import annotations
 
 import re
+import shlex
 from decimal import Decimal
 from typing import TYPE_CHECKING, assert_never
 
@@ -69,7 +70,7 @@ def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) 
         parts=_parts(page.tools, block),
         anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
-        command=" ".join(("python", block.path, *block.args)),
+        command=shlex.join(("python", block.path, *block.args)),
         outputs=tuple(_output(page, recording) for recording in recordings),
         receipt=None if recordings else script_receipt(page, run),
     )

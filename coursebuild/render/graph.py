@@ -12,10 +12,11 @@ is written in the HTML that is read fast (`styles.is_plain`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 
 from markupsafe import Markup, escape
 
-from coursebuild.drawing.layered import Edge, Layout, layered, reduced
+from coursebuild.drawing.layered import Layout, layered, reduced
 from coursebuild.drawing.marks import markup_text, shortened, text_width
 from coursebuild.model import Lesson, Level
 from coursebuild.render import urls
@@ -49,6 +50,8 @@ _NARROW = _Look(50, 30, 5, 58, False)
 _SIZE = 12.0
 """Of letters."""
 _LINE = 15.0
+_PASSING = 0.2
+"""Room for an arrow that passes a layer, in widths of nodes."""
 _EDGE = 2.0
 """Room for the lines around nodes at the edge of a drawing."""
 
@@ -114,29 +117,32 @@ def _graph(
 
 
 def drawings(graph: Graphed, words: Strings) -> tuple[Markup, Markup]:
-    """The drawing with titles, and the one without."""
-    return _drawing(graph, words, _WIDE), _drawing(graph, words, _NARROW)
+    """The drawing with titles, and the one without; what is where is the same in both."""
+    layout = layered([node.id for node in graph.nodes], graph.edges, 1.0, 0.0, _PASSING)
+    return _drawing(graph, layout, words, _WIDE), _drawing(graph, layout, words, _NARROW)
 
 
-def _drawing(graph: Graphed, words: Strings, look: _Look) -> Markup:
-    ids = [node.id for node in graph.nodes]
-    widths = {id: max(look.width, text_width(id, _SIZE) + 26) for id in ids}
-    layout = layered(ids, graph.edges, widths, look.gap)
-    width = layout.width + 2 * _EDGE
+def _drawing(graph: Graphed, layout: Layout, words: Strings, look: _Look) -> Markup:
+    longest = max(text_width(node.id, _SIZE) for node in graph.nodes)
+    wide = max(look.width, longest + 26)
+    unit = wide + look.gap
+    width = layout.width * unit - look.gap + 2 * _EDGE
     height = (layout.layers - 1) * look.step + look.height + 2 * _EDGE
     name = "wide" if look.titles else "narrow"
     parts = [
         f'<svg class="graph-{name}" width="{width:.0f}" height="{height:.0f}" role="group"'
         f' aria-label="{escape(words("graph.label"))}">',
-        *_edges(graph.edges, layout, look),
+        *_edges(layout, look, unit),
     ]
     by_id = {node.id: node for node in graph.nodes}
     for placed in layout.nodes:
-        box = _Box(
-            placed.x + _EDGE, _EDGE + placed.layer * look.step, widths[placed.id], look.height
-        )
-        parts.append(_node(by_id[placed.id], box, words, look))
+        x, top = _x(placed.x, unit, look), _EDGE + placed.layer * look.step
+        parts.append(_node(by_id[placed.id], _Box(x, top, wide, look.height), words, look))
     return Markup("".join((*parts, "</svg>")))
+
+
+def _x(place: float, unit: float, look: _Look) -> float:
+    return place * unit - look.gap / 2 + _EDGE
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,26 +154,22 @@ class _Box:
     height: float
 
 
-def _edges(edges: Iterable[Edge], layout: Layout, look: _Look) -> Iterator[str]:
+def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
     """Lines from box to box, and their heads."""
     layer = {node.id: node.layer for node in layout.nodes}
     lines, heads = [], []
     for edge in layout.edges:
-        first = layer[edge.start]
-        at = f"{edge.xs[0] + _EDGE:.1f} {_EDGE + first * look.step + look.height:.1f}"
-        path = [f"M{at}"]
-        for number, (x, following) in enumerate(zip(edge.xs, edge.xs[1:], strict=False), 1):
-            top = _EDGE + (first + number) * look.step
-            last = number == len(edge.xs) - 1
-            start = top - look.step + look.height
+        xs = [_x(x, unit, look) for x in edge.xs]
+        top = _EDGE + layer[edge.start] * look.step
+        path = [f"M{xs[0]:.1f} {top + look.height:.1f}"]
+        for number, (x, following) in enumerate(pairwise(xs), 1):
+            start, top = top + look.height, top + look.step
             bend = (start + top) / 2
-            x, following = x + _EDGE, following + _EDGE
             path.append(f"C{x:.1f} {bend:.1f} {following:.1f} {bend:.1f} {following:.1f} {top:.1f}")
-            if last:
-                heads.append(f"M{following - 4:.1f} {top - 7:.1f}l4 7 4-7z")
-            else:
+            if number < len(xs) - 1:
                 path.append(f"v{look.height:.1f}")
         lines.append("".join(path))
+        heads.append(f"M{xs[-1] - 4:.1f} {top - 7:.1f}l4 7 4-7z")
     if lines:
         yield f'<path class="edges" d="{"".join(lines)}"/>'
         yield f'<path class="heads" d="{"".join(heads)}"/>'

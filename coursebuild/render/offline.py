@@ -41,6 +41,7 @@ _SHORT = 12
 """Characters of a name below an icon."""
 _COPIES = (".br", ".gz", ".zip", ".epub", ".ipynb", ".md", ".imscc")
 _PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
+_NEEDED = (".css", ".js", ".svg")
 _SHOWN = (".html", ".webmanifest", *_PICTURES)
 _LARGE = 1 << 20
 """Bytes: a page or picture of more is kept for those only who ask for everything."""
@@ -113,8 +114,9 @@ def file_list(names: Names, key: str) -> FileList:
 
 def shell_of(names: Names) -> frozenset[str]:
     """What every page needs, but for the fonts, and what is there when nothing else is."""
-    pages = (urls.HOME, urls.OFFLINE, urls.MANIFEST)
-    return frozenset((*pages, names.style, names.theme_script, names.script, names.icon))
+    pages = {urls.HOME, urls.OFFLINE, urls.MANIFEST}
+    shared = {getattr(names, field) for field in Names.__slots__}
+    return frozenset(pages | {path for path in shared if path.endswith(_NEEDED)})
 
 
 def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.model import (
     Block,
     Document,
@@ -21,6 +21,7 @@ from coursebuild.model import (
     Term,
     block_inlines,
     document_blocks,
+    document_inlines,
     walk_inlines,
 )
 from coursebuild.model.equations import blocks_elsewhere
@@ -34,7 +35,7 @@ def misplaced(document: Document) -> tuple[Diagnostic, ...]:
     if not any(mark in document.source.text for mark in _MARKS):
         return ()
     elsewhere = blocks_elsewhere(document)
-    found: list[Diagnostic] = []
+    found = [*_taken(document)]
     for block in document_blocks(document):
         away = id(block) in elsewhere
         for span in _terms(block) if away or not isinstance(block, Paragraph) else ():
@@ -46,6 +47,20 @@ def misplaced(document: Document) -> tuple[Diagnostic, ...]:
             help = "label formulas of the text, but not those of quizzes, labs and headings"
             found.append(diagnose("equation-label", span, message, help=help))
     return tuple(found)
+
+
+def _taken(document: Document) -> Iterator[Diagnostic]:
+    """Headings whose explicit ids are those of terms."""
+    terms = {
+        inline.anchor: inline.span
+        for inline in document_inlines(document)
+        if isinstance(inline, Term)
+    }
+    for block in document_blocks(document):
+        if isinstance(block, Heading) and block.anchor in terms:
+            notes = [Note("it is that of this term", terms[block.anchor])]
+            message = f"the id `{block.anchor}` is already used"
+            yield diagnose("anchor-repeated", block.span, message, notes=notes)
 
 
 def _terms(block: Block) -> Iterator[Span]:

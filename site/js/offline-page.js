@@ -135,7 +135,7 @@ async function choose(place, store, choice) {
 
 function megabytes(bytes) {
   const number = new Intl.NumberFormat(document.documentElement.lang, { style: 'unit', unit: 'megabyte', maximumSignificantDigits: 2 })
-  return number.format(Math.max(bytes / 1e6, 0.1))
+  return number.format(Math.max(bytes / 1e6, 0.1)).replaceAll(' ', '\u00a0')
 }
 
 function say(place, text) {

@@ -2,19 +2,19 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
-import { decode, emptyState, encode, LAST_STAMP, latestRecalls, merge, NOTHING, StateError, RECALLS } from '../js/progress/state.js'
+import { decode, emptyState, encode, LAST_TICK, latestRecalls, merge, NOTHING, StateError, RECALLS } from '../js/progress/state.js'
 import { answer, random } from './progress-helpers.mjs'
 
 const text = (state) => encode(state, 'c')
 const pick = (draw, list) => list[Math.floor(draw() * list.length)]
 
-/** A state of random entries with few names and few stamps, so that equal ones, removals and resets often meet. */
+/** A state of random entries with few names and few ticks, so that equal ones, removals and resets often meet. */
 function anyState(draw) {
-  const stamp = () => Math.floor(draw() * 12)
+  const tick = () => Math.floor(draw() * 12)
   const entry = (names) => {
-    const values = new Map(names.filter(() => draw() < 0.7).map((name) => [name, { stamp: stamp(), ...value(name) }]))
-    const recalls = Array.from({ length: Math.floor(draw() * 4) }, () => ({ stamp: stamp(), right: draw() < 0.5, at: stamp() }))
-    return { gone: draw() < 0.2 ? stamp() : 0, values, recalls: latestRecalls(recalls) }
+    const values = new Map(names.filter(() => draw() < 0.7).map((name) => [name, { tick: tick(), ...value(name) }]))
+    const recalls = Array.from({ length: Math.floor(draw() * 4) }, () => ({ tick: tick(), right: draw() < 0.5, at: tick() }))
+    return { gone: draw() < 0.2 ? tick() : 0, values, recalls: latestRecalls(recalls) }
   }
   const value = (name) => {
     const at = `2026-01-0${1 + Math.floor(draw() * 3)}T00:00:00.000Z`
@@ -24,7 +24,7 @@ function anyState(draw) {
   }
   const map = (keys, make) => new Map(keys.filter(() => draw() < 0.6).map((key) => [key, make()]))
   const state = {
-    reset: draw() < 0.3 ? stamp() : 0,
+    reset: draw() < 0.3 ? tick() : 0,
     answers: map(['q', '__proto__', 'ü"<'], () => map(['1', '2'], () => entry(['answer']))),
     lessons: map(['4.2', 'constructor'], () => entry(['read', 'place'])),
   }
@@ -54,7 +54,7 @@ test('text is read back as it was, and equal states have equal texts', () => {
 })
 
 test('no more recalls are kept than count, and which they are does not depend on the order of merging', () => {
-  const many = Array.from({ length: 40 }, (_, n) => ({ stamp: n + 1, right: n % 2 === 0, at: n }))
+  const many = Array.from({ length: 40 }, (_, n) => ({ tick: n + 1, right: n % 2 === 0, at: n }))
   const state = (recalls) => ({ ...emptyState(), answers: new Map([['q', new Map([['1', { ...NOTHING, recalls }]])]]) })
   const parts = [many.slice(0, 15), many.slice(10, 30), many.slice(25)].map(state)
   const all = [
@@ -64,27 +64,27 @@ test('no more recalls are kept than count, and which they are does not depend on
   ].map((order) => text(order.map((n) => parts[n]).reduce(merge)))
   assert.equal(new Set(all).size, 1)
   const [kept] = decode(JSON.parse(all[0]), assert.fail).answers.get('q').values()
-  assert.deepEqual(kept.recalls.map(({ stamp }) => stamp), Array.from({ length: RECALLS }, (_, n) => 41 - RECALLS + n))
+  assert.deepEqual(kept.recalls.map(({ tick }) => tick), Array.from({ length: RECALLS }, (_, n) => 41 - RECALLS + n))
 })
 
 test('an entry that is not as it should be is told by its place, and the others are read', () => {
-  const good = { answer: { stamp: 3, ...answer() } }
+  const good = { answer: { tick: 3, ...answer() } }
   const bad = [
     null,
     7,
     [],
     { answer: null },
-    { answer: { ...good.answer, stamp: -1 } },
-    { answer: { ...good.answer, stamp: LAST_STAMP + 1 } },
-    { answer: { ...good.answer, stamp: 1.5 } },
+    { answer: { ...good.answer, tick: -1 } },
+    { answer: { ...good.answer, tick: LAST_TICK + 1 } },
+    { answer: { ...good.answer, tick: 1.5 } },
     { answer: { ...good.answer, kind: 3 } },
     { answer: { ...good.answer, right: 'yes' } },
     { answer: { ...good.answer, tries: -2 } },
     { answer: { ...good.answer, at: 'yesterday' } },
     { answer: { ...good.answer, at: '2026-99-99T00:00:00Z' } },
     { answer: { ...good.answer, given: [[[[['deep']]]]] } },
-    { other: { stamp: 1 } },
-    { constructor: { stamp: 1 } },
+    { other: { tick: 1 } },
+    { constructor: { tick: 1 } },
     { ...good, recalls: [[1, true, 1]] },
     { ...good, recalls: 'many' },
     { ...good, gone: '3' },
@@ -97,7 +97,7 @@ test('an entry that is not as it should be is told by its place, and the others 
     assert.ok(told[0] instanceof StateError)
     assert.match(told[0].where, /^answers, q, bad/)
   }
-  const lessons = { a: { place: { stamp: 1, section: '', title: '', share: 2, at: '2026-01-01T00:00:00Z' } }, b: { read: { stamp: 1, value: 1 } } }
+  const lessons = { a: { place: { tick: 1, section: '', title: '', share: 2, at: '2026-01-01T00:00:00Z' } }, b: { read: { tick: 1, value: 1 } } }
   const told = []
   assert.equal(decode({ reset: 0, answers: {}, lessons }, (error) => told.push(error.where)).lessons.size, 0)
   assert.deepEqual(told, ['lessons, a, place', 'lessons, b, read'])

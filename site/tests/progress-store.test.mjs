@@ -41,10 +41,23 @@ test('what is kept is not what whoever put it goes on changing', () => {
 
 test('an answer that is none is refused and changes nothing', () => {
   const progress = open()
-  for (const own of [{ right: 'yes' }, { tries: -1 }, { kind: undefined }, { given: [[[[['x']]]]] }, { at: 'now' }]) {
+  for (const own of [{ right: 'yes' }, { tries: -1 }, { kind: undefined }, { given: [[[[['x']]]]] }]) {
     assert.throws(() => progress.put('q', 'k', answer(own)))
   }
   assert.deepEqual(progress.all(), [])
+})
+
+test('whatever the clock says, what is kept can be read again', () => {
+  for (const time of [-1e15, 0, 1.5, 8e15, 1e300]) {
+    const browser = new Browser()
+    const progress = open(browser, { now: clock(time) })
+    for (const at of [undefined, 'now', '+275760-09-13T00:00:00.000Z']) progress.put('q', String(at), answer({ right: false, at }))
+    progress.markLesson('1.1', true)
+    progress.readLesson('1.1', { at: '', share: 0.5 })
+    assert.equal(open(browser).all().length, 3)
+    assert.equal(open(browser).trouble(), null)
+    assert.ok(open(browser).lessons().get('1.1').read)
+  }
 })
 
 test('a missed question has a recall, tries after it and answers without a verdict have none', () => {
@@ -238,7 +251,7 @@ test('files that are none of this course’s progress are refused by name, and c
       own.replace('"lessons":{}', '"lessons":{"__proto__":{"polluted":{}}}'),
       own.replace('"lessons":{}', '"lessons":[]'),
       own.replace('"reset":0', '"reset":1e300'),
-      own.replace(/"stamp":\d+/, '"stamp":9007199254740993'),
+      own.replace(/"tick":\d+/, '"tick":9007199254740993'),
       `{"coursebuild":"progress","version":1,"course":"c","reset":0,"answers":${'{"a":'.repeat(5000)}1${'}'.repeat(5000)},"lessons":{}}`,
     ],
     size: [' '.repeat(33 * 2 ** 20)],

@@ -106,7 +106,7 @@ def kept(page: Page) -> dict[str, object]:
 def put(page: Page, *answers: dict[str, object], at: datetime.datetime | None = None) -> None:
     """Write answers into the storage as an earlier visit would have."""
     when = at or datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=2)
-    stamp = int(when.timestamp() * 1000)
+    tick = int(when.timestamp() * 1000)
     quizzes: dict[str, dict[str, object]] = {}
     for number, given in enumerate(answers, 1):
         answer = {"kind": "mcq", "given": [], "right": False, "tries": 1, "hints": 0, "number": 1}
@@ -114,8 +114,8 @@ def put(page: Page, *answers: dict[str, object], at: datetime.datetime | None = 
         quiz, key = answer.pop("quiz"), answer.pop("key")
         assert isinstance(quiz, str)
         assert isinstance(key, str)
-        entry = {"answer": {"stamp": stamp + number, **answer}}
-        recalls = [] if answer["right"] else [[stamp + number, 0, stamp]]
+        entry = {"answer": {"tick": tick + number, **answer}}
+        recalls = [] if answer["right"] else [[tick + number, 0, tick]]
         quizzes.setdefault(quiz, {})[key] = {**entry, "recalls": recalls}
     text = {"coursebuild": "progress", "version": 1, "course": "motion", "reset": 0}
     data = json.dumps({**text, "answers": quizzes, "lessons": {}})
@@ -310,7 +310,7 @@ def test_a_file_goes_to_another_device(
         ),
         (
             b'{"coursebuild":"progress","version":1,"course":"motion","reset":0,"lessons":{},'
-            b'"answers":{"q":{"<b>k":{"answer":{"stamp":1}}}}}',
+            b'"answers":{"q":{"<b>k":{"answer":{"tick":1}}}}}',
             "The file is damaged: what it says at “answers, q, <b>k, answer” makes no sense.",
         ),
     ],

@@ -292,6 +292,15 @@ def test_a_half_typed_answer_survives_the_author(
             field.fill("0.08")
             press(page, NUMBER)
             expect(verdict(page, NUMBER)).to_contain_text("So much, then.")
+            # What is entered after that has no verdict yet, and gets none by itself.
+            field.fill("0.081")
+            folder.replace(folder.lesson(), "So much, then.", "So much, at last.")
+            until(
+                page,
+                "() => document.querySelectorAll('.explain')[2].textContent.includes('last')",
+            )
+            expect(field).to_have_value("0.081")
+            expect(verdict(page, NUMBER)).to_be_empty()
             assert page.evaluate("window.same")
 
 

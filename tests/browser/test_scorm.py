@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from coursekit import GOOD, ROOT, Folder
-from playwright.sync_api import Browser, BrowserContext, FrameLocator, Page
+from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page
 
 pytestmark = pytest.mark.browser
 
@@ -130,14 +130,22 @@ def refused(page: Page) -> Any:
     return page.evaluate("refused")
 
 
+def live(page: Page, key: str) -> Locator:
+    """A question that can be answered: in a frame it comes alive when it comes into sight."""
+    question = lesson(page).locator(f'[data-question="{key}"]')
+    question.scroll_into_view_if_needed()
+    question.locator(".quiz-check").wait_for()
+    return question
+
+
 def choose(page: Page, text: str) -> None:
-    question = lesson(page).locator('[data-question="which"]')
+    question = live(page, "which")
     question.get_by_label(text).check()
     question.locator(".quiz-check").click()
 
 
 def enter(page: Page, text: str) -> None:
-    question = lesson(page).locator('[data-question="much"]')
+    question = live(page, "much")
     question.locator("input").first.fill(text)
     question.locator(".quiz-check").click()
 
@@ -189,7 +197,7 @@ def test_a_later_visit_shows_the_answers_on_a_machine_that_has_none(
     )
     page.close()
     again = visit()
-    shown = lesson(again).locator('[data-question="which"]').get_by_label("green")
+    shown = live(again, "which").get_by_label("green")
     assert shown.is_checked()
     until(again, "API.cmi.core.score.raw === '50'")
     assert refused(again) == []
@@ -204,20 +212,20 @@ def test_another_learner_at_this_machine_starts_anew(visit: Open) -> None:
     page.evaluate("localStorage.removeItem('platform')")
     page.close()
     other = visit(who="emmy")
-    assert not lesson(other).locator('[data-question="which"]').get_by_label("green").is_checked()
+    assert not live(other, "which").get_by_label("green").is_checked()
     assert values(other)["core"]["score"]["raw"] in ("", "0")
 
 
 def test_a_visit_goes_on_over_other_pages_of_the_course(visit: Open) -> None:
     page = visit()
     lesson(page).get_by_role("link", name="The other lesson").click()
-    other = lesson(page).locator('[data-question="other"]')
+    other = live(page, "other")
     other.get_by_label("this").check()
     other.locator(".quiz-check").click()
     other.locator(".verdict").get_by_text("Right").wait_for()
     assert page.evaluate("API.cmi.interactions.childArray.length") == 0, "it is not this lesson's"
     page.evaluate("history.back()")
-    lesson(page).locator('[data-question="which"] .quiz-check').wait_for()
+    live(page, "which")
     choose(page, "green")
     until(page, "API.cmi.core.score.raw === '50'")
     assert page.evaluate("API.cmi.interactions.childArray.length") == 1

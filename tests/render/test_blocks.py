@@ -150,7 +150,7 @@ def test_arguments_and_requirements_stand_in_the_command_line(make: Make) -> Non
     keys = 'file=examples/a.py args="--n 3 <x>" requires=torch'
     html = make(SCRIPT.replace("file=examples/a.py", keys)).html()
     assert (
-        "<code>python examples/a.py --n 3 &lt;x&gt;</code>"
+        "<code>python examples/a.py --n 3 &#39;&lt;x&gt;&#39;</code>"
         ' <span class="run-needs">needs torch</span></p>' in html
     )
 

@@ -22,7 +22,7 @@ def graphs(draw: st.DrawFn) -> Graph:
 
 
 def laid_out(nodes: list[str], edges: list[Edge], width: float = 40.0, gap: float = 8.0) -> Layout:
-    return layered(nodes, edges, dict.fromkeys(nodes, width), gap)
+    return layered(nodes, edges, width, gap, 10.0)
 
 
 def reach(nodes: list[str], edges: list[Edge] | tuple[Edge, ...]) -> set[Edge]:

@@ -45,10 +45,15 @@ def test_every_word_that_is_asked_for_is_there_and_every_one_there_is_used(asset
     made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
     made += ("lab.live.", "measured.reference_", "numerics.case_")
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))
-    text += "".join(p.read_text() for p in sorted((ROOT / "coursebuild" / "render").glob("*.py")))
+    text += "".join(p.read_text() for p in sorted((ROOT / "coursebuild" / "render").rglob("*.py")))
+    scripts = "".join(p.read_text() for p in sorted((ROOT / "site" / "js").rglob("*.js")))
     words = strings_for(assets.templates, "en")
     known = {re.sub(r"\.(one|other)$", "", key) for key in words.keys}
     quoted = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
     asked = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
     assert asked - known == {key for key in asked if key.endswith(".")}
-    assert {key for key in known - quoted if not key.startswith(made)} == set()
+    quoted |= set(re.findall(r"""["'`]([a-z]+\.[a-z_.]+)["'`]""", scripts))
+    unused = {key for key in known - quoted if not key.startswith(made)}
+    # Keys of tables are put together from the table's name and words that are looked up in it.
+    said = set(re.findall(r"[a-z]+", text + scripts))
+    assert {key for key in unused if not set(re.split(r"[._]", key)) <= said} == set()

@@ -63,8 +63,10 @@ def renewed_places(known: Places, fresh: Iterable[Owner], library: Library) -> P
 def _renewed_terms(known: Places, fresh: Iterable[Owner]) -> dict[str, Span]:
     documents = [owner.document for owner in fresh if owner.document is not None]
     paths = {document.source.path for document in documents}
-    kept = {id: span for id, span in known.terms.items() if span.path not in paths}
-    return defined_terms(documents) | kept
+    terms = {id: span for id, span in known.terms.items() if span.path not in paths}
+    for document in documents:
+        terms = defined_terms(document) | terms
+    return terms
 
 
 def changed_runs(old: Mapping[str, ScriptRun], new: Mapping[str, ScriptRun]) -> frozenset[str]:

@@ -186,9 +186,10 @@ def finished(
         cells += _setup(made, archive, imports, words)
     ids: dict[str, int] = {}
     for cell in made.cells:
-        base = _slug(cell.script or cell.section)
+        kind = "code" if cell.script else "text"
+        base = f"{kind}-{_slug(cell.script or cell.section)}"
         ids[base] = number = ids.get(base, 0) + 1
-        name = f"{'code' if cell.script else 'text'}-{base}-{number}"
+        name = f"{base}-{number}"
         if cell.script:
             cells.append(_code(name, cell.text, cell.output))
         else:

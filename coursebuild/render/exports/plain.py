@@ -8,6 +8,7 @@ is its recorded picture and what it showed, a quiz is a list with its answers.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from typing import assert_never
 
@@ -156,7 +157,7 @@ class Plain:
         name = link(code_span(block.path), href)
         if self.notebook:
             return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
-        command = code_span(" ".join(("python", block.path, *block.args)))
+        command = code_span(shlex.join(("python", block.path, *block.args)))
         run = f"{self.words('code.run')}: {command}"
         if block.requires:
             run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"

@@ -116,6 +116,8 @@ class Rewriter:
             empty = name in VOID or start.closed
             self._left_out += 0 if empty else name in _DROPPED
             return
+        if self.rules.xml and not _XML_NAME.fullmatch(name):
+            return
         for ended in _ENDS.get(name, ("p",) if name in _ENDS_P else ()):
             if self._open and self._open[-1] == ended:
                 self._shut()

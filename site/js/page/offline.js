@@ -33,10 +33,11 @@ export function storeChoice(document, choice) {
 }
 
 /** The address of the site's root, where a service worker may serve it; else `null`. */
-export function workingRoot({ document, location, navigator, isSecureContext }) {
+export function workingRoot({ document, location, navigator, isSecureContext, self, top }) {
   const root = document.documentElement.dataset.root
   if (!isSecureContext || !navigator.serviceWorker || !/^https?:$/.test(location.protocol)) return null
   // The page for missing addresses names its root by the course's base address, where this site may not be.
+  if (top !== self) return null // in the frame of a learning platform, which keeps what it wants
   if (root === undefined || root.startsWith('/') || document.querySelector('script[src^="/.coursebuild/"]')) return null
   return new URL(root || './', document.baseURI)
 }

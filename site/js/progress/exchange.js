@@ -60,14 +60,14 @@ export function importText(progress, text, { restore = false } = {}) {
   return told
 }
 
-/** A state in which what a file has and the state has not, since it was reset or removed, is new; `tick` gives its stamps. */
+/** A state in which what a file has and the state has not, since it was reset or removed, is new; `tick` gives its ticks. */
 function restored(state, file, tick) {
   const renew = (have, old) => {
     const entry = { gone: have?.gone ?? 0, values: new Map(have?.values), recalls: have?.recalls ?? [] }
     for (const [name, value] of old.values) {
-      if (!entry.values.has(name)) entry.values.set(name, { ...value, stamp: tick() })
+      if (!entry.values.has(name)) entry.values.set(name, { ...value, tick: tick() })
     }
-    if (!have?.values.size) entry.recalls = old.recalls.map((recall) => ({ ...recall, stamp: tick() }))
+    if (!have?.values.size) entry.recalls = old.recalls.map((recall) => ({ ...recall, tick: tick() }))
     return entry
   }
   const answers = new Map(state.answers)
@@ -107,5 +107,5 @@ function changes(state, before) {
 /** 1 where an entry says something else than before, else 0. */
 function differs(entry, before) {
   if (entry === before || entry.values.size === 0) return 0
-  return Number([...entry.values].some(([name, { stamp }]) => before?.values.get(name)?.stamp !== stamp))
+  return Number([...entry.values].some(([name, { tick }]) => before?.values.get(name)?.tick !== tick))
 }

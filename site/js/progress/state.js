@@ -1,8 +1,8 @@
 /**
  * What is known of a reader's way through a course, as a value that can be merged.
  *
- * A state holds the answers to questions, the lessons read, and the time of the last reset. Every value in it has a stamp, a whole
- * number that grows with each change: the time in ms where that is later than all stamps known, else the next number. So a clock that
+ * A state holds the answers to questions, the lessons read, and the time of the last reset. Every value in it has a tick, a whole
+ * number that grows with each change: the time in ms where that is later than all ticks known, else the next number. So a clock that
  * goes backwards, or another device whose clock is wrong, puts nothing in the wrong order (L. Lamport, “Time, clocks, and the ordering
  * of events in a distributed system”, 1978, with the wall clock as in S. Kulkarni and others, “Logical physical clocks”, 2014).
  *
@@ -11,13 +11,13 @@
  * So it does not matter which of two tabs or devices learns of what first, or how often.
  *
  * In memory: `{ reset, answers: Map(quiz → Map(key → Entry)), lessons: Map(id → Entry) }` with
- * `Entry = { gone, values: Map(name → { stamp, … }), recalls: [{ stamp, right, at }] }`. An answer has the one value `answer`, a lesson
+ * `Entry = { gone, values: Map(name → { tick, … }), recalls: [{ tick, right, at }] }`. An answer has the one value `answer`, a lesson
  * has `read` and `place`. Nothing changes a state or an entry once it is made.
  */
 
 export const VERSION = 1
-/** The latest stamp that is taken from elsewhere: so many changes remain that can be counted exactly. */
-export const LAST_STAMP = 2 ** 52
+/** The latest tick that is taken from elsewhere: so many changes remain that can be counted exactly. */
+export const LAST_TICK = 2 ** 52
 /** So many recalls of a question are kept, the latest. */
 export const RECALLS = 16
 const DEPTH = 4
@@ -37,15 +37,15 @@ export function emptyState() {
   return { reset: 0, answers: new Map(), lessons: new Map() }
 }
 
-/** The latest stamp in a state. */
+/** The latest tick in a state. */
 export function latest(state) {
-  let stamp = state.reset
+  let tick = state.reset
   for (const entry of entriesOf(state)) {
-    stamp = Math.max(stamp, entry.gone)
-    for (const value of entry.values.values()) stamp = Math.max(stamp, value.stamp)
-    for (const recall of entry.recalls) stamp = Math.max(stamp, recall.stamp)
+    tick = Math.max(tick, entry.gone)
+    for (const value of entry.values.values()) tick = Math.max(tick, value.tick)
+    for (const recall of entry.recalls) tick = Math.max(tick, recall.tick)
   }
-  return stamp
+  return tick
 }
 
 function* entriesOf(state) {
@@ -85,27 +85,27 @@ export function mergeEntries(one = NOTHING, other = NOTHING, reset = 0) {
   }
   const values = joined(one.values, other.values, (a, b) => {
     const value = a && b ? later(a, b) : a ?? b
-    return value.stamp > since ? value : undefined
+    return value.tick > since ? value : undefined
   })
-  const recalls = latestRecalls([...one.recalls, ...other.recalls].filter(({ stamp }) => stamp > since))
+  const recalls = latestRecalls([...one.recalls, ...other.recalls].filter(({ tick }) => tick > since))
   const entry = { gone, values, recalls }
   return isBare(entry) ? undefined : entry
 }
 
 const isBare = ({ gone, values, recalls }) => gone === 0 && values.size === 0 && recalls.length === 0
 const allLater = ({ values, recalls }, since) =>
-  [...values.values()].every(({ stamp }) => stamp > since) && recalls.every(({ stamp }) => stamp > since)
+  [...values.values()].every(({ tick }) => tick > since) && recalls.every(({ tick }) => tick > since)
 
 function later(one, other) {
-  if (one.stamp !== other.stamp) return one.stamp > other.stamp ? one : other
+  if (one.tick !== other.tick) return one.tick > other.tick ? one : other
   return canonical(one) >= canonical(other) ? one : other
 }
 
-const recallOrder = (a, b) => a.stamp - b.stamp || a.right - b.right || a.at - b.at
+const recallOrder = (a, b) => a.tick - b.tick || a.right - b.right || a.at - b.at
 
 /** The latest of some recalls, each once, in order. */
 export function latestRecalls(recalls) {
-  const sorted = recalls.toSorted ? recalls.toSorted(recallOrder) : [...recalls].sort(recallOrder)
+  const sorted = [...recalls].sort(recallOrder)
   return sorted.filter((recall, i) => i === 0 || recallOrder(sorted[i - 1], recall) !== 0).slice(-RECALLS)
 }
 
@@ -135,10 +135,10 @@ function mapText(map, textOf) {
 /** The same as `canonical`, faster for what there is most of. */
 function valueText(name, value) {
   if (name !== 'answer') return canonical(value)
-  const { at, given, hints, kind, lesson, number, right, stamp, tries } = value
+  const { at, given, hints, kind, lesson, number, right, tick, tries } = value
   const texts = [at, kind, lesson].map((text) => JSON.stringify(text))
   const before = `{"at":${texts[0]},"given":${canonical(given)},"hints":${hints},"kind":${texts[1]},"lesson":${texts[2]}`
-  return `${before},"number":${number},"right":${right},"stamp":${stamp},"tries":${tries}}`
+  return `${before},"number":${number},"right":${right},"tick":${tick},"tries":${tries}}`
 }
 
 function entryText(entry) {
@@ -147,7 +147,7 @@ function entryText(entry) {
     const fields = [...entry.values].map(([name, value]) => `${JSON.stringify(name)}:${valueText(name, value)}`).sort()
     if (entry.gone) fields.push(`"gone":${entry.gone}`)
     if (entry.recalls.length) {
-      fields.push(`"recalls":[${entry.recalls.map(({ stamp, right, at }) => `[${stamp},${Number(right)},${at}]`).join(',')}]`)
+      fields.push(`"recalls":[${entry.recalls.map(({ tick, right, at }) => `[${tick},${Number(right)},${at}]`).join(',')}]`)
     }
     text = `{${fields.join(',')}}`
     texts.set(entry, text)
@@ -169,7 +169,7 @@ export function encode(state, course) {
 export function decode(data, bad) {
   if (!isObject(data) || !isObject(data.answers) || !isObject(data.lessons)) throw new StateError('the whole')
   const state = emptyState()
-  state.reset = stampOf(data.reset, 'reset')
+  state.reset = tickOf(data.reset, 'reset')
   const add = (map, key, where, read, value) => {
     try {
       map.set(key, read(value, where))
@@ -209,8 +209,8 @@ export function understood(text, course) {
 
 const isObject = (value) => value !== null && typeof value === 'object' && !Array.isArray(value)
 
-function stampOf(value, where) {
-  if (!Number.isSafeInteger(value) || value < 0 || value > LAST_STAMP) throw new StateError(where)
+function tickOf(value, where) {
+  if (!Number.isSafeInteger(value) || value < 0 || value > LAST_TICK) throw new StateError(where)
   return value
 }
 
@@ -224,11 +224,11 @@ function readEntry(data, where, readers) {
   let gone = 0
   let recalls = []
   for (const [name, value] of Object.entries(data)) {
-    if (name === 'gone') gone = stampOf(value, `${where}, gone`)
+    if (name === 'gone') gone = tickOf(value, `${where}, gone`)
     else if (name === 'recalls') recalls = readRecalls(value, `${where}, recalls`)
     else {
       must(Object.hasOwn(readers, name) && isObject(value), `${where}, ${name}`)
-      values.set(name, { stamp: stampOf(value.stamp, `${where}, ${name}`), ...readers[name](value, `${where}, ${name}`) })
+      values.set(name, { tick: tickOf(value.tick, `${where}, ${name}`), ...readers[name](value, `${where}, ${name}`) })
     }
   }
   return { gone, values, recalls }
@@ -239,7 +239,7 @@ function readRecalls(data, where) {
   return latestRecalls(
     data.map((recall) => {
       must(Array.isArray(recall) && recall.length === 3 && (recall[1] === 0 || recall[1] === 1), where)
-      return { stamp: stampOf(recall[0], where), right: recall[1] === 1, at: stampOf(recall[2], where) }
+      return { tick: tickOf(recall[0], where), right: recall[1] === 1, at: tickOf(recall[2], where) }
     }),
   )
 }
@@ -248,7 +248,8 @@ const readAnswer = (data, where) => readEntry(data, where, { answer: answerOf })
 const readLesson = (data, where) => readEntry(data, where, { read: readOf, place: placeOf })
 
 const isCount = (value) => Number.isSafeInteger(value) && value >= 0
-const isTime = (value) => typeof value === 'string' && /^\d{4}-\d\d-\d\dT[\d:.]+Z$/.test(value) && Number.isFinite(Date.parse(value))
+/** Whether a value is a time as `toISOString` gives it, in years of four digits. */
+export const isTime = (value) => typeof value === 'string' && /^\d{4}-\d\d-\d\dT[\d:.]+Z$/.test(value) && Number.isFinite(Date.parse(value))
 
 /** An answer with its own fields and no others. @throws {StateError} */
 export function answerOf({ kind, given, right, tries, hints, number, lesson, at }, where = 'answer') {

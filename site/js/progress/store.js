@@ -12,11 +12,13 @@
  */
 
 import { counts } from './schedule.js'
-import { answerOf, canonical, emptyState, encode, latest, latestRecalls, merge, NOTHING, placeOf, readOf, understood } from './state.js'
+import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
+import { placeOf, readOf, understood } from './state.js'
 
 export { matchQuestions } from './match.js'
 
 const PREFIX = 'coursebuild.progress.'
+const LAST_TIME = Date.UTC(9999, 11, 31)
 
 /**
  * @typedef {object} Answer
@@ -67,7 +69,8 @@ class Progress {
     this.#course = course
     this.#name = `${PREFIX}${course}`
     this.#storage = storage
-    this.#now = now
+    // A clock may be set to before 1970, or to years that no date can be of.
+    this.#now = () => Math.min(Math.max(Math.floor(now()), 0), LAST_TIME)
     events?.addEventListener?.('storage', (event) => {
       if (this.#begun && (event.key === this.#name || event.key === null)) this.refresh()
     })
@@ -94,15 +97,15 @@ class Progress {
    */
   put(quiz, key, answer, { recall } = {}) {
     const now = this.#now()
-    const value = answerOf({ ...answer, given: structuredClone(answer.given), at: answer.at ?? new Date(now).toISOString() })
+    const value = answerOf({ ...answer, given: structuredClone(answer.given), at: isTime(answer.at) ? answer.at : new Date(now).toISOString() })
     this.#read()
     const entry = this.#state.answers.get(quiz)?.get(key) ?? NOTHING
     const before = entry.values.get('answer')
     if (before && !recall && canonical({ ...value, at: before.at }) === canonical(plain(before))) return
     const told = recall ?? (before?.tries !== value.tries || before?.right !== value.right)
-    const made = { stamp: this.#tick(now), right: value.right, at: now }
+    const made = { tick: this.#tick(now), right: value.right, at: now }
     const kept = told && value.right !== null && counts(entry.recalls, made)
-    const values = new Map(entry.values).set('answer', { stamp: made.stamp, ...value })
+    const values = new Map(entry.values).set('answer', { tick: made.tick, ...value })
     const recalls = kept ? latestRecalls([...entry.recalls, made]) : entry.recalls
     this.#setAnswer(quiz, key, { gone: entry.gone, values, recalls })
     this.#write()
@@ -133,9 +136,9 @@ class Progress {
     const old = this.#state.answers.get(quiz)?.get(from)
     const have = this.#state.answers.get(quiz)?.get(to) ?? NOTHING
     if (!old?.values.size || have.values.size || from === to) return
-    const stamped = (value) => ({ ...value, stamp: this.#tick() })
-    const values = new Map([...old.values].map(([name, value]) => [name, stamped(value)]))
-    this.#setAnswer(quiz, to, { gone: have.gone, values, recalls: old.recalls.map(stamped) })
+    const anew = (value) => ({ ...value, tick: this.#tick() })
+    const values = new Map([...old.values].map(([name, value]) => [name, anew(value)]))
+    this.#setAnswer(quiz, to, { gone: have.gone, values, recalls: old.recalls.map(anew) })
     this.#setAnswer(quiz, from, { ...NOTHING, gone: this.#tick() })
     this.#write()
   }
@@ -152,7 +155,7 @@ class Progress {
     for (const [id, { values }] of this.#known.lessons) {
       const read = values.get('read')
       const place = values.get('place')
-      const at = !read || (place && place.stamp > read.stamp) ? place?.at : read.at
+      const at = !read || (place && place.tick > read.tick) ? place?.at : read.at
       if (at) found.set(id, { read: read?.value ?? false, marked: read !== undefined, place: place ? plain(place) : null, at })
     }
     return found
@@ -185,7 +188,7 @@ class Progress {
     let found = null
     for (const [id, { values }] of this.#known.lessons) {
       const place = values.get('place')
-      if (place && (found === null || place.stamp > found.stamp || (place.stamp === found.stamp && id > found.id))) {
+      if (place && (found === null || place.tick > found.tick || (place.tick === found.tick && id > found.id))) {
         found = { id, ...place }
       }
     }
@@ -225,7 +228,7 @@ class Progress {
   }
 
   /**
-   * Take another state, made of the one that is: `make(state, tick)`, where `tick` gives stamps. See exchange.js.
+   * Take another state, made of the one that is: `make(state, tick)`, where `tick` gives ticks. See exchange.js.
    * @returns {boolean} `false` where there is no room for it: then nothing is changed
    */
   replace(make) {
@@ -268,7 +271,7 @@ class Progress {
   // --- inner
 
   #tick(now = this.#now()) {
-    this.#clock = Math.max(Math.floor(now), this.#clock + 1)
+    this.#clock = Math.max(now, this.#clock + 1)
     return this.#clock
   }
 
@@ -289,7 +292,7 @@ class Progress {
   #setLesson(id, name, value) {
     this.#read()
     const entry = this.#state.lessons.get(id) ?? NOTHING
-    this.#putLesson(id, { ...entry, values: new Map(entry.values).set(name, { stamp: this.#tick(), ...value }) })
+    this.#putLesson(id, { ...entry, values: new Map(entry.values).set(name, { tick: this.#tick(), ...value }) })
     this.#write()
   }
 
@@ -355,4 +358,4 @@ class Progress {
   }
 }
 
-const plain = ({ stamp, id, ...value }) => value
+const plain = ({ tick, id, ...value }) => value

@@ -83,6 +83,7 @@ export class Question {
 
   showDraft(given) {
     this.dirty = this.control.show(given)
+    if (this.dirty) this.#set(null) // a verdict would be that of another answer
   }
 
   // --- what happens
@@ -143,7 +144,7 @@ export class Question {
     const how = element.querySelector(':scope > .question-how')
     if (how) how.id = this.id('how')
     const legend = this.#legend()
-    const described = [how, ...legend].filter((part) => part?.id).map((part) => part.id)
+    const described = [how, ...legend].filter((part) => part?.id && part.localName !== 'legend').map((part) => part.id)
     const fields = h('fieldset', { 'aria-describedby': described.join(' ') || null }, ...legend, how, control.body)
     fields.addEventListener('input', () => this.touched())
     const actions = h('div', { class: 'question-actions' }, this.checking, this.revealing, this.retrying)
@@ -163,7 +164,7 @@ export class Question {
       const name = fill(this.words('quiz.live.question'), { n: this.element.dataset.number ?? '' })
       return [h('legend', { class: 'quiz-unseen' }, name), text]
     }
-    const legend = h('legend', {}, ...lead.childNodes)
+    const legend = h('legend', { id: lead.id || null, class: lead.className || null }, ...lead.childNodes)
     lead.remove()
     if (text.childElementCount > 0 || text.textContent.trim() !== '') return [legend, text]
     text.remove()

@@ -1,0 +1,124 @@
+"""The pictures of the icon are what a browser makes of the SVG."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+ICON = (ROOT / "templates" / "icon.svg").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def icons() -> Any:
+    """The module that draws them; dataclasses of it need its name to be known."""
+    sys.path.insert(0, str(ROOT / "site"))
+    try:
+        import prepare_icons
+    finally:
+        sys.path.remove(str(ROOT / "site"))
+    return prepare_icons
+
+
+def pixels(data: bytes) -> np.ndarray:
+    """A PNG of 8 bits in red, green, blue and opacity, as drawn here: filter 2 in each row."""
+    stream = io.BytesIO(data)
+    assert stream.read(8) == b"\x89PNG\r\n\x1a\n"
+    body = b""
+    width = height = 0
+    while chunk := stream.read(8):
+        length, name = int.from_bytes(chunk[:4], "big"), chunk[4:]
+        content, checksum = stream.read(length), stream.read(4)
+        assert zlib.crc32(name + content) == int.from_bytes(checksum, "big")
+        if name == b"IHDR":
+            width, height = (int.from_bytes(content[i : i + 4], "big") for i in (0, 4))
+            assert content[8:] == bytes((8, 6, 0, 0, 0))
+        body += content if name == b"IDAT" else b""
+    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + 4 * width)
+    assert (rows[:, 0] == 2).all()
+    return np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8).reshape(height, width, 4)
+
+
+@pytest.mark.browser
+def test_they_are_what_a_browser_draws(icons: Any) -> None:
+    chromium = shutil.which("chromium")
+    assert chromium is not None, "no chromium: install Debian's package `chromium`"
+    draw = """async ([svg, side]) => {
+      const image = new Image()
+      image.src = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }))
+      await image.decode()
+      const canvas = new OffscreenCanvas(side, side)
+      const context = canvas.getContext('2d')
+      context.drawImage(image, 0, 0, side, side)
+      return [...context.getImageData(0, 0, side, side).data]
+    }"""
+    shapes = icons.shapes(ICON)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page()
+        for side in (64, 192):
+            theirs = np.array(page.evaluate(draw, [ICON, side]), float).reshape(side, side, 4)
+            ours = pixels(icons.drawn(shapes, icons.Picture("x", side))).astype(float)
+            # Without opacity a colour means nothing.
+            off = np.abs(theirs * theirs[..., 3:] - ours * ours[..., 3:]) / 255
+            assert off.mean() < 1, side
+            assert (off.max(axis=2) > 48).mean() < 0.002, side
+        browser.close()
+
+
+def test_where_a_system_cuts_there_is_ground(icons: Any) -> None:
+    shapes = icons.shapes(ICON)
+    found = pixels(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
+    assert (found[..., 3] == 255).all()
+    ground = np.array(shapes[0].colour)
+    y, x = np.mgrid[0:96, 0:96] + 0.5
+    cut = np.hypot(x - 48, y - 48) > 0.4 * 96
+    assert (found[cut][:, :3] == ground).all(), "nothing of the drawing lies where it may be cut"
+    assert not (found[~cut][:, :3] == ground).all()
+
+
+def test_they_are_drawn_once_for_the_same_icon(
+    icons: Any, tmp_path: Path, monkeypatch: Any
+) -> None:
+    for name in ("old", "new", "again"):
+        (tmp_path / name).mkdir()
+    icons.main(tmp_path / "old")
+    monkeypatch.setattr(icons, "drawn", lambda *_: pytest.fail("drawn again"))
+    icons.main(tmp_path / "new", tmp_path / "old")
+    old = {path.name: path.read_bytes() for path in (tmp_path / "old/icons").iterdir()}
+    assert old == {path.name: path.read_bytes() for path in (tmp_path / "new/icons").iterdir()}
+    assert set(old) == {picture.name for picture in icons.PICTURES} | {"source.json"}
+    (tmp_path / "old/icons/source.json").write_text(json.dumps("of another icon"))
+    monkeypatch.setattr(icons, "drawn", lambda *_: b"anew")
+    icons.main(tmp_path / "again", tmp_path / "old")
+    assert (tmp_path / "again/icons/icon-192.png").read_bytes() == b"anew"
+
+
+GROUND = '<rect width="32" height="32" fill="#000000"/>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        ("<ellipse/>", "the icon has an element `ellipse`"),
+        ('<circle cx="1" cy="1" r="1" fill="red"/>', "the icon has a colour 'red'"),
+        ('<path d="M0 0C1 1 2 2 3 3" fill="none" stroke-linecap="round"/>', "a path `M0 0C1"),
+        ('<path d="M0 0l1 1" fill="#ffffff"/>', "a path that is filled"),
+        ('<path d="M0 0" fill="none" stroke-linecap="round" stroke-width="1"/>', "a path `M0 0`"),
+    ],
+)
+def test_what_cannot_be_drawn_is_an_error(icons: Any, inside: str, message: str) -> None:
+    start = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32">'
+    with pytest.raises(icons.IconError, match=message):
+        icons.shapes(f"{start}{GROUND}{inside}</svg>")
+    with pytest.raises(icons.IconError, match="first shape"):
+        icons.shapes(f"{start}</svg>")
