@@ -32,6 +32,8 @@ _SWEEPS = 12
 _PLACINGS = 40
 _BOTH_SIDES = 32
 """Of the placings, the last, which look at the layers above and below at once."""
+_STRAIGHT = 20.0
+"""How much more an arrow counts between two of which each has no other on that side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +106,10 @@ def layered(
         rows[layer[node]].append(node)
     ways: list[tuple[Edge, list[_Point]]] = []
     for a, b in edges:
-        passing: list[_Point] = [(a, b, level) for level in range(layer[a] + 1, layer[b])]
-        for level, point in enumerate(passing, layer[a] + 1):
+        between: list[_Point] = [(a, b, level) for level in range(layer[a] + 1, layer[b])]
+        for level, point in enumerate(between, layer[a] + 1):
             rows[level].append(point)
-        ways.append(((a, b), [a, *passing, b]))
+        ways.append(((a, b), [a, *between, b]))
     links = [pair for _, way in ways for pair in pairwise(way)]
     above = _neighbours(links, upwards=True)
     below = _neighbours(links, upwards=False)
@@ -211,19 +213,42 @@ def _placed(
         middle = (at - gap) / 2
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
+    pulls = _pulls(above, below), _pulls(below, above)
     for placing in range(_PLACINGS):
-        down, both = placing % 2 == 0, placing >= _PLACINGS - _BOTH_SIDES
+        down = placing % 2 == 0
+        sides = pulls if placing >= _PLACINGS - _BOTH_SIDES else pulls[:1] if down else pulls[1:]
         for level in range(len(rows)) if down else reversed(range(len(rows))):
             row, places = rows[level], steps[level]
-            near = (above, below) if both else (above,) if down else (below,)
-            wanted = [
-                _mean([x[other] for side in near for other in side.get(point, ())], x[point])
-                for point in row
+            offsets = [
+                _pulled(x, point, sides) - place for point, place in zip(row, places, strict=True)
             ]
-            offsets = [want - place for want, place in zip(wanted, places, strict=True)]
             fitted = zip(row, places, _rising(offsets), strict=True)
             x |= {point: place + offset for point, place, offset in fitted}
     return x
+
+
+def _pulls(
+    near: Mapping[_Point, list[_Point]], far: Mapping[_Point, list[_Point]]
+) -> dict[_Point, list[tuple[_Point, float]]]:
+    """The neighbours on one side with their weights; `far` has those of the other side."""
+    return {
+        point: [
+            (other, _STRAIGHT if len(others) == len(far[other]) == 1 else 1.0) for other in others
+        ]
+        for point, others in near.items()
+    }
+
+
+def _pulled(
+    x: Mapping[_Point, float],
+    point: _Point,
+    sides: Sequence[Mapping[_Point, list[tuple[_Point, float]]]],
+) -> float:
+    """Where a point would best be; where it is if it has no neighbours."""
+    pairs = [pair for side in sides for pair in side.get(point, ())]
+    if not pairs:
+        return x[point]
+    return sum(weight * x[other] for other, weight in pairs) / sum(weight for _, weight in pairs)
 
 
 def _rising(values: Sequence[float]) -> list[float]:

@@ -77,11 +77,24 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
 
 
 def _tokens(lexer: Lexer, code: str) -> Iterator[tuple[_TokenType, str]]:
-    """The lexer's tokens; a byte order mark at the start, which it drops, stays."""
+    """The lexer's tokens; a byte order mark at the start, which it drops, stays.
+
+    A lexer that leaves anything else out marks nothing.
+    """
     if code.startswith("\ufeff"):
         yield Token.Text, "\ufeff"
         code = code[1:]
-    yield from lexer.get_tokens(code)
+    # Those of sessions see lines that end only.
+    for end in ("", "\n"):
+        found = list(lexer.get_tokens(code + end))
+        if "".join(text for _, text in found) == code + end:
+            break
+    else:
+        found, end = [(Token.Text, code)], ""
+    if end:
+        token, text = found.pop()
+        found.append((token, text.removesuffix(end)))
+    yield from found
 
 
 def _span(css: str, text: str) -> str:

@@ -185,8 +185,10 @@ def address(library: Library, place: urls.Place, path: str, target: Target) -> s
         case ExampleTarget():
             return place.href(target.path)
         case TermTarget():
-            found = library.references.terms[target.id]
-            return place.href(owner_path(found.owner), f"term:{target.id}")
+            found = library.references.terms.get(target.id)
+            # In a preview the text that defined it may have changed just now.
+            path = place.path if found is None else owner_path(found.owner)
+            return place.href(path, f"term:{target.id}")
         case UrlTarget():
             return file_address(place, path, target.url)
         case _:

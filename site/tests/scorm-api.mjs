@@ -48,6 +48,8 @@ const READ_ONLY = {
   'cmi.core.entry': 'ab-initio',
   'cmi.core.lesson_mode': 'normal',
   'cmi.launch_data': '',
+  'cmi.core.score._children': 'raw,min,max',
+  'cmi.interactions._children': 'id,objectives,time,type,correct_responses,weighting,student_response,result,latency',
 }
 
 export class StrictApi {
@@ -93,6 +95,8 @@ export class StrictApi {
     let value = ''
     this.#said('LMSGetValue', [name], () => {
       if (this.state !== 'running') return '301'
+      if (name === 'cmi.interactions._count' && this.values['cmi.interactions._children'] === '') return '401'
+      if (name.endsWith('._children') && this.values[name] === '') return '401'
       if (name === 'cmi.interactions._count') value = String(this.interactions.length)
       else if (Object.hasOwn(this.values, name)) value = this.values[name]
       else return name.startsWith('cmi.interactions.') || name === 'cmi.core.exit' || name === 'cmi.core.session_time' ? '404' : '401'
@@ -107,14 +111,21 @@ export class StrictApi {
       if (typeof value !== 'string') return '405'
       if (Object.hasOwn(READ_ONLY, name)) return '403'
       if (name.startsWith('cmi.interactions.')) return this.#setInteraction(name, value)
-      if (!Object.hasOwn(SETTABLE, name)) return '401'
+      if (!Object.hasOwn(SETTABLE, name) || this.#lacks(name)) return '401'
       if (!SETTABLE[name](value)) return '405'
       this.values[name] = value
       return '0'
     })
   }
 
+  /** What is optional, and not listed. */
+  #lacks(name) {
+    const [, group, part] = /^(cmi\.core\.score|cmi\.interactions)\.(?:\d+\.)?(\w+)/.exec(name) ?? []
+    return group !== undefined && !this.values[`${group}._children`].split(',').includes(part)
+  }
+
   #setInteraction(name, value) {
+    if (this.#lacks(name)) return '401'
     const [, at, part] = /^cmi\.interactions\.(\d+)\.(.+)$/.exec(name) ?? []
     if (part === undefined || !Object.hasOwn(INTERACTION, part)) return '401'
     if (Number(at) > this.interactions.length) return '201'

@@ -293,6 +293,24 @@ test('a platform that refuses or throws loses what it refused, and nothing else'
   assert.ok(session.trouble.length > 0)
 })
 
+test('a platform that knows only what every platform must know is told nothing else', () => {
+  for (const interactions of ['', 'id, type, result', 'type,result']) {
+    const api = new StrictApi({ 'cmi.core.score._children': 'raw', 'cmi.interactions._children': interactions.replaceAll(' ', '') })
+    if (interactions.includes(' ')) {
+      const get = api.LMSGetValue.bind(api)
+      api.LMSGetValue = (name) => (name === 'cmi.interactions._children' ? interactions : get(name))
+    }
+    const { session, visit } = visitTo(api)
+    visit.shows([mcq])
+    visit.answered('q', 'k1', answer(['green'], true))
+    visit.ends()
+    assert.deepEqual(session.trouble, [])
+    assert.deepEqual(api.errors.filter(([, name]) => name !== 'LMSGetValue'), [])
+    assert.equal(api.values['cmi.core.lesson_status'], 'passed')
+    assert.equal(api.interactions.length, Number(interactions.includes('id')))
+  }
+})
+
 test('a platform that does not begin has no session', () => {
   const api = new StrictApi()
   api.LMSInitialize('')

@@ -48,6 +48,8 @@ class Host:
         """Paths that were asked for, with their queries."""
         self.delay = 0.0
         """Seconds before an answer."""
+        self.fonts_delay = 0.0
+        """Seconds before a font, which on this machine alone comes before anything is drawn."""
         self._packed: dict[tuple[str, bytes], bytes] = {}
         self._server: http.server.ThreadingHTTPServer | None = None
         self._port = 0
@@ -143,8 +145,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         host = self.host
         host.asked.append(self.path.removeprefix(host.base))
-        time.sleep(host.delay)
         status, path = host.file(self.path)
+        time.sleep(host.delay + (host.fonts_delay if path.suffix == ".woff2" else 0.0))
         data = path.read_bytes() if path.is_file() else b""
         tag = f'"{hashlib.sha256(data).hexdigest()[:16]}"'
         lasting = _LASTING.fullmatch(urlsplit(self.path).path)

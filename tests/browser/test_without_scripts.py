@@ -164,7 +164,7 @@ SIGNS = """body => {
 
 
 def signs_of(mathml: str) -> str:
-    return unescape(re.sub(r"<annotation\b.*?</annotation>|<[^>]*>", "", mathml))
+    return unescape(re.sub(r"(?s)<annotation\b.*?</annotation>|<[^>]*>", "", mathml))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -113,8 +113,8 @@ def test_every_term_stands_once_where_the_browser_looks(pages: int) -> None:
 def test_the_plan_grows_with_the_course() -> None:
     plans = {pages: Plan.of(pages) for pages in (0, 1, 80, 2000, 100_000)}
     assert plans[0] == plans[1] == Plan(1, 1, 1)
-    assert plans[80] == Plan(4, 16, 1)
-    assert plans[2000] == Plan(64, 256, 16)
+    assert plans[80] == Plan(4, 8, 1)
+    assert plans[2000] == Plan(64, 128, 16)
     assert plans[100_000].terms == 1024
 
 

@@ -1,16 +1,14 @@
 """The whole course as an e-book: EPUB 3.
 
-Entry points: `book_of(library, …)`, which files are in it, and `packed(files)`, the archive in
-pieces.
+Entry point: `Epub`, whose `files` are those of the archive, in order.
 
 1. Each lesson is a chapter of XHTML, drawn as on its page: formulas are MathML, folds are open,
    labs are their recorded pictures. Links between lessons lead to chapters; others lead to the site
    where the course has an address, and are plain text where it has none.
-2. The archive begins with `mimetype`, uncompressed; entries have one fixed date.
-3. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
+2. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
    and says nothing.
 
-Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1; PKWARE, APPNOTE 6.3.
+Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
 """
 
 from __future__ import annotations
@@ -18,11 +16,8 @@ from __future__ import annotations
 import functools
 import hashlib
 import re
-import struct
 import uuid
-import zlib
 from collections.abc import Callable, Iterable, Iterator
-from typing import TypeAlias
 
 from markupsafe import Markup
 
@@ -30,6 +25,7 @@ from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.direction import direction
+from coursebuild.render.exports.archive import File
 from coursebuild.render.exports.cover import cover
 from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
 from coursebuild.render.exports.parts import LessonPart
@@ -80,14 +76,6 @@ class Item:
     properties: str = ""
     linear: bool | None = None
     """Whether it is read in order; `None`: it is no page."""
-
-
-@dataclass(frozen=True, slots=True)
-class File:
-    """A file of the archive."""
-
-    path: str
-    make: Callable[[], bytes]
 
 
 class Epub:
@@ -282,45 +270,3 @@ def _name(name: str, ending: str) -> str:
     if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         return name + ending
     return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}{ending}"
-
-
-# ------------------------------------------------------------------------------- the archive
-
-_LOCAL = struct.Struct("<4s5H3L2H")
-_CENTRAL = struct.Struct("<4s6H3L5H2L")
-_LAST = struct.Struct("<4s4H2LH")
-_DATE, _TIME = (1 << 5) | 1, 0
-"""1980-01-01 00:00, the first that the format has."""
-_UTF8 = 1 << 11
-
-
-Deflated: TypeAlias = tuple[int, int, bytes]
-"""Checksum and size of a file, and its compressed bytes."""
-
-
-def packed(files: Iterable[File], compressed: Callable[[File], Deflated]) -> Iterator[bytes]:
-    """The archive, a file at a time."""
-    listing: list[bytes] = []
-    at = 0
-    for file in files:
-        if file.path == "mimetype" or file.path.endswith((".png", ".jpg", ".jpeg", ".webp")):
-            data = file.make()
-            method, crc, size = 0, zlib.crc32(data), len(data)
-        else:
-            method = 8
-            crc, size, data = compressed(file)
-        name = file.path.encode()
-        numbers = (_UTF8, method, _TIME, _DATE, crc, len(data), size, len(name))
-        head = _LOCAL.pack(b"PK\3\4", 20, *numbers, 0) + name
-        listing.append(_CENTRAL.pack(b"PK\1\2", 20, 20, *numbers, 0, 0, 0, 0, 0, at) + name)
-        at += len(head) + len(data)
-        yield head + data
-    central = b"".join(listing)
-    count = len(listing)
-    yield central + _LAST.pack(b"PK\5\6", 0, 0, count, count, len(central), at, 0)
-
-
-def deflate(data: bytes) -> Deflated:
-    """Compress a file."""
-    made = zlib.compressobj(9, zlib.DEFLATED, -15)
-    return zlib.crc32(data), len(data), made.compress(data) + made.flush()

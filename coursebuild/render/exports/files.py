@@ -20,11 +20,12 @@ from typing import Protocol, TypeAlias
 from coursebuild.model import Document, Lesson, Page
 from coursebuild.render import pages, urls, zips
 from coursebuild.render.characters import visible
+from coursebuild.render.exports.archive import Deflated, File, deflate, packed
 from coursebuild.render.exports.book import Book, books
-from coursebuild.render.exports.epub import Chapter, Deflated, Epub, File, deflate, packed
+from coursebuild.render.exports.epub import Chapter, Epub
 from coursebuild.render.exports.llms import PATH as LLMS
 from coursebuild.render.exports.llms import llms
-from coursebuild.render.exports.notebook import finished
+from coursebuild.render.exports.notebook_file import finished
 from coursebuild.render.exports.page import Beside, PageExports, page_exports
 from coursebuild.render.exports.parts import LessonPart
 from coursebuild.render.exports.twin import twin_of

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Iterator
 from html import unescape
 
-from coursebuild.render.exports.markdown import (
+from coursebuild.render.exports.marks import (
     code_span,
     escaped,
     fence,

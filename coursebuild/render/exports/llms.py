@@ -12,7 +12,7 @@ from __future__ import annotations
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.characters import visible
-from coursebuild.render.exports.markdown import escaped, link
+from coursebuild.render.exports.marks import escaped, link
 from coursebuild.render.library import Library
 
 PATH = "llms.txt"

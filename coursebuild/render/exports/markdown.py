@@ -57,6 +57,18 @@ from coursebuild.model import (
     ThematicBreak,
     plain_text,
 )
+from coursebuild.render.exports.marks import (
+    ALWAYS,
+    code_span,
+    escaped,
+    fence,
+    guarded,
+    hang,
+    link,
+    picture,
+    quoted,
+    table,
+)
 from coursebuild.render.markup import OwnBlock, escape
 
 
@@ -95,84 +107,6 @@ def write_footnotes(footnotes: Iterable[Footnote], context: Context) -> str:
     return "\n\n".join(
         hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
     )
-
-
-def hang(mark: str, text: str, indent: int | None = None) -> str:
-    """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
-    space = " " * (len(mark) if indent is None else indent)
-    first, *rest = text.split("\n")
-    lines = [f"{mark}{first}" if first else mark.rstrip()]
-    return "\n".join([*lines, *(f"{space}{line}" if line.strip() else "" for line in rest)])
-
-
-def quoted(text: str) -> str:
-    """Lines in a blockquote."""
-    return "\n".join(f"> {line}" if line.strip() else ">" for line in text.split("\n"))
-
-
-def fence(language: str, text: str) -> str:
-    """Code between fences that are longer than any in it."""
-    runs = re.findall(r"^[ ]*(`{3,})", text, re.MULTILINE)
-    ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
-    body = text if text.endswith("\n") or not text else f"{text}\n"
-    return f"{ticks}{language}\n{body}{ticks}"
-
-
-def code_span(text: str, ticks: str = "") -> str:
-    """Text as inline code, between these ticks or as few as do."""
-    text = text.replace("\n", " ")
-    runs = set(map(len, _TICKS(text)))
-    ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
-    blank = text.strip(" ") == ""
-    edges = text[:1] == "`" or text[-1:] == "`" or (text[:1] == text[-1:] == " ")
-    pad = " " if edges and not blank else ""
-    return f"{ticks}{pad}{text}{pad}{ticks}"
-
-
-_TICKS = re.compile("`+").findall
-_MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
-_ALWAYS = re.compile(r"[$`]")
-"""What is escaped wherever it is text: another reader may see more in it than ours did."""
-
-
-def escaped(text: str) -> str:
-    """Text with all its marks escaped, in one line or several."""
-    return _MARKS.sub(lambda match: f"\\{match[0]}", text)
-
-
-def link(text: str, href: str, title: str = "") -> str:
-    """A link; `text` is Markdown."""
-    return f"[{text}]({_destination(href)}{_title(title)})"
-
-
-def picture(alt: str, url: str, title: str = "") -> str:
-    """A picture; `alt` is plain text."""
-    alt = escaped(" ".join(alt.split()))
-    return f"![{alt}]({_destination(url)}{_title(title)})"
-
-
-def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[str] = ()) -> str:
-    """A table of cells that are Markdown in one line, their pipes escaped."""
-    head = tuple(head)
-    marks = {"left": ":---", "right": "---:", "center": ":---:"}
-    aligned = [marks.get(one, "---") for one in align] or ["---"] * len(head)
-    lines = [head, aligned, *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-
-
-def _destination(url: str) -> str:
-    if url and not re.search(r"[\s<>()\\]", url):
-        return url
-    safe = url.replace("\\", "%5C").replace("<", "%3C").replace(">", "%3E")
-    return f"<{''.join('%20' if c.isspace() else c for c in safe)}>"
-
-
-def _title(title: str) -> str:
-    if not title:
-        return ""
-    text = re.sub(r'[\\"]|&(?=#?\w+;)', lambda match: f"\\{match[0]}", title)
-    text = re.sub(r"\n[ \t\n]*", "\n", text)
-    return f' "{text}"'
 
 
 _APART = (HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Lab, Quiz, Table, MathBlock)
@@ -345,7 +279,7 @@ def _text(node: Text, *, cell: bool) -> str:
         if text[-1:].isspace() and not source[-1:].isspace():
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
-    text = _ALWAYS.sub(lambda match: f"\\{match[0]}", node.text)
+    text = ALWAYS.sub(lambda match: f"\\{match[0]}", node.text)
     return _piped(text, cell=cell)
 
 
@@ -370,28 +304,3 @@ def _formula(node: Math, *, cell: bool) -> str:
 
 def _no_empty_lines(tex: str) -> str:
     return "\n".join(line for line in tex.split("\n") if line.strip())
-
-
-_BEGINS = re.compile(
-    r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
-    r"|[|:\s-]*-[|:\s-]*$)"
-    r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
-    r"|(?P<note>\[\^[^\]]+\]):"
-)
-"""What begins, or makes of the line before it, another block than a paragraph."""
-
-
-def guarded(text: str) -> str:
-    """The lines of a paragraph, so that none of them begins another block."""
-    return "\n".join(_guarded_line(line) for line in text.split("\n"))
-
-
-def _guarded_line(line: str) -> str:
-    found = _BEGINS.match(line)
-    if found is None:
-        return line
-    if found["number"]:
-        return f"{found['number']}\\{line[found.end('number') :]}"
-    if found["note"]:
-        return f"{found['note']}\\{line[found.end('note') :]}"
-    return f"\\{line}"

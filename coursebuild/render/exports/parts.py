@@ -17,6 +17,8 @@ from coursebuild.values import dataclass
 
 SHOWN = frozenset("gif jpeg jpg png svg webp".split())
 """Endings of the pictures that every reading system shows."""
+_ON_PAPER = frozenset(("anchor", "bar-tools", "qr"))
+"""Classes of what an e-book does not need: links of headings to themselves, downloads, QR codes."""
 _TOP = "_top"
 _DOWN = 2
 """The course is the first heading, its levels are the second."""
@@ -48,7 +50,7 @@ def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:
     values = {"lesson": head, "draft": sheet.values["draft"], "article": article, "top": _TOP}
     html = str(tools.render("exports/lesson.html", **values))
     page = Rules(sheet.path, prefix=anchor(head.id, ""), down=_DOWN, opened=_is_no_answer)
-    book = Rules(sheet.path, xml=True, pictures=SHOWN)
+    book = Rules(sheet.path, xml=True, pictures=SHOWN, without=_ON_PAPER)
     section, chapter = Rewriter(page), Rewriter(book)
     return LessonPart(
         section.text(html),

@@ -37,7 +37,8 @@ from coursebuild.model import (
 )
 from coursebuild.render.blocks import output_receipt, script_receipt
 from coursebuild.render.context import PageContext
-from coursebuild.render.exports.markdown import (
+from coursebuild.render.exports.markdown import write_blocks, write_inlines
+from coursebuild.render.exports.marks import (
     code_span,
     escaped,
     fence,
@@ -46,8 +47,6 @@ from coursebuild.render.exports.markdown import (
     picture,
     quoted,
     table,
-    write_blocks,
-    write_inlines,
 )
 from coursebuild.render.labs import (
     control_view,

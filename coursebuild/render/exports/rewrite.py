@@ -69,6 +69,8 @@ class Rules:
     """Whether a fold is shown open."""
     pictures: frozenset[str] = frozenset()
     """Endings of the pictures that can be shown; empty where all can."""
+    without: frozenset[str] = frozenset()
+    """Classes of elements that are left out, with all that is in them."""
 
 
 class Rewriter:
@@ -83,7 +85,8 @@ class Rewriter:
         self._known: dict[Start, str] = {}
         self._out: list[str] = []
         self._open: list[str] = []
-        self._left_out = 0
+        self._left_out: list[str] = []
+        """Open elements in one that is left out, and that one."""
 
     def text(self, html: str) -> str:
         """The whole."""
@@ -112,9 +115,9 @@ class Rewriter:
 
     def _start(self, start: Start) -> None:
         name = start.name
-        if self._left_out or name in _DROPPED:
-            empty = name in VOID or start.closed
-            self._left_out += 0 if empty else name in _DROPPED
+        if self._left_out or self._is_left_out(start):
+            if name not in VOID and not start.closed:
+                self._left_out.append(name)
             return
         if self.rules.xml and not _XML_NAME.fullmatch(name):
             return
@@ -132,9 +135,17 @@ class Rewriter:
         if name not in VOID and not start.closed:
             self._open.append(name)
 
+    def _is_left_out(self, start: Start) -> bool:
+        if start.name in _DROPPED:
+            return True
+        without = self.rules.without
+        return bool(without and not without.isdisjoint((start.get("class") or "").split()))
+
     def _end(self, end: End) -> None:
         if self._left_out:
-            self._left_out -= end.name in _DROPPED
+            if end.name in self._left_out:
+                while self._left_out.pop() != end.name:
+                    pass
             return
         if end.name in self._open:
             while self._open[-1] != end.name:

@@ -17,14 +17,8 @@ from coursebuild.model import Document
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.exports.fromhtml import markdown_of
-from coursebuild.render.exports.markdown import (
-    code_span,
-    escaped,
-    guarded,
-    link,
-    write_blocks,
-    write_footnotes,
-)
+from coursebuild.render.exports.markdown import write_blocks, write_footnotes
+from coursebuild.render.exports.marks import code_span, escaped, guarded, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
 from coursebuild.render.sheet import Sheet

@@ -14,7 +14,14 @@ from coursebuild.model import Course
 from coursebuild.render import urls
 from coursebuild.render.packages.flow import STRUCK
 from coursebuild.render.packages.items import NAMESPACE, SCHEMA, STYLE, MadeItem, MadeQuiz
-from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.render.packages.xml import (
+    XSI,
+    Element,
+    document,
+    element,
+    identifier,
+    long_document,
+)
 from coursebuild.results import OutputFile
 from coursebuild.values import replace
 
@@ -68,18 +75,6 @@ def style_file() -> OutputFile:
 def manifest(course: Course, quizzes: Iterable[MadeQuiz]) -> OutputFile:
     """The package's manifest, which lists every file with the item that shows it."""
     resources = element("resources")
-    for quiz in quizzes:
-        names = [f"RES-{item.identifier}" for item in quiz.items]
-        path = test_path(quiz)
-        given = {"identifier": f"RES-{quiz.identifier}", "type": "imsqti_test_xmlv2p1"}
-        test = element("resource", given | {"href": path}, _file(path))
-        add(resources, test)
-        add(test, *(element("dependency", {"identifierref": name}) for name in names))
-        for item, name in zip(quiz.items, names, strict=True):
-            path = item_path(item)
-            files = (_file(path), _file(STYLE), *map(_file, item.pictures))
-            given = {"identifier": name, "type": "imsqti_item_xmlv2p1", "href": path}
-            add(resources, element("resource", given, *files))
     root = element(
         "manifest",
         {
@@ -97,7 +92,22 @@ def manifest(course: Course, quizzes: Iterable[MadeQuiz]) -> OutputFile:
         element("organizations"),
         resources,
     )
-    return OutputFile(MANIFEST, document(root, pretty=True))
+    return OutputFile(MANIFEST, long_document(root, resources, _resources(quizzes)))
+
+
+def _resources(quizzes: Iterable[MadeQuiz]) -> Iterator[Element]:
+    """A test with its items, then these."""
+    for quiz in quizzes:
+        names = [f"RES-{item.identifier}" for item in quiz.items]
+        path = test_path(quiz)
+        given = {"identifier": f"RES-{quiz.identifier}", "type": "imsqti_test_xmlv2p1"}
+        needs = (element("dependency", {"identifierref": name}) for name in names)
+        yield element("resource", given | {"href": path}, _file(path), *needs)
+        for item, name in zip(quiz.items, names, strict=True):
+            path = item_path(item)
+            files = (_file(path), _file(STYLE), *map(_file, item.pictures))
+            given = {"identifier": name, "type": "imsqti_item_xmlv2p1", "href": path}
+            yield element("resource", given, *files)
 
 
 def _file(path: str) -> Element:

@@ -19,7 +19,14 @@ from coursebuild.render import urls
 from coursebuild.render.assets import Assets, page_script
 from coursebuild.render.direction import direction
 from coursebuild.render.frame import policy
-from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.render.packages.xml import (
+    XSI,
+    Element,
+    add,
+    element,
+    identifier,
+    long_document,
+)
 from coursebuild.render.tools import Tools
 from coursebuild.results import OutputFile
 
@@ -89,13 +96,17 @@ def manifest(course: Course, paths: Iterable[str]) -> OutputFile:
     for path in paths:
         stem = path.rpartition(".")[0]
         own.get(stem, shared).append(path)
-    resources = element("resources", {}, _resource(_SHARED, "asset", "", shared))
-    for lesson in lessons:
-        path = launch_path(lesson)
-        files = [path, *own[f"lessons/{lesson.id}-{lesson.slug}"]]
-        sco = _resource(identifier("sco.", lesson.id), "sco", path, files)
-        add(sco, element("dependency", {"identifierref": _SHARED}))
-        add(resources, sco)
+    resources = element("resources")
+
+    def listed() -> Iterator[Element]:
+        yield _resource(_SHARED, "asset", "", shared)
+        for lesson in lessons:
+            path = launch_path(lesson)
+            files = [path, *own[f"lessons/{lesson.id}-{lesson.slug}"]]
+            sco = _resource(identifier("sco.", lesson.id), "sco", path, files)
+            add(sco, element("dependency", {"identifierref": _SHARED}))
+            yield sco
+
     root = element(
         "manifest",
         {
@@ -110,7 +121,7 @@ def manifest(course: Course, paths: Iterable[str]) -> OutputFile:
         element("organizations", {"default": "organization"}, _organization(course)),
         resources,
     )
-    return OutputFile(MANIFEST, document(root, pretty=True))
+    return OutputFile(MANIFEST, long_document(root, resources, listed()))
 
 
 def _organization(course: Course) -> Element:

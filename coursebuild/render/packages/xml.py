@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Iterable
 from typing import TypeAlias
 from xml.etree.ElementTree import Element as Element
 from xml.etree.ElementTree import indent, tostring
@@ -17,6 +18,7 @@ Child: TypeAlias = "Element | str | None"
 
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 has no place for, section 2.2."""
+_SLOT = "\ue000"
 _OUTSIDE = re.compile("[^A-Za-z0-9.-]")
 
 
@@ -51,6 +53,18 @@ def document(root: Element, *, pretty: bool = False) -> bytes:
         indent(root, " ")
     text = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def long_document(root: Element, slot: Element, children: Iterable[Element]) -> bytes:
+    """The same with elements in the place of `slot`'s text, of which one at a time is held."""
+    slot.text = _SLOT
+    before, _, after = document(root, pretty=True).partition(_SLOT.encode())
+    parts = [before]
+    for child in children:
+        indent(child, " ", level=2)
+        child.tail = None
+        parts.append(f"\n  {tostring(child, encoding='unicode')}".encode())
+    return b"".join((*parts, b"\n ", after))
 
 
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:

@@ -24,9 +24,8 @@ from coursebuild.results import KeptFile
 from coursebuild.values import dataclass
 
 FOLDER = "assets/search"
-_FAST, _DENSE = 5, 10
-"""Qualities of Brotli: for the list, which every edit makes anew, and for shards, of which it is a
-seventh less for ten times the time."""
+_QUALITY = 5
+"""Of Brotli: the tenth would be a seventh less for ten times the time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +93,13 @@ class SearchFiles:
     def files(self) -> Iterator[KeptFile]:
         """All of them, with smaller copies of the index but not of the pages' texts."""
         listing = self._listing()
-        yield from _copied(
-            urls.SEARCH_INDEX, hashlib.sha256(listing).hexdigest(), lambda: listing, _FAST
-        )
+        key = hashlib.sha256(listing).hexdigest()
+        yield from _copied(urls.SEARCH_INDEX, key, lambda: listing)
         for number, name in enumerate(self._names):
             make = functools.partial(self._shard, number)
             key = f"search-{index.FORMAT}-{number}-{name}"
             path = f"{FOLDER}/{number:04x}.{name}.js"
-            yield from _copied(path, key, make, _DENSE)
+            yield from _copied(path, key, make)
         for entry in self._entries:
             yield KeptFile(
                 f"{FOLDER}/{entry.file}.js",
@@ -176,13 +174,13 @@ class SearchFiles:
         return hashlib.sha256("\n".join(said).encode()).hexdigest()
 
 
-def _copied(path: str, key: str, make: Callable[[], bytes], quality: int) -> Iterator[KeptFile]:
+def _copied(path: str, key: str, make: Callable[[], bytes]) -> Iterator[KeptFile]:
     """A file and its copies, which are there whether or not they are smaller: nobody knows yet."""
     yield KeptFile(path, key, make)
     for suffix in COPIES:
-        copy = functools.partial(_copy, make, suffix, quality)
+        copy = functools.partial(_copy, make, suffix)
         yield KeptFile(f"{path}.{suffix}", f"{key}-{suffix}", copy)
 
 
-def _copy(make: Callable[[], bytes], suffix: str, quality: int) -> bytes:
-    return copy_of(make(), suffix, quality)
+def _copy(make: Callable[[], bytes], suffix: str) -> bytes:
+    return copy_of(make(), suffix, _QUALITY)

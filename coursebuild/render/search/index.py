@@ -22,13 +22,13 @@ import functools
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 
-from coursebuild.render.search.words import is_fuzzy, shelf_of
+from coursebuild.render.search.words import BEGINNING, is_fuzzy, shelf_of
 from coursebuild.values import dataclass
 
 FORMAT = 1
 """Of the files; part of every name."""
 _PAGES_A_BUCKET = 16
-_PAGES_A_SHARD = 4
+_PAGES_A_SHARD = 8
 _MOST_SHARDS = 1024
 _SHARDS_A_GROUP = 32
 _DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
@@ -48,7 +48,7 @@ class Plan:
     def of(cls, pages: int) -> Plan:
         """For a number of pages; all are powers of two."""
         terms = min(_MOST_SHARDS, _below(pages / _PAGES_A_SHARD))
-        return cls(_below(pages / _PAGES_A_BUCKET), terms, _below(terms / 16))
+        return cls(_below(pages / _PAGES_A_BUCKET), terms, _below(terms / 8))
 
     @property
     def groups(self) -> tuple[range, ...]:
@@ -66,10 +66,12 @@ class Plan:
 
     def shards(self, term: str) -> tuple[int, ...]:
         """Numbers of the shards that have a term."""
-        first = _placed(shelf_of(term)) & (self.terms - 1)
-        if not is_fuzzy(term):
-            return (first,)
-        return first, self.terms + (_placed(term[0]) & (self.words - 1))
+        if term.isascii() and term.isalpha():  # as most are: what follows would give the same
+            first, fuzzy = _placed(term[:BEGINNING]), 3 <= len(term) <= 24
+        else:
+            first, fuzzy = _placed(shelf_of(term)), is_fuzzy(term)
+        first &= self.terms - 1
+        return (first, self.terms + (_placed(term[0]) & (self.words - 1))) if fuzzy else (first,)
 
 
 def _below(number: float) -> int:

@@ -24,7 +24,7 @@ export function showPage(document, { words, progress }) {
     showOverall(place('overall'), sumOf(written, others, done), words, progress.trouble())
     for (const level of document.querySelectorAll('[data-level]')) {
       const [inside, beside] = [written, others].map((rows) => rows.filter(({ row }) => level.contains(row)))
-      level.querySelector('[data-amounts]').replaceChildren(...amounts(sumOf(inside, beside, done), words))
+      level.querySelector('[data-amounts]')?.replaceChildren(...amounts(sumOf(inside, beside, done), words))
     }
     showOrphans(place('orphans'), orphans, words, progress)
   }

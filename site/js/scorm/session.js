@@ -3,6 +3,7 @@
  *
  * Entry point: `beginSession(api)`. A call that the platform refuses is no reason to lose what follows: it is noted in `trouble`.
  *
+ * - Points' limits and interactions are optional in the standard: a platform that lists none of them gets none.
  * - In `browse` and `review` nothing of the learner is recorded (3.4.4, `cmi.core.lesson_mode`).
  * - A status that was reached is never taken back: not by a question that came after it, nor by a wrong answer.
  * - `finish` counts once, however a page ends.
@@ -30,6 +31,9 @@ class Session {
   #began
   #open = false
   #recorded = 0
+  #count = 0
+  /** What the platform knows of interactions and of points. */
+  #known = { interactions: [], points: [] }
   #said = new Map()
 
   constructor(api, now) {
@@ -48,7 +52,8 @@ class Session {
     this.kept = this.#get('cmi.suspend_data')
     this.location = this.#get('cmi.core.lesson_location')
     this.status = this.#get('cmi.core.lesson_status')
-    this.#count = Number.parseInt(this.#get('cmi.interactions._count'), 10) || 0
+    this.#known = { interactions: this.#children('cmi.interactions'), points: this.#children('cmi.core.score') }
+    if (this.#known.interactions.includes('id')) this.#count = Number.parseInt(this.#get('cmi.interactions._count'), 10) || 0
     if (this.records) {
       if (RANK[this.status] === undefined) this.#setStatus('incomplete')
       this.#commit()
@@ -56,13 +61,11 @@ class Session {
     return true
   }
 
-  #count = 0
-
   /** Record an answer. */
   answer(question, answer) {
-    if (!this.#open || !this.records || this.#recorded >= MOST) return
+    if (!this.#open || !this.records || this.#recorded >= MOST || !this.#known.interactions.includes('id')) return
     const at = `cmi.interactions.${this.#count}.`
-    const elements = interaction(question, answer, new Date(this.#now()))
+    const elements = interaction(question, answer, new Date(this.#now())).filter(([name]) => this.#known.interactions.includes(name.split('.')[0]))
     this.#count += 1
     this.#recorded += 1
     for (const [name, value] of elements) this.#call('LMSSetValue', at + name, value)
@@ -77,8 +80,8 @@ class Session {
   progress({ raw, status }, kept, location) {
     if (!this.#open || !this.records) return
     if (raw !== null) {
-      this.#set('cmi.core.score.min', '0')
-      this.#set('cmi.core.score.max', '100')
+      if (this.#known.points.includes('min')) this.#set('cmi.core.score.min', '0')
+      if (this.#known.points.includes('max')) this.#set('cmi.core.score.max', '100')
       this.#set('cmi.core.score.raw', String(raw))
     }
     if (RANK[status] > (RANK[this.status] ?? 0)) this.#setStatus(status)
@@ -102,6 +105,10 @@ class Session {
   #setStatus(status) {
     this.status = status
     this.#set('cmi.core.lesson_status', status)
+  }
+
+  #children(name) {
+    return this.#get(`${name}._children`).split(',').map((part) => part.trim())
   }
 
   #get(name) {

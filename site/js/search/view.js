@@ -1,5 +1,7 @@
 /** Results as elements. What comes from the index is text and becomes text nodes: nothing of it is read as HTML. */
 
+import { form } from '../page/words.js'
+
 /** An element with attributes and children; `null` children are left out. */
 export function element(name, attributes = {}, ...children) {
   const made = document.createElement(name)
@@ -49,7 +51,7 @@ export const filled = (text, values) => text.replace(/\{(\w+)\}/g, (all, key) =>
 /** How much was found, in words. */
 export function summary(found, strings) {
   if (found.count === 0) return filled(strings.none, { query: found.query })
-  const count = filled(found.count === 1 ? strings.count_one : strings.count_other, { n: found.count })
+  const count = filled(form((key) => strings[key] ?? key, 'count', found.count), { n: found.count })
   const instead = found.instead.length > 0 ? filled(strings.instead, { words: found.instead.map((word) => `“${word}”`).join(', ') }) : ''
   return [`${count}.`, instead, found.complete ? '' : strings.part_failed].filter(Boolean).join(' ')
 }

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.model import Callout, Document, PlainCode, Target
-from coursebuild.render.exports.markdown import (
+from coursebuild.render.exports.markdown import write_blocks, write_footnotes, write_inlines
+from coursebuild.render.exports.marks import (
     code_span,
     escaped,
     fence,
@@ -18,9 +19,6 @@ from coursebuild.render.exports.markdown import (
     link,
     picture,
     quoted,
-    write_blocks,
-    write_footnotes,
-    write_inlines,
 )
 from coursebuild.render.markup import OwnBlock
 from coursebuild.render.plain import PlainContext, plain_html

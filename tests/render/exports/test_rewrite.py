@@ -83,6 +83,12 @@ def test_among_other_lessons(html: str, expected: str) -> None:
     assert moved(html) == expected
 
 
+def test_what_is_left_out_takes_what_is_in_it_along() -> None:
+    rules = Rules(PAGE, xml=True, without=frozenset({"qr"}))
+    html = 'a<svg class="x qr"><g><svg/><path d="M0"></path></g></svg>b<button><p>c</button>d'
+    assert Rewriter(rules).text(html) == "abd"
+
+
 def test_a_link_that_leads_nowhere_is_text() -> None:
     text = Rewriter(BOOK).text('<a class="x" href="data.csv">a</a>')
     assert filled(text, lambda path, anchor, shown: "") == '<a class="x">a</a>'

@@ -1,0 +1,136 @@
+"""A course of any length takes about the same memory, and is built as a short one is."""
+
+from __future__ import annotations
+
+import gc
+import shutil
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from coursekit import Folder, block
+
+from coursebuild.pipeline import documents
+from coursebuild.pipeline.build import build, prepare
+from coursebuild.pipeline.bundles import WORTHWHILE
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.results import KeptFile, OutputFile
+
+FEW, MANY = 12, 48
+TEXT = 20_000
+"""Bytes of prose in a lesson."""
+SLOPE = 6_000
+"""Bytes that a further lesson may take: its entry in the map, names, keys; no text, no tree."""
+
+
+def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
+    """A course of so many lessons, each with so much prose."""
+    entries = ['[course]\ntitle = "Long"\n\n[[level]]\nid = "1"\ntitle = "One"\n']
+    for n in range(1, count + 1):
+        following = n % count + 1
+        prose = "What is said of *this* thing is said of `that` one. " * 6 + "\n\n"
+        code = "\n".join(f"print({i})" for i in range(120))
+        text = block(f"s{n}.py", code, info="norun") + prose * (size // len(prose))
+        links = f"See [there](#part), and [the next](lesson:1.{following}).\n"
+        folder.write(f"content/lessons/1.{n}-l{n}.md", f"## Part {{#part}}\n\n{text}{links}")
+        entries.append(
+            f'[[level.lesson]]\nid = "1.{n}"\nslug = "l{n}"\ntitle = "L {n}"\nstatus = "complete"\n'
+        )
+    folder.write("content/course.toml", "\n".join(entries))
+
+
+def options(folder: Folder, jobs: int = 1) -> Options:
+    return Options(folder.root.resolve(), jobs, True)
+
+
+def peak(folder: Folder) -> int:
+    """The most bytes of Python's that a build holds at once, files that it makes included."""
+    gc.collect()
+    tracemalloc.start()
+    try:
+        with prepare(options(folder), Progress(quiet=True)) as prepared:
+            assert prepared.report.ok, prepared.report.diagnostics
+            for file in prepared.files:
+                if file.path.endswith(".html") and not file.path.startswith("course/"):
+                    assert isinstance(file, KeptFile)
+                    file.make()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.fixture
+def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Caches of a fixed size are left out: they would be filled by the longer course only."""
+    monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
+    monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
+    monkeypatch.setattr("coursebuild.pipeline.reading._COLLECT", 4)
+    monkeypatch.setattr("coursebuild.pipeline.documents._AT_ONCE", 8)
+
+
+@pytest.mark.usefixtures("no_room")
+@pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
+def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
+    peaks = []
+    warm = Folder(tmp_path / "warm")
+    for name, count in (("warm", 4), ("few", FEW), ("many", MANY)):
+        folder = warm if name == "warm" else Folder(tmp_path / name)
+        write_course(folder, count)
+        folder.borrow(stores)
+        if again:
+            build(options(folder), Path("public"))
+            folder.replace("content/lessons/1.2-l2.md", "See [there]", "See again [there]")
+        peaks.append(peak(folder))
+    _, few, many = peaks
+    slope = (many - few) / (MANY - FEW)
+    assert slope < SLOPE, f"{slope:.0f} bytes a lesson"
+
+
+def test_pages_are_drawn_in_copies_of_what_was_read_here(
+    tmp_path: Path, stores: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Texts too few to be read in copies of the process, pages enough to be drawn there."""
+    sites = []
+    for jobs in (1, 2):
+        folder = Folder(tmp_path / f"jobs{jobs}")
+        write_course(folder, documents._MANY - 1, 300)
+        folder.borrow(stores)
+        for store in ("outlines", "pages", "site"):
+            shutil.rmtree(folder.root / ".coursebuild" / store, ignore_errors=True)
+        assert build(options(folder, jobs), Path("public")).ok
+        sites.append(folder.tree("public"))
+    assert sites[0] == sites[1]
+
+
+def test_outlines_come_from_one_file_and_from_many(tmp_path: Path, stores: Path) -> None:
+    """Whether they are in the bundle, beside it, in neither, or damaged: the site is the same."""
+    folder = Folder(tmp_path / "course")
+    write_course(folder, WORTHWHILE + 8, 300)
+    folder.borrow(stores)
+    for store in ("outlines", "bundles"):
+        (folder.root / ".coursebuild" / store).unlink(missing_ok=True)
+    kept = folder.root / ".coursebuild"
+    assert build(options(folder), Path("public")).ok
+    clean = folder.tree("public")
+    (bundled,) = (kept / "bundles").iterdir()
+
+    def again() -> dict[str, bytes]:
+        with prepare(options(folder), Progress(quiet=True)) as prepared:
+            assert prepared.report.ok, prepared.report.diagnostics
+            made = {
+                f.path: f.data if isinstance(f, OutputFile) else f.make() for f in prepared.files
+            }
+        return {path: data for path, data in clean.items() if made.get(path) != data}
+
+    marker = {".coursebuild-site", "files.json"}
+    shutil.rmtree(kept / "outlines")
+    assert again().keys() == marker  # only what publishing adds
+    assert not (kept / "outlines").exists(), "nothing was read again"
+    bundled.write_bytes(bundled.read_bytes()[:-7])
+    assert again().keys() == marker
+    assert len(list((kept / "outlines").iterdir())) == WORTHWHILE + 8
+    (bundled,) = (kept / "bundles").iterdir()
+    shutil.rmtree(kept / "bundles")
+    assert again().keys() == marker
+    assert [entry.name for entry in (kept / "bundles").iterdir()] == [bundled.name]
