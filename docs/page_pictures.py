@@ -38,6 +38,7 @@ ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftsh
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
 
 SETTLED = """async () => {
+  document.documentElement.style.setProperty('--below', 'visible')
   for (let y = 0; y < document.documentElement.scrollHeight; y += innerHeight) {
     scrollTo({ top: y, behavior: 'instant' })
     await new Promise((done) => setTimeout(done, 60))

@@ -142,14 +142,21 @@ def anchors(document: Document) -> frozenset[str]:
 
 def _is_line(anchor: str, document: Document) -> bool:
     """Whether an anchor names lines of a script of a document."""
+    lines, script = linked_lines(anchor), _listing(anchor, document)
+    return lines is not None and script is not None and lines[2] <= _length(script)
+
+
+def _listing(anchor: str, document: Document) -> Script | None:
+    """The script of a document of which an anchor names lines, whether it has them or not."""
     if (lines := linked_lines(anchor)) is None:
-        return False
-    return any(
-        isinstance(block, Script)
-        and line_anchor(block.path, lines[1]) == f"{lines[0]}.L{lines[1]}"
-        and lines[2] <= block.code.text.rstrip("\n").count("\n") + 1
-        for block in document_blocks(document)
-    )
+        return None
+    scripts = (block for block in document_blocks(document) if isinstance(block, Script))
+    wanted = f"{lines[0]}.L{lines[1]}"
+    return next((s for s in scripts if line_anchor(s.path, lines[1]) == wanted), None)
+
+
+def _length(script: Script) -> int:
+    return script.code.text.rstrip("\n").count("\n") + 1
 
 
 def remembered_anchors() -> AnchorsOf:
@@ -275,13 +282,15 @@ def _anchor(
         return
     known = anchors_of(document)
     name = unquote(anchor)
-    if name not in known and not _is_line(name, document):
-        yield diagnose(
-            "link-anchor",
-            span,
-            f"{where} has no anchor `#{anchor}`",
-            help=did_you_mean(anchor, known),
-        )
+    if name in known or _is_line(name, document):
+        return
+    listing = _listing(name, document)
+    help = (
+        did_you_mean(anchor, known)
+        if listing is None
+        else f"the last line of `{listing.path}` is {_length(listing)}"
+    )
+    yield diagnose("link-anchor", span, f"{where} has no anchor `#{anchor}`", help=help)
 
 
 def _check_url(

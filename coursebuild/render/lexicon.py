@@ -24,6 +24,7 @@ from coursebuild.model import (
     Lexicon,
     Math,
     MathBlock,
+    Meaning,
     NumberBinding,
     Paragraph,
     SymbolUse,
@@ -32,6 +33,7 @@ from coursebuild.model import (
     child_blocks,
     document_blocks,
     plain_text,
+    walk_blocks,
     walk_inlines,
 )
 from coursebuild.model.lexicon import Piece
@@ -60,11 +62,11 @@ def lexicon(document: Document, formulas: Formulas) -> Lexicon:
     equations = numbered(document, lambda tex: mathml(tex, True)) if "$$" in text else {}
     if "$" not in text:
         return Lexicon(terms)
-    uses, sections = _symbols(document, mathml)
+    found = _symbols(document, mathml)
     return Lexicon(
         terms,
-        uses,
-        sections,
+        tuple(found.uses.values()),
+        tuple(found.sections),
         tuple(Equation(one.id, one.number) for one in equations.values()),
     )
 
@@ -143,32 +145,53 @@ def _sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
 # --- symbols
 
 
-def _symbols(
-    document: Document, mathml: _Mathml
-) -> tuple[tuple[SymbolUse, ...], tuple[tuple[str, str], ...]]:
-    found: dict[str, SymbolUse] = {}
-    sections: list[tuple[str, str]] = []
-    heading: Heading | None = None
-    listed = False
-    for block in document_blocks(document):
-        if isinstance(block, Heading) and block.level <= 3:
-            heading, listed = block, False
-        for formula in _formulas_in(block):
+class _Symbols:
+    """The symbols of a document, as far as it was looked at."""
+
+    def __init__(self) -> None:
+        self.uses: dict[str, SymbolUse] = {}
+        self.sections: list[tuple[str, str]] = []
+        self._heading: Heading | None = None
+        self._section = -1
+        """Index of the section of the heading, once a symbol stood there first."""
+
+    def under(self, heading: Heading | None) -> None:
+        """What follows stands under a heading, or under none."""
+        self._heading, self._section = heading, -1
+
+    def note(self, symbol: str, meaning: Meaning | None) -> None:
+        """A symbol stands here, and may be said to mean something."""
+        known = self.uses.get(symbol)
+        if known is None:
+            if self._section < 0 and self._heading is not None:
+                title = " ".join(plain_text(self._heading.children).split())
+                self._section = len(self.sections)
+                self.sections.append((self._heading.anchor, title))
+            self.uses[symbol] = known = SymbolUse(symbol, self._section)
+        if meaning is not None and not known.meaning:
+            self.uses[symbol] = SymbolUse(symbol, known.section, meaning.text, meaning.unit)
+
+
+def _symbols(document: Document, mathml: _Mathml) -> _Symbols:
+    found = _Symbols()
+    for block in _blocks(document):
+        if block is None or (isinstance(block, Heading) and block.level <= 3):
+            found.under(block)
+        for formula in () if block is None else _formulas_in(block):
             meaning = formula.meaning if isinstance(formula, Math) else None
-            html = mathml(formula.tex.text, formula.display if isinstance(formula, Math) else True)
-            here = symbols(html) if html else ()
-            only = only_symbol(html) if meaning is not None and html else None
-            for symbol in (only,) if only is not None else here:
-                known = found.get(symbol)
-                if known is None:
-                    if heading is not None and not listed:
-                        title = " ".join(plain_text(heading.children).split())
-                        sections.append((heading.anchor, title))
-                        listed = True
-                    found[symbol] = known = SymbolUse(symbol, len(sections) - 1)
-                if meaning is not None and not known.meaning:
-                    found[symbol] = SymbolUse(symbol, known.section, meaning.text, meaning.unit)
-    return tuple(found.values()), tuple(sections)
+            html = mathml(formula.tex.text, not isinstance(formula, Math) or formula.display)
+            only = only_symbol(html) if meaning is not None else None
+            for symbol in (only,) if only is not None else symbols(html):
+                found.note(symbol, meaning)
+    return found
+
+
+def _blocks(document: Document) -> Iterator[Block | None]:
+    """All blocks; `None` before the footnotes, which stand under no heading."""
+    yield from walk_blocks(document.blocks)
+    yield None
+    for footnote in document.footnotes:
+        yield from walk_blocks(footnote.blocks)
 
 
 def _formulas_in(block: Block) -> Iterator[Math | MathBlock]:

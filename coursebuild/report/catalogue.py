@@ -42,8 +42,6 @@ def catalogue_page(examples: Mapping[str, Example]) -> str:
     """`docs/rules.md`."""
     errors = sum(rule.severity == "error" for rule in RULES.values())
     head = f"""\
-# Rules
-
 Every diagnostic of `coursebuild` names its rule, as in `error[output-drift]`. There are {errors}
 errors and {len(RULES) - errors} warnings. An error keeps the site from being published, and
 nothing silences it. A warning can be silenced in `content/course.toml`, by its rule and with a

@@ -47,6 +47,7 @@ document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }
   if (!document.querySelector('.theme')) addThemeSwitch(document, words)
   addSearch(document, words)
   added.forEach(improve)
+  addLineNumbers(document, words) // of a listing of which only lines were replaced
   leaveContents()
   leaveContents = followContents(document)
   leaveNotes()

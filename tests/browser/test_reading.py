@@ -115,6 +115,12 @@ def test_a_line_in_a_fold_is_shown_and_marked(hosts: dict[str, Host], open_page:
     until(page, "document.querySelector('.marked')?.id === 'sub/wide.L4'")
 
 
+def test_a_long_line_is_shown_from_its_beginning(hosts: dict[str, Host], open_page: Any) -> None:
+    page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L5", 800)
+    box = page.locator("pre:has([id='sub/wide.L5'])")
+    assert box.evaluate("b => [b.scrollWidth > b.clientWidth, b.scrollLeft]") == [True, 0]
+
+
 def test_a_line_is_reached_without_scripts(hosts: dict[str, Host], open_page: Any) -> None:
     page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L60", java_script_enabled=False)
     line = page.locator("[id='sub/wide.L60']")

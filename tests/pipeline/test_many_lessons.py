@@ -52,9 +52,10 @@ def peak(folder: Folder) -> int:
         with prepare(options(folder), Progress(quiet=True)) as prepared:
             assert prepared.report.ok, prepared.report.diagnostics
             for file in prepared.files:
-                if file.path.endswith(".html"):
+                if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
                     assert isinstance(file, KeptFile)
-                    file.make()
+                    for _ in file.pieces() if file.pieces is not None else (file.make(),):
+                        pass  # as it is written
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -180,6 +180,8 @@ def test_the_list_of_pages_says_where_everything_is() -> None:
         assert (kind, title, name) == (0, f"Title {path}", "")
         assert files[f"assets/search/{file}.js"].make() == b"text of " + path.encode()
     assert {path.partition(".js")[2] for path in files} == {"", ".br", ".gz"}
+    # Keys stand in lines whose fields are parted by blanks.
+    assert not [file.key for file in files.values() if len(file.key.split()) != 1]
 
 
 def test_pages_that_are_alike_have_files_of_their_own() -> None:

@@ -25,7 +25,7 @@ from coursebuild.model import Course, Document, MjcfModel
 from coursebuild.render import fonts, lesson, meta, pages, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
-from coursebuild.render.exports.files import Around, Exports, OnDemand
+from coursebuild.render.exports.files import Around, Exports, OnDemand, export_paths
 from coursebuild.render.frame import Draft, Names, frame
 from coursebuild.render.glossary import glossary_draft
 from coursebuild.render.library import Library, owners
@@ -223,8 +223,9 @@ class Pages:
         for file in offline_files(course, self._assets):
             if file.path != urls.WORKER:  # a preview is shown by nothing but its server
                 yield file.path, functools.partial(_data, file)
-        for kept in self._exports(library):
-            yield kept.path, functools.partial(self._exported, kept.path)
+        files = frozenset(map(urls.file_path, course.files))
+        for path in export_paths(library, self._painters, files):
+            yield path, functools.partial(self._exported, path)
         yield urls.ROBOTS, functools.partial(meta.robots, course)
         if course.base_url:
             yield urls.SITEMAP, self._sitemap

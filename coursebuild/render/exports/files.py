@@ -85,6 +85,18 @@ class Around:
     keep: Keep = lambda key, make: make()
 
 
+def export_paths(library: Library, pages: Iterable[str], taken: frozenset[str]) -> Iterator[str]:
+    """The site paths of what `Exports` makes, in no order; `pages` are those of all pages."""
+    twins = map(urls.twin_path, pages)
+    yield from (path for path in twins if path is not None and path not in taken)
+    yield LLMS
+    lessons = [lesson for lesson in library.order if lesson.document is not None]
+    yield from map(urls.notebook_path, lessons)
+    yield from (book.path for book in books(library))
+    if lessons:
+        yield urls.EPUB
+
+
 class Exports:
     """What a site gives away besides its pages."""
 

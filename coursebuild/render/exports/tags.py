@@ -55,6 +55,8 @@ _MARK = re.compile(
 )
 _NAME = re.compile(r"/?([a-zA-Z][^\s/>]*)")
 _ATTRIBUTE = re.compile(r"""([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+_SHORT = 24
+"""Characters of a tag that is remembered."""
 _DROPPED = frozenset("script style xmp iframe noembed noframes".split())
 
 
@@ -66,17 +68,23 @@ def pieces(html: str) -> Iterator[Piece]:
             yield html[at : match.start()]
         at = match.end()
         if match["tag"]:
-            yield _tag(match["tag"])
+            text = match["tag"]
+            # A tag with an address or an id comes once: it would only fill the cache.
+            yield (_tag if len(text) < _SHORT else _read)(text)
         elif match["raw"] and match["raw"].lower() not in _DROPPED:
-            yield _tag(f"{match['raw']}{match['rest']}")
+            yield _read(f"{match['raw']}{match['rest']}")
             yield match["inside"]
             yield End(match["raw"].lower())
     if at < len(html):
         yield html[at:]
 
 
-@functools.lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=512)
 def _tag(text: str) -> Start | End:
+    return _read(text)
+
+
+def _read(text: str) -> Start | End:
     match = _NAME.match(text)
     assert match is not None, "the pattern of tags begins with a name"
     name = match[1] if match[1] in _CAMEL else match[1].lower()

@@ -51,16 +51,24 @@ function mark(document, lines) {
   return found
 }
 
+/** Bring a line into sight, with its beginning: a long one would be scrolled to its end. */
+function show(line, block) {
+  if (!line) return
+  line.scrollIntoView({ block })
+  line.closest('pre').scrollLeft = 0
+}
+
 /** Follow the page's address: mark the lines that it names, now and whenever it changes. */
 export function followLines(window) {
-  const follow = () => mark(window.document, readLines(window.location.hash))[0]?.scrollIntoView({ block: 'center' })
+  const follow = () => show(mark(window.document, readLines(window.location.hash))[0], 'center')
   window.addEventListener('hashchange', follow)
   if (readLines(window.location.hash)) follow()
 }
 
-/** Put numbers beside the listings of a part of the page. */
+/** Put numbers beside the listings of a part of the page, in place of those that are there. */
 export function addLineNumbers(part, words) {
   for (const box of within(part, 'pre[data-first]')) {
+    box.querySelector(':scope > .lines')?.remove()
     const line = box.querySelector('code > [id]')
     if (line) box.prepend(numbers(box, line, words))
   }
@@ -96,7 +104,7 @@ function numbers(box, line, words) {
     const keys = { ArrowDown: to + 1, ArrowRight: to + 1, ArrowUp: to - 1, ArrowLeft: to - 1, Home: first, End: first + count - 1 }
     if (!(event.key in keys) || event.ctrlKey || event.altKey || event.metaKey) return
     event.preventDefault()
-    go(keys[event.key], event.shiftKey)?.scrollIntoView({ block: 'nearest' })
+    show(go(keys[event.key], event.shiftKey), 'nearest')
   })
   return column
 }
