@@ -15,7 +15,7 @@ import hashlib
 import json
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Protocol, TypeAlias
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 from coursebuild.model import Document, Lesson, Page
 from coursebuild.render import pages, urls, zips
@@ -36,6 +36,7 @@ from coursebuild.render.sheet import Sheet
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 from coursebuild.values import dataclass
 
+Of = TypeVar("Of")
 Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]]
 """Archives of scripts by site path, with their keys."""
 Keep: TypeAlias = Callable[[str, Callable[[], bytes]], bytes]
@@ -120,11 +121,11 @@ class Exports:
         return self._source.key(urls.lesson_path(lesson))
 
     def _twins(self) -> Iterator[SiteFile]:
+        twin = self._twin
         for page in self._source.paths:
             path = urls.twin_path(page)
             if path is not None and path not in self._around.taken:
-                key = _key("twin", self._source.key(page))
-                yield KeptFile(path, key, functools.partial(self._twin, page))
+                yield KeptFile(path, self._source.key(page), _Made(twin, page))
 
     def _twin(self, page: str) -> bytes:
         return visible(self._source.beside(page).twin).encode()
@@ -134,8 +135,7 @@ class Exports:
     def _notebook(self, lesson: Lesson) -> KeptFile:
         key, _ = self._around.archives.get(urls.lesson_zip_path(lesson), ("", None))
         key = _key("notebook", self._page_key(lesson), key)
-        make = functools.partial(self._notebook_made, lesson)
-        return KeptFile(urls.notebook_path(lesson), key, make)
+        return KeptFile(urls.notebook_path(lesson), key, _Made(self._notebook_made, lesson))
 
     def _notebook_made(self, lesson: Lesson) -> bytes:
         made = self._source.beside(urls.lesson_path(lesson)).notebook
@@ -226,6 +226,17 @@ def _chapter_part(data: bytes) -> tuple[Chapter, Deflated]:
     end = _HEAD.size + length
     pictures, mathml, svg = json.loads(data[_HEAD.size : end])
     return Chapter(tuple(pictures), mathml, svg), (crc, size, data[end:])
+
+
+@dataclass(frozen=True, slots=True)
+class _Made(Generic[Of]):
+    """Gives the bytes of a file; a course has many, so that they are small."""
+
+    make: Callable[[Of], bytes]
+    of: Of
+
+    def __call__(self) -> bytes:
+        return self.make(self.of)
 
 
 def _joined(pieces: Callable[[], Iterator[bytes]]) -> bytes:

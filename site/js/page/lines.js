@@ -55,14 +55,21 @@ function mark(document, lines) {
 function show(line, block) {
   if (!line) return
   line.scrollIntoView({ block })
-  line.closest('pre').scrollLeft = 0
+  straighten(line)
+}
+
+function straighten(line) {
+  if (line) line.closest('pre').scrollLeft = 0
 }
 
 /** Follow the page's address: mark the lines that it names, now and whenever it changes. */
 export function followLines(window) {
   const follow = () => show(mark(window.document, readLines(window.location.hash))[0], 'center')
   window.addEventListener('hashchange', follow)
-  if (readLines(window.location.hash)) follow()
+  if (!readLines(window.location.hash)) return
+  follow()
+  // By then the browser has gone to the line by itself, and perhaps to its end.
+  window.addEventListener('load', () => straighten(window.document.querySelector('.marked')))
 }
 
 /** Put numbers beside the listings of a part of the page, in place of those that are there. */
