@@ -80,7 +80,7 @@ def test_no_page_is_wider_than_a_narrow_window(
         assert page.evaluate(WIDTH) <= width, path
 
 
-@pytest.mark.parametrize("width", [700, 1000, 1300])
+@pytest.mark.parametrize("width", [700, 1000, 1200, 1300])
 def test_nor_than_a_wider_one(hosts: dict[str, Host], open_page: Any, width: int) -> None:
     page = open_page(hosts["nasty"].url + LESSON, width)
     page.evaluate(OPEN_ALL)

@@ -186,3 +186,39 @@ def test_axe_finds_nothing_on_any_kind_of_page(
             page.evaluate(WHOLE)
             assert axe(page) == [], kind
             assert page.evaluate("document.documentElement.scrollWidth") <= width, kind
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1440), ("dark", 360)])
+def test_axe_finds_nothing_in_what_scripts_add(
+    browsers: dict[str, Browser], sites: dict[str, Site], scheme: Any, width: int
+) -> None:
+    """The search while it is open, questions that were answered, a notice."""
+    viewport: Any = {"width": width, "height": 900}
+    with browsers["plain"].new_context(
+        viewport=viewport, color_scheme=scheme, bypass_csp=True
+    ) as context:
+        page = context.new_page()
+        page.goto(sites["full"].url(sites["full"].kinds()["lesson"]))
+        page.keyboard.press("Control+k")
+        dialog = page.locator("dialog[open]")
+        dialog.wait_for()
+        page.keyboard.type("number")
+        dialog.get_by_role("option").or_(dialog.get_by_role("link")).first.wait_for()
+        assert axe(page) == [], "the search"
+        page.keyboard.press("Escape")
+        dialog.wait_for(state="detached")
+        answered = 0
+        for question in page.locator(".question:visible").all():
+            question.scroll_into_view_if_needed()
+            question.locator("button:visible").first.wait_for()
+            choice = question.locator("input[type=radio]:visible, input[type=checkbox]:visible")
+            if choice.count():
+                choice.first.check()
+            elif question.locator("input:visible").count():
+                question.locator("input:visible").first.fill("1")
+            question.locator("button[type=submit]:visible, button:visible").last.click()
+            answered += 1
+        assert answered > 3
+        until(page, "document.querySelectorAll('.verdict').length > 2")
+        page.evaluate(WHOLE)
+        assert axe(page) == [], "questions"

@@ -3,6 +3,15 @@
 import { gradeChoice } from './grade.js'
 import { copyOf, fill, h, keysIn, shape } from './parts.js'
 
+/** Names are made of text, and a formula alone has none that every reader of screens takes: it is called as it is written in TeX. */
+function nameFormula(input, text) {
+  const formulas = [...text.querySelectorAll('math')]
+  const words = [text.textContent, ...formulas.map((formula) => formula.textContent)].reduce((rest, part) => rest.replace(part, ''))
+  if (formulas.length === 0 || words.trim()) return
+  const written = (formula) => formula.querySelector('annotation')?.textContent ?? formula.textContent
+  input.setAttribute('aria-label', formulas.map(written).join(' '))
+}
+
 export class Choices {
   /** @param {import('./question.js').Question} question */
   constructor(question) {
@@ -22,6 +31,7 @@ export class Choices {
     const input = h('input', { type: this.several ? 'checkbox' : 'radio', name: 'option', value: item.dataset.key })
     const text = h('span', { class: 'option-text' }, ...item.childNodes)
     const mark = h('span', { class: 'option-mark' })
+    nameFormula(input, text)
     item.append(h('label', { class: 'option' }, input, h('span', { class: 'option-body' }, text, ' ', mark)))
     return { key: item.dataset.key, item, input, text, mark }
   }
