@@ -36,9 +36,10 @@ from coursebuild.pipeline.records import (
 from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, Draw, Later
 from coursebuild.render import lesson, pages
 from coursebuild.render.frame import Frames, Names
-from coursebuild.render.glossary import glossary_sheet
 from coursebuild.render.library import Library
 from coursebuild.render.links import has
+from coursebuild.render.lookup.glossary import glossary_sheet
+from coursebuild.render.lookup.symbol_index import symbols_sheet
 from coursebuild.render.numerics import numerics_sheet
 from coursebuild.render.offline import offline_sheet
 from coursebuild.render.own_pages import own_pages
@@ -48,7 +49,6 @@ from coursebuild.render.search.files import Entry
 from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.shared import PageFacts
 from coursebuild.render.sheet import Sheet, fingerprint
-from coursebuild.render.symbol_index import symbols_sheet
 from coursebuild.results import KeptFile
 from coursebuild.values import dataclass
 

@@ -51,7 +51,7 @@ from coursebuild.pipeline.requests import (
     Read,
     Request,
 )
-from coursebuild.render.lexicon import lexicon, misdeclared
+from coursebuild.render.lookup.lexicon import lexicon, misdeclared
 from coursebuild.render.record import record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports

@@ -34,7 +34,7 @@ from coursebuild.render.asked import AskedBy
 from coursebuild.render.asked import asked as asked_in
 from coursebuild.render.assets import Assets, strings_for, templates_of
 from coursebuild.render.lab_files import PublishedLabs, lab_files
-from coursebuild.render.references import CrossReferences, Mentions, mentions
+from coursebuild.render.lookup.references import CrossReferences, Mentions, mentions
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
@@ -221,7 +221,7 @@ def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) 
     """That of a skeleton, or made from a whole document and its formulas."""
     if document.lexicon is not None:
         return document.lexicon
-    from coursebuild.render.lexicon import lexicon  # with all that it takes to draw
+    from coursebuild.render.lookup.lexicon import lexicon  # with all that it takes to draw
 
     return lexicon(document, formulas)
 

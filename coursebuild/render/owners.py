@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.library import Library
-from coursebuild.render.references import Owner
-from coursebuild.render.references import owner_path as owner_path
+from coursebuild.render.lookup.references import Owner
+from coursebuild.render.lookup.references import owner_path as owner_path
 from coursebuild.values import dataclass
 
 MOST = 12

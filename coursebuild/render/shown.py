@@ -36,7 +36,7 @@ from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
-from coursebuild.render.references import owner_path
+from coursebuild.render.lookup.references import owner_path
 from coursebuild.render.sheet import (
     Shown,
     ShownCallout,

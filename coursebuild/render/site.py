@@ -20,8 +20,9 @@ from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.files import Around, Exports, OnDemand
 from coursebuild.render.frame import Draft, Names, frame
-from coursebuild.render.glossary import glossary_draft
 from coursebuild.render.library import Library
+from coursebuild.render.lookup.glossary import glossary_draft
+from coursebuild.render.lookup.symbol_index import symbols_draft
 from coursebuild.render.offline import facts_of, file_list, offline_draft, offline_files
 from coursebuild.render.reader import progress_draft, review_draft
 from coursebuild.render.search.sheet import search_sheet
@@ -33,7 +34,6 @@ from coursebuild.render.shared import (
     settled,
     shared_files,
 )
-from coursebuild.render.symbol_index import symbols_draft
 from coursebuild.results import OutputFile, Results
 from coursebuild.values import dataclass, field
 

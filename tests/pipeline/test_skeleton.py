@@ -18,7 +18,6 @@ from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.outlines import Outline, packed, unpacked
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import PublishedLabs
-from coursebuild.render.lexicon import lexicon
 from coursebuild.render.library import (
     Library,
     document_scripts,
@@ -26,7 +25,8 @@ from coursebuild.render.library import (
     named_models,
     place,
 )
-from coursebuild.render.references import mentions
+from coursebuild.render.lookup.lexicon import lexicon
+from coursebuild.render.lookup.references import mentions
 from coursebuild.render.sheet import fingerprint
 from coursebuild.render.shown import shown
 from coursebuild.render.urls import Place

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.model import Paragraph, Term, plain_text, walk_inlines
-from coursebuild.render.sentences import runs_on, sentence_of
+from coursebuild.render.lookup.sentences import runs_on, sentence_of
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.effects.v8 import MathEngine
-from coursebuild.render.symbols import only_symbol, sort_key, symbols
+from coursebuild.render.lookup.symbols import only_symbol, sort_key, symbols
 from coursebuild.results import Formula
 
 Typeset = Callable[[str], str]

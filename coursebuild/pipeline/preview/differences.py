@@ -15,7 +15,7 @@ from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.model import Course, Document, Lesson, Page, Quiz, Script, document_blocks
 from coursebuild.render import urls
 from coursebuild.render.library import Library, Owner
-from coursebuild.render.references import owner_path
+from coursebuild.render.lookup.references import owner_path
 from coursebuild.results import ScriptRun
 from coursebuild.source import Span
 

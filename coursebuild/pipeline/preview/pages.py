@@ -27,13 +27,13 @@ from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.files import Around, Exports, OnDemand, export_paths
 from coursebuild.render.frame import Draft, Names, frame
-from coursebuild.render.glossary import glossary_draft
 from coursebuild.render.library import Library, owners
+from coursebuild.render.lookup.glossary import glossary_draft
+from coursebuild.render.lookup.symbol_index import symbols_draft
 from coursebuild.render.offline import offline_draft, offline_files
 from coursebuild.render.reader import progress_draft, review_draft
 from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
 from coursebuild.render.site import all_facts
-from coursebuild.render.symbol_index import symbols_draft
 from coursebuild.results import OutputFile, SiteFile
 from coursebuild.values import dataclass
 

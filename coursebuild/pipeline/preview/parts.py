@@ -32,7 +32,6 @@ from coursebuild.pipeline.preview.memo import PerDocument
 from coursebuild.render.asked import asked
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import LabFiles, PublishedLabs, lab_files
-from coursebuild.render.lexicon import misdeclared
 from coursebuild.render.library import (
     Library,
     NamedModels,
@@ -46,7 +45,8 @@ from coursebuild.render.library import (
     references_of,
     uses_of,
 )
-from coursebuild.render.references import Mentions, mentions
+from coursebuild.render.lookup.lexicon import misdeclared
+from coursebuild.render.lookup.references import Mentions, mentions
 from coursebuild.results import (
     CompileResult,
     Formula,

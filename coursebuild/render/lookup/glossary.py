@@ -14,8 +14,8 @@ from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library
+from coursebuild.render.lookup.references import GlossaryTerm
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.render.references import GlossaryTerm
 from coursebuild.render.sheet import Sheet
 from coursebuild.values import dataclass
 

@@ -13,10 +13,10 @@ from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library
+from coursebuild.render.lookup.references import CourseSymbol
+from coursebuild.render.lookup.symbols import sort_key
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.render.references import CourseSymbol
 from coursebuild.render.sheet import Sheet
-from coursebuild.render.symbols import sort_key
 from coursebuild.values import dataclass
 
 
