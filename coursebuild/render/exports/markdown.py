@@ -87,6 +87,14 @@ class Context(Protocol):
         """A reference to a footnote."""
         ...
 
+    def named(self, target: Target) -> str:
+        """What a link without a text says: the number of a formula; empty for none."""
+        ...
+
+    def number(self, start: int) -> str:
+        """The number that is to stand beside the formula at an offset; empty for none."""
+        ...
+
     def own(self, block: OwnBlock) -> str:
         """A block of ours, without its last line end; empty for none."""
         ...
@@ -155,7 +163,8 @@ class _Writer:
             case ThematicBreak():
                 return "___"
             case MathBlock():
-                return "\n".join(filter(None, ("$$", _no_empty_lines(block.tex.text), "$$")))
+                tex, tag = _no_empty_lines(block.tex.text), self._tag(block.span.start)
+                return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case Table():
                 return self._table(block)
             case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf() | Lab() | Quiz():
@@ -230,7 +239,8 @@ class _Writer:
             case NumberBinding():
                 return escaped(number_text(inline))
             case Math():
-                return _formula(inline, cell=cell)
+                tag = self._tag(inline.span.start) if inline.display else ""
+                return _formula(inline, tag, cell=cell)
             case Emphasis():
                 mark = _delimiter(inline.span.text, "*")
                 return f"{mark}{inner(inline.children)}{mark}"
@@ -253,11 +263,16 @@ class _Writer:
             case _:
                 assert_never(inline)
 
+    def _tag(self, start: int) -> str:
+        number = self.context.number(start)
+        return f"\\tag{{{number}}}" if number else ""
+
     def _link(self, node: Link, text: str, *, cell: bool) -> str:
         source = node.span.text
         if source == f"<{plain_text(node.children)}>" and not cell:
             return source
         href = self.context.href(node.target)
+        text = text or escaped(self.context.named(node.target))
         return link(text, href.replace("|", "%7C") if cell else href, node.title)
 
 
@@ -291,8 +306,8 @@ def _delimiter(source: str, usual: str) -> str:
     return source[0] if source[:1] in ("*", "_") else usual
 
 
-def _formula(node: Math, *, cell: bool) -> str:
-    tex = node.tex.text
+def _formula(node: Math, tag: str, *, cell: bool) -> str:
+    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
     if cell:  # a pipe would end the cell, and an escaped one is another sign
         tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
     if re.search(r"(?<!\\)%", tex):  # a line's end ends a comment

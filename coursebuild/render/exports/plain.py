@@ -87,6 +87,15 @@ class Plain:
         """A reference to a footnote."""
         return f"<sup>{note}</sup>" if self.notebook else f"[^{note}]"
 
+    def named(self, target: Target) -> str:
+        """What a link without a text says."""
+        return self.page.reference(target)
+
+    def number(self, start: int) -> str:
+        """The number beside a formula that does not show one itself."""
+        known = self.page.equations.get(start)
+        return known.number if known is not None and known.shown else ""
+
     def own(self, block: OwnBlock) -> str:
         """A block of ours."""
         match block:

@@ -259,3 +259,13 @@ def test_a_course_without_lessons_gives_none_away(make: Make) -> None:
     files = replace(made, course=course).site(SiteOptions(subset=lambda job: job.data))
     assert not [path for path in files if path.endswith((".ipynb", ".epub")) or "course/" in path]
     assert b"course.epub" not in files["index.html"] and b"Optional" in files["llms.txt"]
+
+
+def test_numbers_of_formulas_are_written(make: Make) -> None:
+    text = (
+        "## Part {#part}\n\n$$\na = b % so\n$$ {#eq:one}\n\nBy $$c$$ {#eq:two} and [](#eq:two), "
+        "from [](#eq:one).\n"
+    )
+    twin = site(make, text)["lessons/0.1-falling.md"].decode()
+    assert "$$\na = b % so\n\\tag{1}\n$$" in twin
+    assert "[(1)](#eq:one)" in twin

@@ -43,6 +43,12 @@ class Context:
     def reference(self, note: int) -> str:
         return f"[^{note}]"
 
+    def named(self, target: Target) -> str:
+        return ""
+
+    def number(self, start: int) -> str:
+        return ""
+
     def own(self, block: OwnBlock) -> str:
         if isinstance(block, Callout):
             title = guarded(write_inlines(block.title, self))
