@@ -8,7 +8,8 @@ So
 1. a long formula is cut into several elements where TeX would break it too: after the relations and
    the binary operators of its outermost level;
 2. a piece that may be wider than a narrow window scrolls inside itself;
-3. a formula and the punctuation that touches it are held together.
+3. a formula is held together with the punctuation that touches it, and with a unit behind a space
+   that does not break.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ _ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
-_TOUCHING = re.compile(r"""((?:<math>.*?</math>)+)([,.;:!?)\]’”"'…%]*)""", re.DOTALL)
+_TOUCHING = re.compile(
+    r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16})?[,.;:!?)\]’”"'…%]*)""", re.DOTALL
+)
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
@@ -111,7 +114,7 @@ def contained(html: str, label: str) -> str:
 
 
 def glue(html: str) -> str:
-    """The page with each inline formula held together with the punctuation that touches it."""
+    """The page with each inline formula held together with what must not leave it."""
     parts: list[str] = []
     at = 0
     start = html.find("<math>")

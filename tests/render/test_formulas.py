@@ -38,6 +38,9 @@ Y = "<math><mi>y</mi></math>"
     [
         (f"axis {X}, {Y}.", f'axis <span class="held">{X},</span> <span class="held">{Y}.</span>'),
         (f"({X})", f'<span class="held">({X})</span>'),
+        (f"{X}\u00a0m, to", f'<span class="held">{X}\u00a0m,</span> to'),
+        (f"{Y}\u00a0kg<sup>2</sup>", f'<span class="held">{Y}\u00a0kg</span><sup>2</sup>'),
+        (f"{X} m, {Y}\u00a0", f"{X} m, {Y}\u00a0"),
         (f"“{X}”, so", f'<span class="held">“{X}”,</span> so'),
         (f"{X} and {X}", f"{X} and {X}"),
         (f"({X}{Y}{X})!", f'<span class="held">({X}</span>{Y}<span class="held">{X})!</span>'),

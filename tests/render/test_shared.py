@@ -30,6 +30,7 @@ PIECES = [
         "é",
         "∂",
         "a b",
+        "\u00a0m",
         "\n",
     ),
 ]
@@ -43,7 +44,8 @@ def draft(body: str) -> Draft:
 def glued(body: str) -> str:
     """The same as `formulas.glue`, by its definition."""
     formula = r"((?:<math>(?:(?!</math>).)*</math>)+)"
-    touching = re.compile(rf"""([(\[“‘"']*){formula}([,.;:!?)\]’”"'…%]*)""", re.DOTALL)
+    after = r"""((?:\xa0[^\s<&]{1,16})?[,.;:!?)\]’”"'…%]*)"""
+    touching = re.compile(rf"""([(\[“‘"']*){formula}{after}""", re.DOTALL)
     return touching.sub(held, body)
 
 
