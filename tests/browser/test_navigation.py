@@ -198,7 +198,7 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
 def test_from_a_term_to_the_glossary_and_back(page: Page, base: str) -> None:
     page.goto(base + "lessons/1.2-two.html")
     page.get_by_role("link", name="force", exact=True).click()
-    assert page.locator('dfn[id="term:force"]:target').count() == 1
+    page.locator('dfn[id="term:force"]:target').wait_for()
     page.get_by_role("contentinfo").get_by_role("link", name="Glossary").click()
     page.wait_for_url("**/glossary/index.html")
     entry = page.locator(".term")

@@ -93,7 +93,8 @@ def test_a_build_killed_at_its_calls(make: Make, mortals: Mortals, tmp_path: Pat
     status, calls = mortals.run(folder, "build", "-q")
     assert status == 0
     new = folder.tree()
-    assert {*old} ^ {*new} == {
+    changed = {path for path in {*old} ^ {*new} if not path.startswith("public/assets/search/")}
+    assert changed == {
         f"{place}examples/{name}.py" for place in ("", "public/") for name in ("gone", "new")
     }
     assert {"exchange", "replace", "link", "write", "unlink", "rmdir"} <= {*calls}

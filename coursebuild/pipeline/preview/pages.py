@@ -22,6 +22,7 @@ from typing import TypeAlias
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
 from coursebuild.model import Course, Document, MjcfModel
+from coursebuild.pipeline.preview.search import Search
 from coursebuild.render import fonts, lesson, meta, pages, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
@@ -32,12 +33,16 @@ from coursebuild.render.lookup.glossary import glossary_draft
 from coursebuild.render.lookup.symbol_index import symbols_draft
 from coursebuild.render.offline import offline_draft, offline_files
 from coursebuild.render.reader import progress_draft, review_draft
+from coursebuild.render.search.files import FOLDER
+from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
 from coursebuild.render.site import all_facts
 from coursebuild.results import OutputFile, SiteFile
 from coursebuild.values import dataclass
 
 Painter: TypeAlias = Callable[[Library], Draft]
+Make: TypeAlias = Callable[[], bytes | None]
+"""Makes a file, if it can be had."""
 
 _ANYTHING = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
@@ -82,6 +87,7 @@ def painters(library: Library, whole: Callable[[Document], Document]) -> dict[st
     if library.asked:
         found[urls.REVIEW] = review_draft
     found[urls.OFFLINE] = offline_draft
+    found[urls.SEARCH] = _search
     found[urls.NOT_FOUND] = pages.not_found_draft
     return found
 
@@ -99,6 +105,10 @@ def _lesson(id: str, whole: Callable[[Document], Document], library: Library) ->
 
 def _model(model: MjcfModel, library: Library) -> Draft:
     return pages.model_draft(library, model)
+
+
+def _search(library: Library) -> Draft:
+    return lesson.drawn(library, search_sheet(library))
 
 
 def _page(id: str, whole: Callable[[Document], Document], library: Library) -> Draft:
@@ -146,7 +156,8 @@ class Pages:
         self._facts: dict[str, PageFacts] = {}
         self._stale: set[str] = set()
         self._texts: dict[str, bytes] = {}
-        self._files: dict[str, Callable[[], bytes]] | None = None
+        self._search = Search(whole)
+        self._files: dict[str, Make] | None = None
         """Everything else, listed when it is first asked for."""
         self._shared_facts: PageFacts | None = None
         self._generations: list[dict[str, bytes]] = []
@@ -173,6 +184,7 @@ class Pages:
         else:
             self._stale.update(stale)
         self._files = None
+        self._search.renew()
         if self._names is None:
             self._share(_ANYTHING, lambda job: job.data)
 
@@ -188,6 +200,8 @@ class Pages:
 
     def put(self, path: str, drawn: Drawn, text: bytes | None = None) -> None:
         """Take a page that was drawn, and maybe framed, from the library as it is now."""
+        if path in self._stale or path in self._held:
+            self._search.renew()
         self._held.discard(path)
         self._drawn[path] = drawn
         if len(self._drawn) > _DRAWN + len(self._held):
@@ -200,7 +214,7 @@ class Pages:
         if text is not None:
             self._texts[path] = text
 
-    def _other_files(self, library: Library) -> Iterator[tuple[str, Callable[[], bytes]]]:
+    def _other_files(self, library: Library) -> Iterator[tuple[str, Make]]:
         """Everything that is no page and is not shared by all, made when it is asked for."""
         course = library.course
         for path, (script, _) in library.scripts.items():
@@ -252,10 +266,14 @@ class Pages:
         source = OnDemand(library, tuple(self._painters), self._body, self._whole)
         return Exports(library, source, surroundings).files(self._names)
 
-    def _exported(self, path: str) -> bytes:
-        """One of these files, as everything is now."""
+    def _exported(self, path: str) -> bytes | None:
+        """One of these files, as everything is now; none of what has mistakes."""
         library = self._library
         assert library is not None
+        page = path.rpartition(".")[0] + ".html"
+        needed = (page,) if page in self._painters else tuple(self._painters)
+        if any(self._page(path) is None or path in self._held for path in needed):
+            return None
         if path == urls.EPUB:  # which has the styles of all pages
             for page in self.unnoted():
                 self.look_at(page)
@@ -307,7 +325,7 @@ class Pages:
     def paths(self) -> tuple[str, ...]:
         """The site paths of everything that a build would publish, sorted."""
         newest = self._generations[-1].keys() if self._generations else ()
-        return tuple(sorted({*self._painters, *self._others(), *newest}))
+        return tuple(sorted({*self._painters, *self._others(), *newest, *self._searched()}))
 
     def has_page(self, path: str) -> bool:
         """Whether there is a page, or would be but for its mistakes."""
@@ -320,13 +338,27 @@ class Pages:
         for files in reversed(self._generations):
             if path in files:
                 return files[path]
+        if path.startswith((urls.SEARCH_INDEX, f"{FOLDER}/")):
+            return self._searched().get(path)
         make = self._others().get(path)
         try:
             return None if make is None else make()
         except EffectError:
             return None  # gone since the course was read
 
-    def _others(self) -> dict[str, Callable[[], bytes]]:
+    def _searched(self) -> dict[str, bytes]:
+        """The files of the search."""
+        if self._library is None:
+            return {}
+        return self._search.files(self._library, self._searchable)
+
+    def _searchable(self) -> Iterator[tuple[Draft, bool]]:
+        for path in self._painters:
+            drawn = self._page(path)
+            if drawn is not None:
+                yield drawn.draft, path not in self._held
+
+    def _others(self) -> dict[str, Make]:
         if self._files is None:
             self._files = dict(self._other_files(self._library)) if self._library else {}
         return self._files
