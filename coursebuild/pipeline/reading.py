@@ -296,11 +296,12 @@ class Reader:
         drawn = self.draw(request)
         packed_record = pack_record(drawn.record)
         data = join(packed_record, drawn.body, drawn.searched)
-        self._store.keep(PAGES, request.key, data, local=True)
         made = drawn.exports
         self._store.keep(EXPORTS, request.key, pack_value(made.beside), local=True)
         if made.part is not None:
             self._store.keep(PARTS, request.key, pack_value(made.part), local=True)
+        # At last, since a page that is there is not drawn again.
+        self._store.keep(PAGES, request.key, data, local=True)
         return packed_record
 
     def _ask(self, request: Draw) -> bytes:

@@ -18,7 +18,7 @@ from coursebuild.values import dataclass
 if TYPE_CHECKING:
     from coursebuild.render.exports.page import PageExports
 
-OUTLINES, PAGES, EXPORTS, ITEMS = "outlines", "pages", "exports", "items"
+OUTLINES, PAGES, EXPORTS, ITEMS = "outlines", "pages", "beside", "items"
 PARTS = "parts"
 """Kinds of entries in the store. They stay on this machine: reading them may run code."""
 
