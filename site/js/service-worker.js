@@ -49,7 +49,9 @@ self.addEventListener('fetch', (event) => {
 self.addEventListener('message', (event) => {
   const { data, ports, source } = event
   if (data?.coursebuild !== 'visit' || !ports[0]) return
-  running = running.then(() => visit(data, ports[0], source)).catch(() => {})
+  // Whatever fails, the page must not wait for ever.
+  const failed = () => ports[0].postMessage({ here: 0, total: 0, full: false, lost: true, end: true, bytes: null, now: '', shown: '' })
+  running = running.then(() => visit(data, ports[0], source)).catch(failed)
   event.waitUntil(running)
 })
 

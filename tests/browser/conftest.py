@@ -22,6 +22,8 @@ from hostkit import Host
 from labcourse import LESSON, PENDULUM, TWIN, ZOO
 from standardkit import Site, build_both, shared_folder
 
+SLOW = 120_000
+"""Milliseconds that a slow machine may take until what is waited for is there."""
 ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -77,6 +79,7 @@ def browsers() -> Iterator[dict[str, Browser]]:
 def context(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
     """A window of a desk's size."""
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+        context.set_default_timeout(SLOW)
         yield context
 
 
