@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
@@ -24,6 +24,7 @@ from standardkit import Site, build_both, shared_folder
 
 SLOW = 120_000
 """Milliseconds that a slow machine may take until what is waited for is there."""
+expect.set_options(timeout=SLOW)
 ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
