@@ -29,7 +29,6 @@ from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import pack
-from coursebuild.pipeline.pages import sheets
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
 from coursebuild.render.assets import Assets
@@ -39,6 +38,7 @@ from coursebuild.render.folding import forget_folds, imported
 from coursebuild.render.fonts import FontJob, subset_font
 from coursebuild.render.highlight import highlight_lines
 from coursebuild.render.library import Library
+from coursebuild.render.page_list import page_list
 from coursebuild.render.record import record
 from coursebuild.render.site import SiteOptions, render_site
 from coursebuild.results import Formula, MathError, Results
@@ -139,7 +139,8 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     """What each step costs a lesson: time of one core, nothing remembered from lesson to lesson."""
     library = Library.of(course, results, Assets(template_texts(), bundled_files()))
     texts = {document.source.path: document for document in course.documents}
-    drawn = [(sheet, texts[sheet.document]) for sheet in sheets(library) if sheet.document]
+    sheets = (page.sheet(library) for page in page_list(library))
+    drawn = [(sheet, texts[sheet.document]) for sheet in sheets if sheet.document]
     kinds = frozenset(kind.name for kind in course.callouts)
     scripts = [script.code.text for script, _ in library.scripts.values()]
     tools = library.tools

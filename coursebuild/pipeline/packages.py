@@ -13,7 +13,7 @@ Of a file no more is held than how it is made: archives are written one file aft
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, TypeAlias, assert_never
 
@@ -35,12 +35,12 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reading import drawing_tools
 from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
 from coursebuild.pipeline.site import Site, library_of, site_files
-from coursebuild.render import lesson, pages, urls
+from coursebuild.render import urls
 from coursebuild.render.assets import Assets
 from coursebuild.render.library import Library
 from coursebuild.render.packages import qti, scorm
 from coursebuild.render.packages.items import Loss, MadeQuiz
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.tools import Tools
 from coursebuild.report import Report
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
@@ -117,7 +117,7 @@ class _Asked:
 
     source: Source
     key: str
-    sheet: Callable[[], Sheet]
+    page: PageEntry
 
 
 class _Items:
@@ -172,19 +172,11 @@ class _Items:
     def _asked(self) -> Iterator[_Asked]:
         """The documents that have quizzes."""
         library = self._library
-        for entry in library.course.lessons:
-            if entry.document is not None and any(map(_is_quiz, document_blocks(entry.document))):
-                make = functools.partial(lesson.lesson_sheet, library, entry, entry.document)
-                yield self._document(entry.document.source, make)
-        for page in library.course.pages:
-            if page.document is not None and any(map(_is_quiz, document_blocks(page.document))):
-                yield self._document(
-                    page.document.source,
-                    functools.partial(pages.page_sheet, library, page, page.document),
-                )
-
-    def _document(self, source: Source, make: Callable[[], Sheet]) -> _Asked:
-        return _Asked(source, page_key(self._library.course, self._documents, make()), make)
+        for page in page_list(library):
+            document = page.document(library)
+            if document is not None and any(map(_is_quiz, document_blocks(document))):
+                key = page_key(library.course, self._documents, page.sheet(library))
+                yield _Asked(document.source, key, page)
 
     def _made(self, asked: list[_Asked]) -> dict[str, Kept]:
         """The items of documents, kept or made now, by the keys of these."""
@@ -205,7 +197,9 @@ class _Items:
     def _request(self, asked: _Asked) -> Ask:
         course = self._library.course
         task = self._documents.task(asked.source.path)
-        return Ask(Draw(asked.sheet(), task, course.language, course.base_url, asked.key))
+        return Ask(
+            Draw(asked.page.sheet(self._library), task, course.language, course.base_url, asked.key)
+        )
 
 
 def _is_quiz(block: Block) -> bool:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from coursebuild.effects.aside import Aside, Kept
@@ -34,19 +34,13 @@ from coursebuild.pipeline.records import (
     unpack_value,
 )
 from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, Draw, Later
-from coursebuild.render import lesson, pages
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.links import has
-from coursebuild.render.lookup.glossary import glossary_sheet
-from coursebuild.render.lookup.symbol_index import symbols_sheet
-from coursebuild.render.numerics import numerics_sheet
-from coursebuild.render.offline import offline_sheet
 from coursebuild.render.own_pages import own_pages
-from coursebuild.render.reader import progress_sheet, review_sheet
+from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.files import Entry
-from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.shared import PageFacts
 from coursebuild.render.sheet import Sheet, fingerprint
 from coursebuild.results import KeptFile
@@ -64,12 +58,15 @@ _SITE = "site"
 class _Wanted:
     """A page as it should be."""
 
-    path: str
-    """Its site path."""
+    page: PageEntry
     key: str
-    sheet: Callable[[], Sheet]
     document: str | None
     """The path of its document."""
+
+    @property
+    def path(self) -> str:
+        """Its site path."""
+        return self.page.path
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +89,7 @@ class Pages:
         self._aside = documents.aside or Aside(store.folder)
         self._facts = _Facts()
         self._by_path: dict[str, _Wanted] = {}
-        self._pages = self._made([self._wanted(make) for make in sheets(library)])
+        self._pages = self._made([self._wanted(page) for page in page_list(library)])
 
     @property
     def facts(self) -> PageFacts:
@@ -175,16 +172,18 @@ class Pages:
 
     # --- keys
 
-    def _wanted(self, make: Callable[[], Sheet]) -> _Wanted:
-        sheet = make()
+    def _wanted(self, page: PageEntry) -> _Wanted:
+        sheet = page.sheet(self._library)
         key = page_key(self._library.course, self._documents, sheet)
-        return _Wanted(sheet.path, key, make, sheet.document)
+        return _Wanted(page, key, sheet.document)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
         path = wanted.document
         task = self._documents.task(path) if path is not None else None
-        return Draw(wanted.sheet(), task, course.language, course.base_url, wanted.key)
+        return Draw(
+            wanted.page.sheet(self._library), task, course.language, course.base_url, wanted.key
+        )
 
     def _frame(self, names: Names) -> str:
         """All that a frame shows besides its page."""
@@ -315,33 +314,3 @@ class _Facts:
         return PageFacts(
             frozenset(self._text), frozenset(self._mathematics), frozenset(self._declarations)
         )
-
-
-def sheets(library: Library) -> Iterator[Callable[[], Sheet]]:
-    """What makes the sheets of all pages of a course."""
-    course, partial = library.course, functools.partial
-    yield partial(pages.home_sheet, library)
-    for level in course.levels:
-        yield partial(pages.level_sheet, library, level)
-    for entry in library.order:
-        if entry.document is None:
-            yield partial(lesson.stub_sheet, library, entry)
-        else:
-            yield partial(lesson.lesson_sheet, library, entry, entry.document)
-    for model in course.models:
-        yield partial(pages.model_sheet, library, model)
-    if library.references.terms:
-        yield partial(glossary_sheet, library)
-    if library.references.symbols:
-        yield partial(symbols_sheet, library)
-    if library.reports.cases:
-        yield partial(numerics_sheet, library)
-    for page in course.pages:
-        if page.document is not None:
-            yield partial(pages.page_sheet, library, page, page.document)
-    yield partial(progress_sheet, library)
-    if library.asked:
-        yield partial(review_sheet, library)
-    yield partial(offline_sheet, library)
-    yield partial(search_sheet, library)
-    yield partial(pages.not_found_sheet, library)

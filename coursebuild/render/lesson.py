@@ -1,14 +1,12 @@
 """The page of a lesson: where it stands, what it needs and gives, its text, and the way on.
 
-Entry points: `lesson_sheet`, and for a planned lesson `stub_sheet`; `lesson_draft` and
-`stub_draft`, the same drawn.
+Entry points: `lesson_sheet`, and for a planned lesson `stub_sheet`.
 """
 
 from __future__ import annotations
 
 from coursebuild.model import Document, Lesson, Status
 from coursebuild.render import meta, urls
-from coursebuild.render.draft import Draft
 from coursebuild.render.graph import around
 from coursebuild.render.library import Library, document_scripts
 from coursebuild.render.owners import owner_links
@@ -72,18 +70,6 @@ def lesson_link(
     )
 
 
-def drawn(library: Library, sheet: Sheet, document: Document | None = None) -> Draft:
-    """A page drawn."""
-    from coursebuild.render.draw import draw  # with all that it takes to draw
-
-    return draw(sheet, document, library.tools)
-
-
-def lesson_draft(library: Library, lesson: Lesson, document: Document) -> Draft:
-    """The page of a written lesson."""
-    return drawn(library, lesson_sheet(library, lesson, document), document)
-
-
 def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
     """What the page of a written lesson shows; its document's skeleton is enough."""
     place = urls.Place(urls.lesson_path(lesson))
@@ -108,11 +94,6 @@ def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
         document=document.source.path,
         shown=shown(library, place, document),
     )
-
-
-def stub_draft(library: Library, lesson: Lesson) -> Draft:
-    """The page of a planned lesson."""
-    return drawn(library, stub_sheet(library, lesson))
 
 
 def stub_sheet(library: Library, lesson: Lesson) -> Sheet:

@@ -24,9 +24,7 @@ from coursebuild.model import Course
 from coursebuild.render import urls
 from coursebuild.render.assets import Assets, hashed_name, page_script
 from coursebuild.render.direction import direction
-from coursebuild.render.draft import Draft
 from coursebuild.render.frame import Names
-from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library
 from coursebuild.render.sheet import Sheet
 from coursebuild.results import FileFacts, FileList, OutputFile
@@ -153,11 +151,6 @@ def _is_lasting(file: FileFacts) -> bool:
 
 
 # ---------------------------------------------------------------------------------- the page
-
-
-def offline_draft(library: Library) -> Draft:
-    """The page that says what is kept."""
-    return drawn(library, offline_sheet(library))
 
 
 def offline_sheet(library: Library) -> Sheet:

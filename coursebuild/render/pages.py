@@ -1,21 +1,19 @@
 """The pages around the lessons: home, levels, models, other pages, and that of missing addresses.
 
 Entry points: `home_sheet`, `level_sheet`, `model_sheet`, `page_sheet`, `not_found_sheet`, what each
-shows; `home_draft` and so on, the same drawn.
+shows.
 """
 
 from __future__ import annotations
 
 from coursebuild.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.render import meta, urls
-from coursebuild.render.draft import Draft
 from coursebuild.render.frame import place_of
 from coursebuild.render.graph import of_level
 from coursebuild.render.labs import number
-from coursebuild.render.lesson import LessonHead, LessonLink, drawn, edit_address, lesson_link
+from coursebuild.render.lesson import LessonHead, LessonLink, edit_address, lesson_link
 from coursebuild.render.library import Library, ModelUse
 from coursebuild.render.measured import measured_view
-from coursebuild.render.numerics import numerics_sheet
 from coursebuild.render.sheet import Highlighted, Plotted, Sheet
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
@@ -51,11 +49,6 @@ class Named:
     remark: str = ""
 
 
-def home_draft(library: Library) -> Draft:
-    """The home page."""
-    return drawn(library, home_sheet(library))
-
-
 def home_sheet(library: Library) -> Sheet:
     """What the home page shows: the course map."""
     course = library.course
@@ -76,11 +69,6 @@ def home_sheet(library: Library) -> Sheet:
     }
     data = meta.course_data(library)
     return Sheet(urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data)
-
-
-def level_draft(library: Library, level: Level) -> Draft:
-    """The page of a level."""
-    return drawn(library, level_sheet(library, level))
 
 
 def level_sheet(library: Library, level: Level) -> Sheet:
@@ -125,11 +113,6 @@ def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
     )
 
 
-def model_draft(library: Library, model: MjcfModel) -> Draft:
-    """The page of a model."""
-    return drawn(library, model_sheet(library, model))
-
-
 def model_sheet(library: Library, model: MjcfModel) -> Sheet:
     """What the page of a model shows: what it holds, its text, where it is used."""
     place = urls.Place(urls.model_page_path(model.name))
@@ -151,11 +134,6 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
     return Sheet(place.path, "model", title, "", "model.html", values)
-
-
-def numerics_draft(library: Library) -> Draft:
-    """The page of the hard cases."""
-    return drawn(library, numerics_sheet(library))
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
@@ -193,11 +171,6 @@ def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
     return Named(place.href(urls.page_path(use.owner)), use.owner.title, remark)
 
 
-def page_draft(library: Library, page: Page, document: Document) -> Draft:
-    """A page that is no lesson."""
-    return drawn(library, page_sheet(library, page, document), document)
-
-
 def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
     """What a page that is no lesson shows; its document's skeleton is enough."""
     place = urls.Place(urls.page_path(page))
@@ -211,11 +184,6 @@ def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
         document=document.source.path,
         shown=shown(library, place, document),
     )
-
-
-def not_found_draft(library: Library) -> Draft:
-    """The page for missing addresses."""
-    return drawn(library, not_found_sheet(library))
 
 
 def not_found_sheet(library: Library) -> Sheet:

@@ -1,7 +1,6 @@
 """The pages that are about the reader: what is read and answered, and what to go over again.
 
-Entry points: `progress_sheet`, `review_sheet`, what each shows; `progress_draft` and
-`review_draft`, the same drawn.
+Entry points: `progress_sheet`, `review_sheet`, what each shows.
 
 Nothing of a reader is known here. The pages list the lessons with their questions, say what is kept
 and where, and hold places that the page's script fills from the reader's own browser.
@@ -12,8 +11,6 @@ from __future__ import annotations
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.asked import count
-from coursebuild.render.draft import Draft
-from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library, owners
 from coursebuild.render.owners import owner_path
 from coursebuild.render.pages import level_view
@@ -38,11 +35,6 @@ class Asking:
     questions: int
 
 
-def progress_draft(library: Library) -> Draft:
-    """The page of the reader's progress."""
-    return drawn(library, progress_sheet(library))
-
-
 def progress_sheet(library: Library) -> Sheet:
     """What the page of the reader's progress shows: all lessons, by level."""
     place, words = urls.Place(urls.PROGRESS), library.words
@@ -55,11 +47,6 @@ def progress_sheet(library: Library) -> Sheet:
     }
     title, description = words("progress.title"), words("progress.description")
     return Sheet(place.path, "progress", title, description, "progress.html", values, indexed=False)
-
-
-def review_draft(library: Library) -> Draft:
-    """The page of the review."""
-    return drawn(library, review_sheet(library))
 
 
 def review_sheet(library: Library) -> Sheet:

@@ -15,17 +15,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
-from coursebuild.render import fonts, lesson, meta, pages, urls, zips
+from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.files import Around, Exports, OnDemand
 from coursebuild.render.frame import Draft, Names, frame
 from coursebuild.render.library import Library
-from coursebuild.render.lookup.glossary import glossary_draft
-from coursebuild.render.lookup.symbol_index import symbols_draft
-from coursebuild.render.offline import facts_of, file_list, offline_draft, offline_files
-from coursebuild.render.reader import progress_draft, review_draft
-from coursebuild.render.search.sheet import search_sheet
+from coursebuild.render.offline import facts_of, file_list, offline_files
+from coursebuild.render.page_list import page_list
 from coursebuild.render.search.whole import site_search
 from coursebuild.render.shared import (
     PageFacts,
@@ -60,7 +57,7 @@ def render_site(
     options = options or SiteOptions()
     library = Library.of(course, results, assets, reports=options.reports)
     drafts, facts = [], []
-    drawn = tuple(_drafts(library))
+    drawn = tuple(entry.draft(library) for entry in page_list(library))
     for draft, declarations in map(settled, drawn):
         drafts.append(draft)
         facts.append(page_facts(draft, declarations))
@@ -76,36 +73,6 @@ def render_site(
     listed = file_list(names, "")
     files.append(OutputFile(listed.path, listed.make(facts_of(files))))
     return tuple(sorted(files, key=lambda file: file.path))
-
-
-def _drafts(library: Library) -> Iterator[Draft]:
-    """Every page without its frame."""
-    course = library.course
-    yield pages.home_draft(library)
-    for level in course.levels:
-        yield pages.level_draft(library, level)
-    for entry in course.lessons:
-        if entry.document is None:
-            yield lesson.stub_draft(library, entry)
-        else:
-            yield lesson.lesson_draft(library, entry, entry.document)
-    for model in course.models:
-        yield pages.model_draft(library, model)
-    if library.references.terms:
-        yield glossary_draft(library)
-    if library.references.symbols:
-        yield symbols_draft(library)
-    if library.reports.cases:
-        yield pages.numerics_draft(library)
-    for page in course.pages:
-        if page.document is not None:
-            yield pages.page_draft(library, page, page.document)
-    yield progress_draft(library)
-    if library.asked:
-        yield review_draft(library)
-    yield offline_draft(library)
-    yield lesson.drawn(library, search_sheet(library))
-    yield pages.not_found_draft(library)
 
 
 def all_facts(library: Library, pages: Iterable[PageFacts]) -> PageFacts:
@@ -160,7 +127,7 @@ def _exports(
         declarations=frozenset[str]().union(*(one.declarations for one in facts)),
         taken=frozenset(urls.file_path(file.path) for file in options.files),
     )
-    source = OnDemand(library, tuple(bodies), bodies.__getitem__)
+    source = OnDemand(library, bodies.__getitem__)
     for file in Exports(library, source, around).files(names):
         yield file if isinstance(file, OutputFile) else OutputFile(file.path, file.make())
 

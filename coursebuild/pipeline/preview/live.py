@@ -39,7 +39,7 @@ from coursebuild.pipeline.preview.differences import (
     with_owners,
 )
 from coursebuild.pipeline.preview.memo import Parsing, PerDocument
-from coursebuild.pipeline.preview.pages import Drawn, Pages, draw, site_paths
+from coursebuild.pipeline.preview.pages import Drawn, Pages, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.render import fonts, urls, zips
@@ -222,7 +222,7 @@ class LiveCourse:
             if not has_errors(found[path]) and not has_errors(
                 self.parts.formula_mistakes(document)
             ):
-                page = draw(self.pages.painter(self._sites[path]), library)
+                page = self.pages.draw(self._sites[path], library)
                 drawn[self._sites[path]] = page, self.pages.framed(page, library)
         pairs = [(self._document(path), document) for path, document in documents.items()]
         stale = self._stale(pairs, course, library)

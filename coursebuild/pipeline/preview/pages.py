@@ -21,26 +21,22 @@ from typing import TypeAlias
 
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
-from coursebuild.model import Course, Document, MjcfModel
+from coursebuild.model import Course, Document
 from coursebuild.pipeline.preview.search import Search
-from coursebuild.render import fonts, lesson, meta, pages, urls, zips
+from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.files import Around, Exports, OnDemand, export_paths
 from coursebuild.render.frame import Draft, Names, frame
 from coursebuild.render.library import Library, owners
-from coursebuild.render.lookup.glossary import glossary_draft
-from coursebuild.render.lookup.symbol_index import symbols_draft
-from coursebuild.render.offline import offline_draft, offline_files
-from coursebuild.render.reader import progress_draft, review_draft
+from coursebuild.render.offline import offline_files
+from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.search.files import FOLDER
-from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
 from coursebuild.render.site import all_facts
 from coursebuild.results import OutputFile, SiteFile
 from coursebuild.values import dataclass
 
-Painter: TypeAlias = Callable[[Library], Draft]
 Make: TypeAlias = Callable[[], bytes | None]
 """Makes a file, if it can be had."""
 
@@ -62,59 +58,6 @@ class Drawn:
 
     draft: Draft
     declarations: frozenset[str]
-
-
-def painters(library: Library, whole: Callable[[Document], Document]) -> dict[str, Painter]:
-    """How each page is drawn, by its site path, in the order of a build."""
-    course = library.course
-    found: dict[str, Painter] = {urls.HOME: pages.home_draft}
-    for level in course.levels:
-        found[urls.level_path(level)] = functools.partial(_level, level.id)
-    for entry in course.lessons:
-        found[urls.lesson_path(entry)] = functools.partial(_lesson, entry.id, whole)
-    for model in course.models:
-        found[urls.model_page_path(model.name)] = functools.partial(_model, model)
-    if library.references.terms:
-        found[urls.GLOSSARY] = glossary_draft
-    if library.references.symbols:
-        found[urls.SYMBOLS] = symbols_draft
-    if library.reports.cases:
-        found[urls.NUMERICS] = pages.numerics_draft
-    for page in course.pages:
-        if page.document is not None:
-            found[urls.page_path(page)] = functools.partial(_page, page.id, whole)
-    found[urls.PROGRESS] = progress_draft
-    if library.asked:
-        found[urls.REVIEW] = review_draft
-    found[urls.OFFLINE] = offline_draft
-    found[urls.SEARCH] = _search
-    found[urls.NOT_FOUND] = pages.not_found_draft
-    return found
-
-
-def _level(id: str, library: Library) -> Draft:
-    return pages.level_draft(library, library.levels[id])
-
-
-def _lesson(id: str, whole: Callable[[Document], Document], library: Library) -> Draft:
-    entry = library.lessons[id]
-    if entry.document is None:
-        return lesson.stub_draft(library, entry)
-    return lesson.lesson_draft(library, entry, whole(entry.document))
-
-
-def _model(model: MjcfModel, library: Library) -> Draft:
-    return pages.model_draft(library, model)
-
-
-def _search(library: Library) -> Draft:
-    return lesson.drawn(library, search_sheet(library))
-
-
-def _page(id: str, whole: Callable[[Document], Document], library: Library) -> Draft:
-    page = library.pages[id]
-    assert page.document is not None, "a page without a document has no painter"
-    return pages.page_draft(library, page, whole(page.document))
 
 
 def site_paths(course: Course) -> dict[str, str]:
@@ -146,7 +89,7 @@ class Pages:
         self._subset = subset
         self._surroundings = surroundings
         self._library: Library | None = None
-        self._painters: dict[str, Painter] = {}
+        self._entries: dict[str, PageEntry] = {}
         self._ids: dict[str, str] = {}
         """Of lessons and pages, by site path."""
         self._drawn: dict[str, Drawn] = {}
@@ -169,9 +112,9 @@ class Pages:
         """Take what the course is now; `stale` are the pages to draw anew, `None` means all."""
         self._library = library
         if stale is None:
-            self._painters = painters(library, self._whole)
-            self._stale = set(self._painters)
-            for gone in (self._drawn.keys() | self._facts.keys()) - self._painters.keys():
+            self._entries = {entry.path: entry for entry in page_list(library)}
+            self._stale = set(self._entries)
+            for gone in (self._drawn.keys() | self._facts.keys()) - self._entries.keys():
                 self._drawn.pop(gone, None)
                 self._facts.pop(gone, None)
                 self._held.discard(gone)
@@ -195,7 +138,7 @@ class Pages:
 
     def hold(self, path: str) -> None:
         """Draw a page, and keep it until it is drawn again: what comes now is not to be shown."""
-        if path in self._painters and self._page(path) is not None:
+        if path in self._entries and self._page(path) is not None:
             self._held.add(path)
 
     def put(self, path: str, drawn: Drawn, text: bytes | None = None) -> None:
@@ -238,7 +181,7 @@ class Pages:
             if file.path != urls.WORKER:  # a preview is shown by nothing but its server
                 yield file.path, functools.partial(_data, file)
         files = frozenset(map(urls.file_path, course.files))
-        for path in export_paths(library, self._painters, files):
+        for path in export_paths(library, self._entries, files):
             yield path, functools.partial(self._exported, path)
         yield urls.ROBOTS, functools.partial(meta.robots, course)
         if course.base_url:
@@ -263,7 +206,7 @@ class Pages:
             declarations=frozenset[str]().union(*(f.declarations for f in self._facts.values())),
             taken=frozenset(files),
         )
-        source = OnDemand(library, tuple(self._painters), self._body, self._whole)
+        source = OnDemand(library, self._body, self._whole)
         return Exports(library, source, surroundings).files(self._names)
 
     def _exported(self, path: str) -> bytes | None:
@@ -271,7 +214,7 @@ class Pages:
         library = self._library
         assert library is not None
         page = path.rpartition(".")[0] + ".html"
-        needed = (page,) if page in self._painters else tuple(self._painters)
+        needed = (page,) if page in self._entries else tuple(self._entries)
         if any(self._page(path) is None or path in self._held for path in needed):
             return None
         if path == urls.EPUB:  # which has the styles of all pages
@@ -294,7 +237,7 @@ class Pages:
 
     def _sitemap(self) -> bytes:
         assert self._library is not None
-        drafts = (self._page(path) for path in self._painters)
+        drafts = (self._page(path) for path in self._entries)
         indexed = [drawn.draft.path for drawn in drafts if drawn and drawn.draft.indexed]
         return meta.sitemap(self._library.course, indexed)
 
@@ -325,15 +268,15 @@ class Pages:
     def paths(self) -> tuple[str, ...]:
         """The site paths of everything that a build would publish, sorted."""
         newest = self._generations[-1].keys() if self._generations else ()
-        return tuple(sorted({*self._painters, *self._others(), *newest, *self._searched()}))
+        return tuple(sorted({*self._entries, *self._others(), *newest, *self._searched()}))
 
     def has_page(self, path: str) -> bool:
         """Whether there is a page, or would be but for its mistakes."""
-        return path in self._painters
+        return path in self._entries
 
     def find(self, path: str) -> bytes | None:
         """A file of the site, if there is one and it can be had."""
-        if path in self._painters:
+        if path in self._entries:
             return self._text(path)
         for files in reversed(self._generations):
             if path in files:
@@ -353,7 +296,7 @@ class Pages:
         return self._search.files(self._library, self._searchable)
 
     def _searchable(self) -> Iterator[tuple[Draft, bool]]:
-        for path in self._painters:
+        for path in self._entries:
             drawn = self._page(path)
             if drawn is not None:
                 yield drawn.draft, path not in self._held
@@ -376,7 +319,7 @@ class Pages:
         old = self._drawn.get(path)
         if (old is None or path in self._stale) and self._ready(path):
             assert self._library is not None
-            new = draw(self._painters[path], self._library)
+            new = self.draw(path, self._library)
             if new == old:
                 self._stale.discard(path)
                 self._held.discard(path)
@@ -387,25 +330,25 @@ class Pages:
                     self._facts[path] = noted
         return self._drawn.get(path)
 
-    def painter(self, path: str) -> Painter:
-        """How a page is drawn (`KeyError` where there is none)."""
-        return self._painters[path]
+    def draw(self, path: str, library: Library) -> Drawn:
+        """Draw a page (`KeyError` where there is none) of a library of the same course map."""
+        return Drawn(*settled(self._entries[path].draft(library, self._whole)))
 
     # --- what may wait
 
     def waiting(self) -> tuple[str, ...]:
         """The pages that are to be drawn anew."""
-        return tuple(path for path in self._painters if path in self._stale)
+        return tuple(path for path in self._entries if path in self._stale)
 
     def look_at(self, path: str) -> None:
         """Draw a page if it is stale, and note what the shared files must know of it."""
-        drawn = self._page(path) if path in self._painters else None
+        drawn = self._page(path) if path in self._entries else None
         if drawn is not None and path not in self._facts:
             self._facts[path] = page_facts(drawn.draft, drawn.declarations)
 
     def unnoted(self) -> tuple[str, ...]:
         """The pages of which that is not noted yet."""
-        return tuple(path for path in self._painters if path not in self._facts)
+        return tuple(path for path in self._entries if path not in self._facts)
 
     def needed(self) -> PageFacts | None:
         """The facts for new shared files, where those that there are do not do any more."""
@@ -433,11 +376,6 @@ class Pages:
         files, names = shared_files(self._assets, subset, facts)
         self.share(facts, files, names)
         self._shared_facts = None  # the fonts were not cut
-
-
-def draw(painter: Painter, library: Library) -> Drawn:
-    """Draw a page."""
-    return Drawn(*settled(painter(library)))
 
 
 def _data(file: OutputFile) -> bytes:

@@ -17,8 +17,8 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Generic, Protocol, TypeAlias, TypeVar
 
-from coursebuild.model import Document, Lesson, Page
-from coursebuild.render import pages, urls, zips
+from coursebuild.model import Document, Lesson
+from coursebuild.render import urls, zips
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.archive import Deflated, File, deflate, packed
 from coursebuild.render.exports.book import Book, books
@@ -30,9 +30,8 @@ from coursebuild.render.exports.page import Beside, PageExports, page_exports
 from coursebuild.render.exports.parts import LessonPart
 from coursebuild.render.exports.twin import twin_of
 from coursebuild.render.frame import Frames, Names
-from coursebuild.render.lesson import lesson_sheet
 from coursebuild.render.library import Library
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_list import page_list
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 from coursebuild.values import dataclass
 
@@ -248,12 +247,11 @@ def _key(*parts: str) -> str:
 
 
 class OnDemand:
-    """Pages whose documents are at hand."""
+    """A source that makes what it is asked for, and keeps nothing."""
 
     def __init__(
         self,
         library: Library,
-        paths: tuple[str, ...],
         body: Callable[[str], str],
         whole: Callable[[Document], Document] = lambda document: document,
     ) -> None:
@@ -261,22 +259,8 @@ class OnDemand:
         self._library = library
         self._body = body
         self._whole = whole
-        self.paths = paths
-        self._documents: dict[str, Callable[[], tuple[Sheet, Document]]] = {}
-        for lesson in library.order:
-            if lesson.document is not None:
-                make = functools.partial(self._of_lesson, lesson, lesson.document)
-                self._documents[urls.lesson_path(lesson)] = make
-        for page in library.course.pages:
-            if page.document is not None:
-                made = functools.partial(self._of_page, page, page.document)
-                self._documents[urls.page_path(page)] = made
-
-    def _of_lesson(self, lesson: Lesson, document: Document) -> tuple[Sheet, Document]:
-        return lesson_sheet(self._library, lesson, document), self._whole(document)
-
-    def _of_page(self, page: Page, document: Document) -> tuple[Sheet, Document]:
-        return pages.page_sheet(self._library, page, document), self._whole(document)
+        self._entries = {entry.path: entry for entry in page_list(library)}
+        self.paths = tuple(self._entries)
 
     def key(self, path: str) -> str:
         """Its path: nothing is kept."""
@@ -284,7 +268,7 @@ class OnDemand:
 
     def beside(self, path: str) -> Beside:
         """What a page gives to the files beside it, made now."""
-        if path in self._documents:
+        if self._entries[path].document(self._library) is not None:
             return self._exports(path).beside
         return Beside(twin_of(path, self._body(path)), None)
 
@@ -297,8 +281,10 @@ class OnDemand:
     def _exports(self, path: str) -> PageExports:
         from coursebuild.render.draw import draw_whole
 
-        body, tools = self._body(path), self._library.tools
-        sheet, document = self._documents[path]()
+        body, tools, entry = self._body(path), self._library.tools, self._entries[path]
+        found = entry.document(self._library)
+        assert found is not None, "a page without a document gives nothing but its twin"
+        sheet, document = entry.sheet(self._library), self._whole(found)
         _, text = draw_whole(sheet, document, tools)
         base = self._library.course.base_url
         return page_exports(sheet, document, tools, base, body, str(text))

@@ -1,6 +1,6 @@
 """The glossary: every term of the course, the sentence that defines it, and where it is used.
 
-Entry points: `glossary_sheet`; `glossary_draft`, the same drawn.
+Entry point: `glossary_sheet`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ from itertools import groupby
 from markupsafe import Markup
 
 from coursebuild.render import urls
-from coursebuild.render.draft import Draft
-from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import GlossaryTerm
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
@@ -45,11 +43,6 @@ class LetterView:
 
     letter: str
     terms: tuple[TermView, ...]
-
-
-def glossary_draft(library: Library) -> Draft:
-    """The glossary."""
-    return drawn(library, glossary_sheet(library))
 
 
 def glossary_sheet(library: Library) -> Sheet:

@@ -1,6 +1,6 @@
 """The index of symbols: what the letters in the formulas of the course stand for, and where.
 
-Entry points: `symbols_sheet`; `symbols_draft`, the same drawn.
+Entry point: `symbols_sheet`.
 
 Symbols whose meaning a lesson declares come first; the others are listed with their places.
 """
@@ -10,8 +10,6 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from coursebuild.render import urls
-from coursebuild.render.draft import Draft
-from coursebuild.render.lesson import drawn
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import CourseSymbol
 from coursebuild.render.lookup.symbols import sort_key
@@ -39,11 +37,6 @@ class SymbolView:
     section: str
     """The heading under which it stands there; empty before the first."""
     others: OwnerLinks
-
-
-def symbols_draft(library: Library) -> Draft:
-    """The index of symbols."""
-    return drawn(library, symbols_sheet(library))
 
 
 def symbols_sheet(library: Library) -> Sheet:

@@ -1,0 +1,125 @@
+"""Every page of a site, in order: the one place that says which there are.
+
+Entry point: `page_list(library)`.
+
+An entry may be asked with another library of the same course: while a course is edited its
+documents change, and its pages stay as long as the course map does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from coursebuild.model import Document
+from coursebuild.render import lesson, pages, reader, urls
+from coursebuild.render.draft import Draft
+from coursebuild.render.library import Library
+from coursebuild.render.lookup.glossary import glossary_sheet
+from coursebuild.render.lookup.symbol_index import symbols_sheet
+from coursebuild.render.numerics import numerics_sheet
+from coursebuild.render.offline import offline_sheet
+from coursebuild.render.search.sheet import search_sheet
+from coursebuild.render.sheet import Sheet
+from coursebuild.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PageEntry:
+    """A page of a site."""
+
+    path: str
+    """Its site path."""
+    id: str
+    """Of the level, lesson, model or page that it shows; empty where there is one page of its
+    kind."""
+    kind: PageKind
+
+    def sheet(self, library: Library) -> Sheet:
+        """What it shows; skeletons of documents are enough."""
+        return self.kind.sheet(library, self.id)
+
+    def document(self, library: Library) -> Document | None:
+        """The document that it shows, if any."""
+        return self.kind.document(library, self.id)
+
+    def draft(
+        self, library: Library, whole: Callable[[Document], Document] = lambda document: document
+    ) -> Draft:
+        """The page drawn; `whole` gives a document with its text."""
+        from coursebuild.render.draw import draw  # with all that it takes to draw
+
+        document = self.document(library)
+        shown = None if document is None else whole(document)
+        return draw(self.sheet(library), shown, library.tools)
+
+
+@dataclass(frozen=True, slots=True)
+class PageKind:
+    """How the pages of a kind are made, each from the id of what it shows."""
+
+    sheet: Callable[[Library, str], Sheet]
+    document: Callable[[Library, str], Document | None] = lambda library, id: None
+
+
+def _lesson_sheet(library: Library, id: str) -> Sheet:
+    entry = library.lessons[id]
+    if entry.document is None:
+        return lesson.stub_sheet(library, entry)
+    return lesson.lesson_sheet(library, entry, entry.document)
+
+
+def _page_sheet(library: Library, id: str) -> Sheet:
+    page = library.pages[id]
+    assert page.document is not None, "a page without a document is not in the list"
+    return pages.page_sheet(library, page, page.document)
+
+
+def _model_sheet(library: Library, id: str) -> Sheet:
+    model = next(model for model in library.course.models if model.name == id)
+    return pages.model_sheet(library, model)
+
+
+def _only(sheet: Callable[[Library], Sheet]) -> PageKind:
+    return PageKind(lambda library, id: sheet(library))
+
+
+_HOME = _only(pages.home_sheet)
+_LEVEL = PageKind(lambda library, id: pages.level_sheet(library, library.levels[id]))
+_LESSON = PageKind(_lesson_sheet, lambda library, id: library.lessons[id].document)
+_MODEL = PageKind(_model_sheet)
+_GLOSSARY = _only(glossary_sheet)
+_SYMBOLS = _only(symbols_sheet)
+_NUMERICS = _only(numerics_sheet)
+_PAGE = PageKind(_page_sheet, lambda library, id: library.pages[id].document)
+_PROGRESS = _only(reader.progress_sheet)
+_REVIEW = _only(reader.review_sheet)
+_OFFLINE = _only(offline_sheet)
+_SEARCH = _only(search_sheet)
+_NOT_FOUND = _only(pages.not_found_sheet)
+
+
+def page_list(library: Library) -> Iterator[PageEntry]:
+    """The pages of the site of a course."""
+    course = library.course
+    yield PageEntry(urls.HOME, "", _HOME)
+    for level in course.levels:
+        yield PageEntry(urls.level_path(level), level.id, _LEVEL)
+    for entry in library.order:
+        yield PageEntry(urls.lesson_path(entry), entry.id, _LESSON)
+    for model in course.models:
+        yield PageEntry(urls.model_page_path(model.name), model.name, _MODEL)
+    if library.references.terms:
+        yield PageEntry(urls.GLOSSARY, "", _GLOSSARY)
+    if library.references.symbols:
+        yield PageEntry(urls.SYMBOLS, "", _SYMBOLS)
+    if library.reports.cases:
+        yield PageEntry(urls.NUMERICS, "", _NUMERICS)
+    for page in course.pages:
+        if page.document is not None:
+            yield PageEntry(urls.page_path(page), page.id, _PAGE)
+    yield PageEntry(urls.PROGRESS, "", _PROGRESS)
+    if library.asked:
+        yield PageEntry(urls.REVIEW, "", _REVIEW)
+    yield PageEntry(urls.OFFLINE, "", _OFFLINE)
+    yield PageEntry(urls.SEARCH, "", _SEARCH)
+    yield PageEntry(urls.NOT_FOUND, "", _NOT_FOUND)
