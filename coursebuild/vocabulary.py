@@ -40,6 +40,9 @@ CALLOUTS: tuple[CalloutKind, ...] = (
     ),
     CalloutKind("warning", "Warning", "Something here goes wrong easily, or costs dearly."),
     CalloutKind("try", "Try it", "Something to do before reading on."),
+    CalloutKind(
+        "solution", "Solution", "A worked answer, its scripts verified; best read after one's own."
+    ),
     CalloutKind("note", "Note", "A remark beside the main line."),
     CalloutKind("tip", "Tip", "A way to save time or trouble."),
     CalloutKind("important", "Important", "What the rest of the lesson leans on."),

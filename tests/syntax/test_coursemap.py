@@ -165,7 +165,8 @@ def test_callouts_are_the_built_in_ones_and_the_courses_own() -> None:
 def test_every_course_has_the_kinds_of_the_contract() -> None:
     assert {kind.name for kind in CALLOUTS} == {
         *("established", "derivation", "implementation", "recommendation", "research"),
-        *("unverified", "version", "warning", "try", "note", "tip", "important", "caution"),
+        *("unverified", "version", "warning", "try", "solution", "note", "tip"),
+        *("important", "caution"),
     }
     assert all(kind.label and kind.promise for kind in CALLOUTS)
 
