@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
@@ -52,6 +52,9 @@ from coursebuild.source import Span
 from coursebuild.values import dataclass
 
 AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
+_Name: TypeAlias = (
+    LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
+)
 
 _HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
@@ -199,70 +202,54 @@ def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterat
         yield from _anchor(place, link[1][1:], document, "this page", anchors_of)
 
 
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """What a link calls by its name."""
+
+    rule: str
+    name: str
+    among: Collection[str]
+    missing: str
+    """What to say where it is not among them."""
+
+
 def _check_link(
     link: Link, target: Target, document: Document, known: Places, anchors_of: AnchorsOf
 ) -> Iterator[Diagnostic]:
     span = link.target_span
+    if isinstance(target, UrlTarget):
+        yield from _check_url(span, target.url, document, known, anchors_of)
+        return
+    named = _named(link, target, known)
+    if named.name not in named.among:
+        help = did_you_mean(named.name, named.among)
+        yield diagnose(named.rule, span, named.missing, help=help)
+    elif isinstance(target, LessonTarget):
+        to, where = known.lessons[target.id], f"lesson {target.id}"
+        yield from _anchor(span, target.anchor, to, where, anchors_of)
+    elif isinstance(target, PageTarget):
+        to, where = known.pages[target.id], f"page `{target.id}`"
+        yield from _anchor(span, target.anchor, to, where, anchors_of)
+
+
+def _named(link: Link, target: _Name, known: Places) -> _Named:
+    map_lacks = (
+        f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
+    )
     match target:
-        case LessonTarget():
-            if target.id not in known.lessons:
-                what = "mentioned" if link.mention else "linked to"
-                yield diagnose(
-                    "link-lesson",
-                    span,
-                    f"lesson {target.id} is {what}, and the course map does not have it",
-                    help=did_you_mean(target.id, known.lessons),
-                )
-            else:
-                yield from _anchor(
-                    span, target.anchor, known.lessons[target.id], f"lesson {target.id}", anchors_of
-                )
-        case LevelTarget():
-            if target.id not in known.levels:
-                yield diagnose(
-                    "link-level",
-                    span,
-                    f"level {target.id} is mentioned, and the course map does not have it",
-                    help=did_you_mean(target.id, known.levels),
-                )
-        case PageTarget():
-            if target.id not in known.pages:
-                yield diagnose(
-                    "link-page",
-                    span,
-                    f"no page `{target.id}` in the course map",
-                    help=did_you_mean(target.id, known.pages),
-                )
-            else:
-                yield from _anchor(
-                    span, target.anchor, known.pages[target.id], f"page `{target.id}`", anchors_of
-                )
-        case ModelTarget():
-            if target.name not in known.models:
-                yield diagnose(
-                    "link-model",
-                    span,
-                    f"no model `{target.name}` in models/",
-                    help=did_you_mean(target.name, known.models),
-                )
-        case ExampleTarget():
-            if target.path not in known.scripts:
-                yield diagnose(
-                    "link-example",
-                    span,
-                    f"no lesson has a script `{target.path}`",
-                    help=did_you_mean(target.path, known.scripts),
-                )
-        case TermTarget():
-            if target.id not in known.terms:
-                yield diagnose(
-                    "link-term",
-                    span,
-                    f"no lesson defines the term `{target.id}`",
-                    help=did_you_mean(target.id, known.terms),
-                )
-        case UrlTarget():
-            yield from _check_url(span, target.url, document, known, anchors_of)
+        case LessonTarget(id=id):
+            return _Named("link-lesson", id, known.lessons, f"lesson {id} {map_lacks}")
+        case LevelTarget(id=id):
+            return _Named("link-level", id, known.levels, f"level {id} {map_lacks}")
+        case PageTarget(id=id):
+            return _Named("link-page", id, known.pages, f"no page `{id}` in the course map")
+        case ModelTarget(name=name):
+            return _Named("link-model", name, known.models, f"no model `{name}` in models/")
+        case ExampleTarget(path=path):
+            missing = f"no lesson has a script `{path}`"
+            return _Named("link-example", path, known.scripts, missing)
+        case TermTarget(id=id):
+            return _Named("link-term", id, known.terms, f"no lesson defines the term `{id}`")
         case _:
             assert_never(target)
 

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
-import shutil
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
 
 import quizpage
+from chromium import launch
 from coursekit import Folder
 from hostkit import Host
 from labcourse import LESSON, PENDULUM, TWIN, ZOO
+from plainhost import served
 from standardkit import Site, build_both, shared_folder
 
-SLOW = 120_000
-"""Milliseconds that a slow machine may take until what is waited for is there."""
-expect.set_options(timeout=SLOW)
-ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+DRAWING = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 @pytest.fixture(scope="session")
@@ -41,36 +36,21 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     return folder
 
 
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
 @pytest.fixture(scope="session")
 def base(course: Folder) -> Iterator[str]:
     """The address of the site."""
-    handler = functools.partial(Quiet, directory=str(course.root / "public"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
-
-
-def launch(playwright: object, *arguments: str) -> Browser:
-    chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium: install Debian's package `chromium`"
-    start = playwright.chromium.launch  # type: ignore[attr-defined]
-    browser: Browser = start(executable_path=chromium, args=[*ARGUMENTS, *arguments])
-    return browser
+    with served(course.root / "public") as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
 def browsers() -> Iterator[dict[str, Browser]]:
     """Browsers: one with WebGL, one without."""
     with sync_playwright() as playwright:
-        found = {"webgl": launch(playwright), "plain": launch(playwright, "--disable-3d-apis")}
+        found = {
+            "webgl": launch(playwright, *DRAWING),
+            "plain": launch(playwright, *DRAWING, "--disable-3d-apis"),
+        }
         yield found
         for browser in found.values():
             browser.close()
@@ -80,7 +60,6 @@ def browsers() -> Iterator[dict[str, Browser]]:
 def context(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
     """A window of a desk's size."""
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
-        context.set_default_timeout(SLOW)
         yield context
 
 
@@ -111,10 +90,5 @@ def quiz_files(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
 @pytest.fixture(scope="session")
 def quizzes(quiz_files: Path) -> Iterator[str]:
     """The address of that site."""
-    handler = functools.partial(Quiet, directory=str(quiz_files))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
+    with served(quiz_files) as address:
+        yield address

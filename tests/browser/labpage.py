@@ -9,7 +9,8 @@ from collections.abc import Callable
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-from playwright.sync_api import BrowserContext, Locator, Page
+from chromium import SLOW
+from playwright.sync_api import BrowserContext, Locator, Page, Request
 
 SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
 """The labs of the page, by number."""
@@ -29,17 +30,25 @@ test sees more of it, as `made`, than its picture."""
 
 
 def watched(context: BrowserContext) -> tuple[Page, list[str]]:
-    """A page, and what it says to the console."""
+    """A page, and what it says to the console.
+
+    What was still on its way when the next page was opened is no failure.
+    """
     page, said = context.new_page(), list[str]()
+
+    def failed(request: Request) -> None:
+        if request.failure != "net::ERR_ABORTED":
+            said.append(f"failed: {request.url}")
+
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
+    page.on("requestfailed", failed)
     return page, said
 
 
-def until(page: Page, true: str, argument: object = None, tries: int = 400) -> None:
+def until(page: Page, true: str, argument: object = None) -> None:
     """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
-    for _ in range(tries):
+    for _ in range(SLOW // 25):
         if page.evaluate(true, argument):
             return
         page.wait_for_timeout(25)
@@ -75,7 +84,7 @@ def shows(found: Locator, label: str, text: str) -> None:
 
 def comes(page: Page, true: Callable[[], bool]) -> None:
     """Wait for something; how long it takes on a machine is no matter."""
-    for _ in range(400):
+    for _ in range(SLOW // 50):
         if true():
             return
         page.wait_for_timeout(50)
@@ -84,7 +93,7 @@ def comes(page: Page, true: Callable[[], bool]) -> None:
 
 def changed(page: Page, view: Locator, before: bytes) -> bytes:
     """The picture once it is another one."""
-    for _ in range(100):
+    for _ in range(SLOW // 100):
         now = view.screenshot()
         if now != before:
             return now

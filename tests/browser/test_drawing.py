@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
 import json
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +10,7 @@ import numpy as np
 import pytest
 from coursekit import Folder
 from labpage import lab, watched
+from plainhost import served
 from playwright.sync_api import Browser, Page
 
 pytestmark = pytest.mark.browser
@@ -50,11 +48,6 @@ LIGHTS = """
 """
 SKY = """<texture type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0.05 0.1 0.15"
   width="32" height="192"/>"""
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
 
 
 def mjcf(things: str, assets: str = "") -> str:
@@ -97,13 +90,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[st
         folder.write(f"models/{name}.xml", text)
     done = folder.main("build")
     assert done.status == 0, done.out + done.err
-    handler = functools.partial(Quiet, directory=str(folder.root / "public"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/lessons/1.1-one.html"
-        server.shutdown()
-        thread.join()
+    with served(folder.root / "public") as address:
+        yield f"{address}lessons/1.1-one.html"
 
 
 COMPARE = """async (n) => {

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from coursekit import Folder
+from labpage import comes
+from plainhost import served
 from playwright.sync_api import Browser, Page
 
 WIDE = "a + " * 60 + "a"
@@ -48,18 +47,8 @@ def base(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[str
     folder.write("content/course.toml", "[[level.lesson]]".join(parts))
     done = folder.main("build")
     assert done.status == 0, done.out + done.err
-    handler = functools.partial(Quiet, directory=str(folder.root / "public"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
+    with served(folder.root / "public") as address:
+        yield address
 
 
 @pytest.fixture
@@ -68,15 +57,6 @@ def page(browsers: dict[str, Browser]) -> Iterator[Page]:
     size = {"width": 1300, "height": 700}
     with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
         yield context.new_page()
-
-
-def comes(page: Page, true: Callable[[], object]) -> None:
-    """Wait for something."""
-    for _ in range(400):
-        if true():
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError("it never came")
 
 
 def opacity(page: Page, selector: str) -> float:

@@ -5,18 +5,16 @@ The platform's half is the npm package scorm-again, which refuses what the data 
 
 from __future__ import annotations
 
-import functools
 import json
 import shutil
 import subprocess
-import threading
 from collections.abc import Callable, Iterator
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
 from coursekit import GOOD, ROOT, Folder
+from plainhost import served
 from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page
 
 pytestmark = pytest.mark.browser
@@ -85,20 +83,10 @@ def package(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
     return place
 
 
-class Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
 @pytest.fixture(scope="module")
 def base(package: Path) -> Iterator[str]:
-    handler = functools.partial(Quiet, directory=str(package))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
+    with served(package) as address:
+        yield address
 
 
 Open = Callable[..., Page]

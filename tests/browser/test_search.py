@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
 import json
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +10,7 @@ from typing import Any
 import pytest
 from coursekit import Folder, block
 from labpage import until, watched
+from plainhost import served
 from playwright.sync_api import Browser, BrowserContext, Page
 
 pytestmark = pytest.mark.browser
@@ -63,13 +61,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 @pytest.fixture(scope="module")
 def site(folder: Folder) -> Iterator[str]:
-    handler = functools.partial(Quiet, directory=str(folder.root / "public"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/"
-        server.shutdown()
-        thread.join()
+    with served(folder.root / "public") as address:
+        yield address
 
 
 @pytest.fixture
@@ -77,11 +70,6 @@ def window(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
     size = {"width": 1000, "height": 800}
     with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
         yield context
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
-        pass
 
 
 Opened = Callable[..., Page]

@@ -104,7 +104,7 @@ def test_no_page_asks_anyone_else_or_says_anything_to_the_console(
             until(page, "document.fonts.status === 'loaded'")
             run_labs(page)
         page.goto(site.url(kinds["offline"]))
-        page.get_by_text("files of the course are here.").wait_for(timeout=60_000)
+        page.get_by_text("files of the course are here.").wait_for()
         others = [url for url in asked if not url.startswith((site.host.url, "blob:", "data:"))]
         assert others == []
         assert [text for text in said if "404" not in text] == []

@@ -1,23 +1,24 @@
-"""Pages in a headless Chromium: what scripts add works, and nothing is lost without them."""
+"""Pages in a headless Chromium: what scripts add works, and nothing is lost without them.
+
+What standards ask of pages, axe and the Nu checker, is in `tests/browser/test_standards.py`.
+"""
 
 from __future__ import annotations
 
-import functools
-import http.server
-import json
-import shutil
-import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))  # for the kit
 
+from chromium import launch
+from labpage import until, watched
+from plainhost import served
 from reportkit import reports
 
 from coursebuild.render import SiteOptions
@@ -143,37 +144,16 @@ def root(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: Any) -> None:
-        pass
-
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """The page for missing addresses, as a host would send it."""
-        body = (Path(self.directory) / "course" / "404.html").read_bytes()
-        self.send_response(code)
-        self.send_header("Content-Type", "text/html; charset=utf-8")
-        self.end_headers()
-        self.wfile.write(body)
-
-
 @pytest.fixture(scope="module")
 def base(root: Path) -> Iterator[str]:
-    handler = functools.partial(Quiet, directory=str(root))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://localhost:{server.server_address[1]}/course/"
-        server.shutdown()
-        thread.join()
+    with served(root, missing="course/404.html") as address:
+        yield f"{address}course/"
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium: install Debian's package `chromium`"
-    arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=arguments)
+        browser = launch(playwright, "--disable-gpu", "--disable-background-networking")
         yield browser
         browser.close()
 
@@ -182,24 +162,6 @@ def browser() -> Iterator[Browser]:
 def context(browser: Browser) -> Iterator[BrowserContext]:
     with browser.new_context(viewport={"width": 1440, "height": 900}) as context:
         yield context
-
-
-def watched(context: BrowserContext) -> tuple[Page, list[str]]:
-    """A page, and what it says to the console or asks of others."""
-    page, said = context.new_page(), list[str]()
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("requestfailed", lambda request: said.append(f"failed: {request.url}"))
-    return page, said
-
-
-def until(page: Page, expression: str) -> None:
-    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
-    for _ in range(200):
-        if page.evaluate(expression):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never true: {expression}")
 
 
 @pytest.mark.parametrize("place", ["http", "file"])
@@ -358,45 +320,3 @@ def test_no_page_is_wider_than_its_window(browser: Browser, base: str, width: in
             page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
             page.evaluate("document.documentElement.style.setProperty('--below', 'visible')")
             assert page.evaluate("document.documentElement.scrollWidth") <= width, path
-
-
-AXE = """axe.run(document, {rules: {"color-contrast-enhanced": {enabled: true}}}).then(found =>
-    found.violations.map(v => [v.id, v.nodes[0].html, v.nodes[0].failureSummary]))"""
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 1440])
-def test_axe_finds_nothing(browser: Browser, base: str, scheme: Any, width: int) -> None:
-    """With text at 7 : 1, which is more than axe asks for by itself."""
-    axe = (MODULES / "axe-core" / "axe.min.js").read_text(encoding="utf-8")
-    viewport: Any = {"width": width, "height": 900}
-    with browser.new_context(viewport=viewport, color_scheme=scheme, bypass_csp=True) as context:
-        page = context.new_page()
-        for path in (*PAGES, "404.html"):
-            page.goto(base + path)
-            page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
-            page.evaluate(axe)
-            assert page.evaluate(AXE) == [], path
-
-
-def test_the_nu_checker_finds_nothing(base: str) -> None:
-    """Over HTTP, so that `'self'` in the pages' policy means something."""
-    java = shutil.which("java")
-    assert java is not None, "no java: install Debian's package `default-jre-headless`"
-    jar = MODULES / "vnu-jar" / "build" / "dist" / "vnu.jar"
-    allow = "-Dnu.validator.servlet.allow-forbidden-hosts=true"
-    urls = [base + path for path in (*PAGES, "404.html")]
-    command = [
-        java,
-        allow,
-        "-jar",
-        str(jar),
-        "--format",
-        "json",
-        "--stdout",
-        "--exit-zero-always",
-        *urls,
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    messages = json.loads(done.stdout)["messages"]
-    assert [(m["url"], m.get("lastLine"), m["message"]) for m in messages] == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 import sys
 import zlib
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chromium import launch
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,8 +50,6 @@ def pixels(data: bytes) -> np.ndarray:
 
 @pytest.mark.browser
 def test_they_are_what_a_browser_draws(icons: Any) -> None:
-    chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium: install Debian's package `chromium`"
     draw = """async ([svg, side]) => {
       const image = new Image()
       image.src = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }))
@@ -63,7 +61,7 @@ def test_they_are_what_a_browser_draws(icons: Any) -> None:
     }"""
     shapes = icons.shapes(ICON)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = launch(playwright)
         page = browser.new_page()
         for side in (64, 192):
             theirs = np.array(page.evaluate(draw, [ICON, side]), float).reshape(side, side, 4)

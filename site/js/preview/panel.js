@@ -33,7 +33,7 @@ export class Panel {
     this.open = false
     this.told = new Set() // mistakes that a reader has seen
     this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
-    this.status = h('span', { class: 'preview-unseen', role: 'status' })
+    this.status = h('span', { class: 'unseen', role: 'status' })
     this.list = h('section', { class: 'preview-panel', 'aria-label': 'Problems', tabindex: '-1' })
     this.root = h('div', { class: 'preview-own', lang: 'en', dir: 'ltr' }, this.list, this.button, this.status)
     this.root.addEventListener('keydown', (event) => {

@@ -19,7 +19,7 @@ export class Ordering {
     this.first = [...list.children].map((item) => item.dataset.key)
     this.items = new Map([...list.children].map((item) => [item.dataset.key, this.#item(item)]))
     this.list = h('ol', { class: 'ordering' }, ...[...this.items.values()].map(({ item }) => item))
-    this.said = h('p', { class: 'quiz-unseen', role: 'status' })
+    this.said = h('p', { class: 'unseen', role: 'status' })
     this.body = h('div', {}, this.list, this.said)
     this.order = this.first
     list.remove()

@@ -162,7 +162,7 @@ export class Question {
     if (lead?.localName !== 'p') {
       text.id = this.id('text')
       const name = fill(this.words('quiz.live.question'), { n: this.element.dataset.number ?? '' })
-      return [h('legend', { class: 'quiz-unseen' }, name), text]
+      return [h('legend', { class: 'unseen' }, name), text]
     }
     const legend = h('legend', { id: lead.id || null, class: lead.className || null }, ...lead.childNodes)
     lead.remove()

@@ -9,7 +9,7 @@ export class Notices {
   constructor(words) {
     this.words = words
     this.shown = h('p', { class: 'lab-message', role: 'alert', hidden: true })
-    this.spoken = h('p', { class: 'lab-announce', role: 'status' })
+    this.spoken = h('p', { class: 'lab-announce unseen', role: 'status' })
     this.timer = 0
   }
 
