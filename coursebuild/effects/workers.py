@@ -5,6 +5,7 @@ Entry points: `ForkServer`, which makes them where processes can be forked; `spa
 
 from __future__ import annotations
 
+import abc
 import contextlib
 import json
 import os
@@ -37,7 +38,7 @@ class ServerLostError(Exception):
     """The fork server has gone."""
 
 
-class Worker:
+class Worker(abc.ABC):
     """A supervisor: it is given jobs and sends reports."""
 
     def __init__(self, environment: Mapping[str, str], jobs: int, reports: int) -> None:
@@ -99,9 +100,9 @@ class Worker:
         self._buffer.clear()
         return report, data[at : ends[0]], data[ends[0] : ends[1]], data[ends[1] :]
 
+    @abc.abstractmethod
     def status(self) -> int:
         """What ended it, once it is gone: minus a signal's number, or an exit status."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """Let it kill what it runs, and wait for that."""

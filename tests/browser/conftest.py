@@ -18,6 +18,7 @@ from coursekit import Folder
 from hostkit import Host
 from labcourse import LESSON, PENDULUM, TWIN, ZOO
 from plainhost import served
+from readercourse import FILES
 from standardkit import Site, build_both, shared_folder
 
 DRAWING = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -92,3 +93,32 @@ def quizzes(quiz_files: Path) -> Iterator[str]:
     """The address of that site."""
     with served(quiz_files) as address:
         yield address
+
+
+@pytest.fixture(scope="session")
+def reader(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course with questions, and a reader's way through it, built."""
+    folder = Folder(tmp_path_factory.mktemp("reader") / "course")
+    folder.root.mkdir()
+    folder.borrow(stores)
+    for path, text in FILES.items():
+        folder.write(path, text)
+    folder.write("models/pendulum.xml", PENDULUM)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return folder
+
+
+@pytest.fixture(scope="session")
+def site(reader: Folder) -> Iterator[str]:
+    """The address of its site."""
+    with served(reader.root / "public") as address:
+        yield address
+
+
+@pytest.fixture
+def calm(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
+    """A window without a service worker, which would keep pages that a test changes."""
+    size = {"width": 1000, "height": 800}
+    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
+        yield context

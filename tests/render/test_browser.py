@@ -26,7 +26,6 @@ from coursebuild.render import SiteOptions
 pytestmark = pytest.mark.browser
 
 Make = Callable[..., Any]
-MODULES = Path(__file__).parents[2] / "site" / "node_modules"
 
 BODY = "".join(f"def f{i}(x):\n" + "    x = x + 1\n" * 14 + "    return x\n\n\n" for i in range(8))
 WIDE = "a = " + " + ".join(["1.000"] * 40)
