@@ -228,7 +228,7 @@ class _Attempt:
             seconds=seconds if cached else time.monotonic() - began,
             steps_per_second=trial.steps_per_second,
             tried=trial.tried,
-            parity=parity.describe() if parity is not None else "",
+            parity=_parity_text(reply, parity, offer),
             module=module.code,
             config=module.config,
             mjb=mjb,
@@ -294,11 +294,15 @@ class _Attempt:
             self.memory.store.keep("labs", key, zlib.compress(json.dumps(reply).encode()))
         return reply
 
-    def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any] | None:
-        """How the main run compares with native MuJoCo; `None` where it cannot be repeated."""
+    def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
+        """How the main run compares with native MuJoCo, or why it cannot be repeated."""
         run = main["parity"]
-        if run["steps"] == 0 or not run["complete"] or run["modelChanged"]:
-            return None
+        if run["steps"] == 0:
+            return {"unrepeated": "it takes no step"}
+        if run["modelChanged"]:
+            return {"unrepeated": "its controller changes the model"}
+        if not run["complete"]:
+            return {"unrepeated": "its controller writes more than can be kept"}
         compared = self.engines.native.parity(mjb, run, self._horizon(main))
         return {**compared, "steps": run["steps"]}
 
@@ -377,6 +381,17 @@ def _drawing_digest() -> str:
 def _parity(reply: dict[str, Any]) -> Parity | None:
     main = reply["main"]
     told = main["parity"] if main is not None else None
-    if told is None:
+    if told is None or "unrepeated" in told:
         return None
     return Parity(told["steps"], told["timestep"], told["first"], told["relative"], told["exact"])
+
+
+def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: Offer) -> str:
+    if parity is not None:
+        return parity.describe()
+    told = reply["main"]["parity"] if reply["main"] is not None else None
+    if told is None:
+        return ""
+    if offer.script is not None:
+        return "compared with native MuJoCo as its Python export"
+    return f"not compared with native MuJoCo: {told['unrepeated']}"

@@ -291,10 +291,13 @@ def test_what_changes_the_model_is_compared_too(
 ) -> None:
     lab = {"xml": PENDULUM, "controller": "model.opt.gravity[0] = sim.time > 0.5 ? 2 : 0"}
     (result,) = tried(course, lab)
-    assert result.parity == "" and result.unexported == ""
+    assert result.parity == "compared with native MuJoCo as its Python export"
+    assert result.unexported == ""
     wrong(monkeypatch, "data.time > 0.5", "data.time > 0.25")
     (result,) = tried(course, lab)
     assert result.unexported.startswith("its state after 200 steps is apart from the lab's by ")
+    why = "its controller changes the model"
+    assert result.parity == f"not compared with native MuJoCo: {why}"
 
 
 def test_the_comparison_is_kept(course: Path, monkeypatch: pytest.MonkeyPatch) -> None:
