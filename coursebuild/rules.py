@@ -86,6 +86,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
     ("math-syntax", "error", "A formula does not parse."),
     ("math-unclosed", "error", "Display math is never closed."),
+    ("math-unread", "warning", "A dollar sign and TeX stand in a text, and no formula was read."),
     ("equation-label", "error", "The label of a formula cannot be read, or stands where none may."),
     # terms and symbols
     ("term-attribute", "error", "The attribute by which a text defines a term cannot be read."),

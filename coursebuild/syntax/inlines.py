@@ -46,11 +46,16 @@ from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import Placed, Placer, locate
 from coursebuild.syntax.targets import check_scheme, classify
+from coursebuild.syntax.unread_math import unread_formula
 from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
 
+_UNREAD = (
+    "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
+    "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
+)
 _BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
 _DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
@@ -100,6 +105,7 @@ class _Pass:
         self.placer = Placer(content)
         self.stack = [_Frame(None)]
         self.run: list[Item] = []
+        self.texts: list[tuple[int, str]] = []
         self.links = 0 if mentions and may_mention(content.text) else 1
         """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
 
@@ -111,6 +117,8 @@ class _Pass:
                 if token.content:
                     literal = kind == "text" or token.content == token.markup
                     self.run.append(Item(token.content, token.start, token.end, literal))
+                    if literal:
+                        self.texts.append((token.start, token.content))
             elif kind == "softbreak":
                 self.run.append(Item("\n", token.start, token.end, False))
             elif kind == "math_unclosed":
@@ -123,6 +131,8 @@ class _Pass:
                 self._leaf(token)
         self._flush()
         self.reader.balance.leave()
+        if "$" in self.content.text:
+            self._unread_math()
         return tuple(self.stack[0].nodes)
 
     # -- texts
@@ -132,6 +142,13 @@ class _Pass:
             make = plain if self.links else with_mentions
             self.stack[-1].nodes += make(self.run, self.placer)
             self.run = []
+
+    def _unread_math(self) -> None:
+        dollar = unread_formula(self.texts)
+        if dollar is not None:
+            span = self.placer.span(dollar, dollar + 1)
+            what = "a dollar sign and TeX stand in the text: no formula was read here"
+            self.reader.report(diagnose("math-unread", span, what, help=_UNREAD))
 
     def _unclosed_math(self, token: Placed) -> None:
         span = self.placer.span(token.start, token.end)

@@ -1,6 +1,6 @@
 /** Signs for what is read: each a shape of its own, beside a word. */
 
-const SVG = 'http://www.w3.org/2000/svg'
+import { pictogram } from '../lab/page/dom.js'
 
 /** Lines in a square of 16. */
 const SHAPES = {
@@ -11,12 +11,7 @@ const SHAPES = {
 
 /** A small picture in the colour of the text around it. @param {'begun' | 'read' | 'right'} name */
 export function sign(name) {
-  const svg = document.createElementNS(SVG, 'svg')
-  svg.setAttribute('viewBox', '0 0 16 16')
+  const svg = pictogram(SHAPES[name])
   svg.setAttribute('class', `sign sign-${name}`)
-  svg.setAttribute('aria-hidden', 'true')
-  const path = document.createElementNS(SVG, 'path')
-  path.setAttribute('d', SHAPES[name])
-  svg.append(path)
   return svg
 }

@@ -1,11 +1,9 @@
 /** Small things that all kinds of questions are made of. */
 
-import { h } from '../lab/page/dom.js'
+import { h, pictogram } from '../lab/page/dom.js'
 import { fill } from '../lab/page/words.js'
 
 export { fill, h }
-
-const SVG = 'http://www.w3.org/2000/svg'
 
 const SHAPES = {
   right: 'M2.500 8.500 6.500 12.500 13.500 3.500',
@@ -20,13 +18,8 @@ const SHAPES = {
 
 /** A small drawing in the colour of the text; what it means is said in words beside it. */
 export function shape(name) {
-  const svg = document.createElementNS(SVG, 'svg')
-  svg.setAttribute('viewBox', '0 0 16 16')
-  svg.setAttribute('aria-hidden', 'true')
+  const svg = pictogram(SHAPES[name])
   svg.classList.add('quiz-shape')
-  const path = document.createElementNS(SVG, 'path')
-  path.setAttribute('d', SHAPES[name])
-  svg.append(path)
   return svg
 }
 

@@ -33,11 +33,16 @@ const ICONS = {
 
 /** A small picture in the colour of the text; what it means is said by the button that holds it. */
 export function icon(name) {
+  return pictogram(ICONS[name])
+}
+
+/** A picture of one path, in a square of 16, that nobody reads out. */
+export function pictogram(outline) {
   const svg = document.createElementNS(SVG, 'svg')
   svg.setAttribute('viewBox', '0 0 16 16')
   svg.setAttribute('aria-hidden', 'true')
   const path = document.createElementNS(SVG, 'path')
-  path.setAttribute('d', ICONS[name])
+  path.setAttribute('d', outline)
   svg.append(path)
   return svg
 }
