@@ -160,7 +160,12 @@ def config_json(lab: Lab, name: str) -> str:
         "readouts": [{"label": r.label, "digits": r.digits} for r in lab.readouts],
         "plots": [_plot_data(plot) for plot in lab.plots],
         "expect": [
-            {"after": _after(claim.after), "t": claim.t, "min": claim.minimum, "max": claim.maximum}
+            {
+                "after": [step if isinstance(step, str) else dict(step) for step in claim.after],
+                "t": claim.t,
+                "min": claim.minimum,
+                "max": claim.maximum,
+            }
             for claim in lab.expect
         ],
     }
@@ -207,7 +212,3 @@ def _plot_data(plot: LabPlot) -> dict[str, Any]:
         "refLines": [{"y": y, "label": label} for y, label in plot.ref_lines],
         "traces": [{"label": t.label, "dash": t.dash} for t in plot.traces],
     }
-
-
-def _after(after: str | tuple[tuple[str, float | str], ...] | None) -> Any:
-    return dict(after) if isinstance(after, tuple) else after

@@ -81,6 +81,7 @@ from coursebuild.model.interactive import LabControl as LabControl
 from coursebuild.model.interactive import LabExpect as LabExpect
 from coursebuild.model.interactive import LabPlot as LabPlot
 from coursebuild.model.interactive import LabReadout as LabReadout
+from coursebuild.model.interactive import LabStep as LabStep
 from coursebuild.model.interactive import LabTrace as LabTrace
 from coursebuild.model.interactive import NumericQuestion as NumericQuestion
 from coursebuild.model.interactive import OpenQuestion as OpenQuestion

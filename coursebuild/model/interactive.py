@@ -76,6 +76,10 @@ class LabPlot:
     traces: tuple[LabTrace, ...]
 
 
+LabStep: TypeAlias = str | tuple[tuple[str, float | str], ...]
+"""What a reader does to a lab: the label of a button pressed, or labels of controls with values."""
+
+
 @dataclass(frozen=True, slots=True)
 class LabExpect:
     """A claim that the build proves.
@@ -84,7 +88,8 @@ class LabExpect:
     """
 
     span: Span
-    after: str | tuple[tuple[str, float | str], ...] | None
+    after: tuple[LabStep, ...]
+    """Done in order at the start; none: the claim is of the lab as it starts."""
     t: float
     expr: str
     minimum: float | None

@@ -37,6 +37,7 @@ from coursebuild.syntax.lab_schema import (
     Select,
     SimLab,
     Slider,
+    Step,
 )
 from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.syntax.prose import Prose
@@ -267,5 +268,13 @@ def _plot(node: ObjectNode, plot: Plot) -> LabPlot:
 
 
 def _expect(node: ObjectNode, claim: Expect) -> LabExpect:
-    after = tuple(claim.after.items()) if isinstance(claim.after, dict) else claim.after
+    after = tuple(
+        tuple(step.items()) if isinstance(step, dict) else step for step in _steps(claim)
+    )
     return LabExpect(node.span, after, claim.t, claim.expr, claim.min, claim.max)
+
+
+def _steps(claim: Expect) -> tuple[Step, ...]:
+    if claim.after is None:
+        return ()
+    return claim.after if isinstance(claim.after, tuple) else (claim.after,)

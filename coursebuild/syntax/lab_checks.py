@@ -19,6 +19,8 @@ from coursebuild.syntax.relations import one_of, repeated
 from coursebuild.syntax.wording import quoted
 
 Structs = Mapping[ObjectNode, Struct]
+Known = Mapping[str, Struct | None]
+"""The controls of a lab by their labels; `None`: its fields are wrong."""
 
 
 def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
@@ -115,19 +117,40 @@ def _check_expect(
         message = f"`max` must be at least `min`, which is {claim.min:g}"
         yield diagnose("field-value", node.place("max"), message)
     known = {label.value: structs.get(c) for c in controls if (label := _label(c)) is not None}
-    match node.get("after"):
-        case StringNode() as after:
-            yield from _check_pressed(after, known)
-        case ObjectNode() as after:
-            if not after.members:
-                yield diagnose("field-value", after.mark, "`after` names no control")
-            for member in after.members:
-                yield from _check_moved(member.key, member.value, known)
+    after = node.get("after")
+    if isinstance(after, ArrayNode):
+        for i, step in enumerate(after.items):
+            yield from _check_step(step, f"after[{i}]", known)
+    elif after is not None:
+        yield from _check_step(after, "after", known)
+
+
+def _check_step(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
+    """One thing to do before a claim; messages call it `name`."""
+    match node:
+        case StringNode():
+            yield from _check_pressed(node, known)
+        case ObjectNode():
+            if not node.members:
+                yield diagnose("field-value", node.mark, f"`{name}` names no control")
+            for member in node.members:
+                if isinstance(known.get(member.key.value), Button):
+                    help = _pressed_instead(member.key.value, node, name)
+                    message = f"`{member.key.value}` is a button and has no value"
+                    yield diagnose("lab-name", member.key.span, message, help=help)
+                else:
+                    yield from _check_moved(member.key, member.value, known)
         case _:
             pass
 
 
-def _check_pressed(label: StringNode, known: Mapping[str, Struct | None]) -> Iterator[Diagnostic]:
+def _pressed_instead(label: str, node: ObjectNode, name: str) -> str:
+    if len(node.members) > 1:
+        return f'press it in a step of its own, as in `"after": [{{…}}, "{label}"]`'
+    return f'write `"{label}"`' if name != "after" else f'write `"after": "{label}"`'
+
+
+def _check_pressed(label: StringNode, known: Known) -> Iterator[Diagnostic]:
     buttons = [name for name, struct in known.items() if isinstance(struct, Button | None)]
     if label.value in buttons:
         return
@@ -140,19 +163,13 @@ def _check_pressed(label: StringNode, known: Mapping[str, Struct | None]) -> Ite
     yield diagnose("lab-name", label.span, message, help=help)
 
 
-def _check_moved(
-    label: StringNode, value: Node, known: Mapping[str, Struct | None]
-) -> Iterator[Diagnostic]:
+def _check_moved(label: StringNode, value: Node, known: Known) -> Iterator[Diagnostic]:
     if label.value not in known:
         names = [name for name, struct in known.items() if not isinstance(struct, Button)]
         message = f"the lab has no control `{label.value}`"
         yield diagnose("lab-name", label.span, message, help=did_you_mean(label.value, names))
         return
     match known[label.value]:
-        case Button():
-            message = f"`{label.value}` is a button and has no value"
-            help = f'write `"after": "{label.value}"`'
-            yield diagnose("lab-name", label.span, message, help=help)
         case Slider() as slider:
             if not isinstance(value, NumberNode):
                 message = f"`{label.value}` is a slider: its value is a number"

@@ -16,6 +16,7 @@ from coursebuild.syntax.fields import Digits, NotNegative, OptionalBlocks, Posit
 
 Overlay: TypeAlias = Literal["frames", "contacts", "forces", "com", "inertia", "joints"]
 Scalar: TypeAlias = float | str
+Step: TypeAlias = Text | dict[str, Scalar]
 Height: TypeAlias = Annotated[int, Meta(ge=80, le=2000)]
 JAVASCRIPT_NAME = r"^[A-Za-z_$][A-Za-z0-9_$]*$"
 
@@ -138,8 +139,11 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
     t: Annotated[NotNegative, Meta(description="simulated time in seconds")]
     expr: Annotated[Text, Meta(description="an expression that gives a number")]
     after: Annotated[
-        Text | dict[str, Scalar] | None,
-        Meta(description="the label of a button to press, or values of controls by their labels"),
+        Step | Annotated[tuple[Step, ...], Meta(min_length=1)] | None,
+        Meta(
+            description="the label of a button to press, or values of controls by their labels; "
+            "or a list of these, done in order"
+        ),
     ] = None
     min: float | None = None
     max: float | None = None

@@ -50,9 +50,9 @@ test('a sound lab passes, and everything in it is tried', () => {
       readouts: [...READOUT, ...READOUT],
       plots: [plot(2)],
       expect: [
-        { after: null, t: 0, min: 3, max: 3 },
-        { after: { from: 1 }, t: 0, min: 1, max: 1 },
-        { after: 'kick', t: 0.1, min: null, max: 100 },
+        { after: [], t: 0, min: 3, max: 3 },
+        { after: [{ from: 1 }], t: 0, min: 1, max: 1 },
+        { after: ['kick'], t: 0.1, min: null, max: 100 },
       ],
       stopAt: 2,
     },
@@ -92,6 +92,35 @@ test('a sound lab passes, and everything in it is tried', () => {
   assert.ok(reply.stepsPerSecond > 0)
 })
 
+test('steps before a claim are done in order, and claims after the same share a run', () => {
+  const claims = [
+    [[{ at: 5 }, 'add'], 2, 6],
+    [['add', { at: 5 }], 0, 5],
+    [[{ at: 5 }, 'add'], 0, 6],
+    [[{ at: 4 }, { at: 5 }], 0, 5],
+    [['add', 'add'], 0, 5],
+  ]
+  const reply = attempt(
+    PENDULUM,
+    {
+      controls: [control({ label: 'at', min: 3, max: 5, value: 3, param: 'at' }), control({ label: 'add', type: 'button' })],
+      expect: claims.map(([after, t, value]) => ({ after, t, min: value, max: value })),
+    },
+    { controls: ['{set: ({ctx}, value) => { ctx.at = value }}', run('ctx.at += 1')], expect: claims.map(() => 'ctx.at') },
+    { seconds: 0.1 },
+  )
+  assert.deepEqual(told(reply), [])
+  assert.deepEqual(
+    reply.tried.slice(-4).map(({ entry, what }) => `${entry.join('.')}: ${what}`),
+    [
+      'expect.2: claims after "at" at 5, then "add"',
+      'expect.1: claims after "add", then "at" at 5',
+      'expect.3: claims after "at" at 4, then "at" at 5',
+      'expect.4: claims after "add", then "add"',
+    ],
+  )
+})
+
 test('the same request gives the same reply', () => {
   const one = () => {
     const reply = attempt(PENDULUM, { key: 'up', plots: [plot(1)], seed: 5 }, {
@@ -114,17 +143,17 @@ test('each way to be wrong, with its entry', () => {
     [{ plots: [plot(2)] }, { plots: [['1', '"x"']] }, [['plots.0.traces.1.expr', 'type', 'gives the text "x", not a number', 0]]],
     [{ plots: [plot(1)] }, { plots: [['NaN']] }, [['plots.0.traces.0.expr', 'nan', 'is NaN', 0]]],
     [
-      { expect: [{ after: null, t: 1, min: 0, max: null }] },
+      { expect: [{ after: [], t: 1, min: 0, max: null }] },
       { expect: ['data.qpos[2]'] },
       [['expect.0.expr', 'expect', /^is -3\.9\d* at 1 s, less than 0$/, 1]],
     ],
-    [{ expect: [{ after: null, t: 1, min: null, max: -5 }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /more than -5$/, 1]]],
+    [{ expect: [{ after: [], t: 1, min: null, max: -5 }] }, { expect: ['data.qpos[2]'] }, [['expect.0.expr', 'expect', /more than -5$/, 1]]],
     [
-      { expect: [{ after: null, t: 0, min: 0, max: 1 }] },
+      { expect: [{ after: [], t: 0, min: 0, max: 1 }] },
       { expect: ['"0.5"'] },
       [['expect.0.expr', 'type', 'gives the text "0.5", not a number', 0]],
     ],
-    [{ expect: [{ after: 'nothing', t: 0, min: 0, max: 1 }] }, { expect: ['0'] }, [['expect.0', 'throws', 'there is no control "nothing"', 0]]],
+    [{ expect: [{ after: ['nothing'], t: 0, min: 0, max: 1 }] }, { expect: ['0'] }, [['expect.0', 'throws', 'there is no control "nothing"', 0]]],
     [{ key: 'none' }, {}, [['', 'throws', 'the model has no keyframe "none"', null]]],
     [{ trail: 'none' }, {}, [['', 'throws', 'the model has no site "none"', null]]],
   ]
@@ -248,7 +277,7 @@ test('what a lab changes of that which all share is told at its entry, and put b
     [{ controls: [slider] }, { controls: ['{set: (_, value) => { if (value === 1) Math.max = Math.min }}'] }, 'controls.0', '`Math.max`'],
     [{ readouts: READOUT }, { readouts: ['(Math[Symbol.iterator] = 1)'] }, 'readouts.0.expr', '`Math[Symbol(Symbol.iterator)]`'],
     [{ plots: [plot(1)] }, { plots: [['(mj.MjData.prototype.x = 1)']] }, 'plots.0.traces.0.expr', '`mj.MjData.prototype.x`'],
-    [{ expect: [{ after: null, t: 0, min: 0, max: 9 }] }, { expect: ['(Object.defineProperty(Math, "PI", {}), Error.stackTraceLimit = 3)'] }, 'expect.0.expr', '`Error.stackTraceLimit`'],
+    [{ expect: [{ after: [], t: 0, min: 0, max: 9 }] }, { expect: ['(Object.defineProperty(Math, "PI", {}), Error.stackTraceLimit = 3)'] }, 'expect.0.expr', '`Error.stackTraceLimit`'],
   ]) {
     const guard = new Guard([...SHARED, ['mj', engine.mj, true]])
     const { sin, max } = Math

@@ -272,14 +272,21 @@ def test_data_arrives_to_the_last_bit(y: float, text: str, other: float) -> None
 def test_data_is_json_that_any_reader_takes() -> None:
     lab = make_lab(title='</script>"\\ \u2028 \U0001f916 \u00e9', expect=[
         {"after": {"speed": 0.5}, "t": 1, "expr": "1", "min": 0},
-        {"after": "kick", "t": 1, "expr": "1", "max": 2}],
+        {"after": "kick", "t": 1, "expr": "1", "max": 2},
+        {"t": 1, "expr": "1", "max": 2},
+        {"after": [{"speed": 1}, "kick"], "t": 1, "expr": "1", "max": 2}],
         controls=[{"label": "speed", "min": 0, "max": 1, "value": 0, "param": "v"},
                   {"type": "button", "label": "kick", "run": "ctx.x = 1"}],
         camera={"azimuth": 10}, key=0)  # fmt: skip
     data = json.loads(compile_lab(lab, "4.2-lab-1").config)
     assert data["id"] == "4.2-lab-1"
     assert data["title"] == lab.title
-    assert [claim["after"] for claim in data["expect"]] == [{"speed": 0.5}, "kick"]
+    assert [claim["after"] for claim in data["expect"]] == [
+        [{"speed": 0.5}],
+        ["kick"],
+        [],
+        [{"speed": 1}, "kick"],
+    ]
     assert data["camera"] == {"azimuth": 10, "elevation": None, "distance": None, "target": None}
     assert (data["key"], data["stopAt"], data["seed"]) == (0, None, None)
 

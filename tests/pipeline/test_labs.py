@@ -104,6 +104,11 @@ MISTAKES = [
     ("a claim with a control", "lab-expect",
      '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p"}],\n'
      '"expect": [{"after": {"s": 0.25}, "t": 0.1, "max": 0.2,\n"expr": ‸"ctx.p"}]}'),
+    ("a claim after a control and a button", "lab-expect",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p"}, {"type": "button",\n'
+     '"label": "b", "run": "data.qvel[2] = ctx.p"}],\n'
+     '"expect": [{"after": [{"s": 0.25}, "b"], "t": 0, "max": 0.25, "expr": "data.qvel[2]"},\n'
+     '{"after": [{"s": 0.25}, "b"], "t": 0, "max": 0.2,\n"expr": ‸"data.qvel[2]"}]}'),
     ("a claim that is NaN", "lab-value",
      '{"model": "ball", "expect": [{"t": 0.1,\n"expr": ‸"0 / 0", "min": 0}]}'),
     ("a pause that is jumped over", "lab-expect",
@@ -196,7 +201,9 @@ RIGHT = '''{
     {"t": 1, "expr": "ctx.n", "min": 500, "max": 500},
     {"after": "kick", "t": 0.5, "expr": "data.qpos[0]", "min": 0.4999, "max": 0.5001},
     {"after": {"g": -1.6}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.9, "max": 2},
-    {"after": {"g": -1.6, "lift": 0}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.79, "max": 1.81}
+    {"after": {"g": -1.6, "lift": 0}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.79, "max": 1.81},
+    {"after": [{"g": -1.6}, "kick"], "t": 0.5, "expr": "data.qpos[0]", "min": 0.4999, "max": 0.5001},
+    {"after": ["kick", {"g": -1.6}], "t": 0.5, "expr": "data.qpos[0]", "min": 0, "max": 0}
   ]
 }'''  # fmt: skip
 
@@ -208,13 +215,13 @@ def test_a_lab_in_which_everything_holds(make: Make) -> None:
     (lab,) = report["labs"]
     assert {k: lab[k] for k in ("name", "title", "lesson", "status", "tried", "cached")} == {
         "name": "1.2-lab-1", "title": "All of it", "lesson": "1.2", "status": "ok",
-        "tried": 1 + 3 + 3 + 2 + 1 + 4, "cached": False,
+        "tried": 1 + 3 + 3 + 2 + 1 + 6, "cached": False,
     }  # fmt: skip
     assert lab["parity"] == "bit-identical to native MuJoCo over 500 steps"
     assert lab["steps_per_second"] > 100
     text = folder.main("check").out
     assert re.search(
-        r"^ok       1\.2-lab-1  [\d,]+ steps/s, 14 things tried, "
+        r"^ok       1\.2-lab-1  [\d,]+ steps/s, 16 things tried, "
         r"bit-identical to native MuJoCo over 500 steps, cached$",
         text,
         re.MULTILINE,

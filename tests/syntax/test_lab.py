@@ -84,7 +84,9 @@ COMPLETE = r"""{
   "trail": "tip",
   "expect": [{"after": "Spin", "t": 5, "expr": "lib.energy().kinetic", "min": 0.1, "max": 1},
              {"after": {"mass": 2, "mode": "f"}, "t": 0, "expr": "1", "min": 1},
-             {"t": 1, "expr": "2", "max": 2}],
+             {"t": 1, "expr": "2", "max": 2},
+             {"after": [{"mass": 2}, "Spin", {"mode": "f", "gain": 1}], "t": 0, "expr": "1",
+              "min": 1}],
   "seed": 4294967295, "verify": {"seconds": 3, "rtol": 0}
 }"""
 
@@ -153,10 +155,11 @@ def test_a_complete_lab() -> None:
     assert plot.traces[0] == LabTrace(plot.traces[0].span, "x", "data.qvel[3]", (4.0, 2.0))
     assert [trace.dash for trace in plot.traces] == [(4.0, 2.0), True, False]
     assert (lab.trail, text_of(lab.trail_span)) == ("tip", '"tip"')
-    first, second, third = lab.expect
-    assert first == LabExpect(first.span, "Spin", 5.0, "lib.energy().kinetic", 0.1, 1.0)
-    assert second.after == (("mass", 2.0), ("mode", "f"))
-    assert (third.after, third.minimum, third.maximum) == (None, None, 2.0)
+    first, second, third, fourth = lab.expect
+    assert first == LabExpect(first.span, ("Spin",), 5.0, "lib.energy().kinetic", 0.1, 1.0)
+    assert second.after == ((("mass", 2.0), ("mode", "f")),)
+    assert (third.after, third.minimum, third.maximum) == ((), None, 2.0)
+    assert fourth.after == ((("mass", 2.0),), "Spin", (("mode", "f"), ("gain", 1.0)))
     assert (lab.seed, lab.verify_seconds, lab.verify_rtol) == (4294967295, 3.0, 0.0)
 
 
@@ -331,6 +334,9 @@ CLAIM = LAB % (
          "3:54-58 lab-name: the lab has no control `mm` [did you mean `m`?]"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"Go": 1}',
          '3:54-58 lab-name: `Go` is a button and has no value [write `"after": "Go"`]'),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": 1, "Go": 1}',
+         "3:62-66 lab-name: `Go` is a button and has no value"
+         ' [press it in a step of its own, as in `"after": [{…}, "Go"]`]'),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": 1.5}',
          "3:59-62 field-value: `m` goes from 0 to 1, and cannot be `1.5`"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": "x"}',
@@ -340,7 +346,26 @@ CLAIM = LAB % (
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"int": true}',
          "3:61-65 field-type: `int` must be a number or a string, not `true`"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": 3', "3:53-54 field-type: `after` must"
-         ' be a string or an object, not the number 3 [put it between quotes: `"3"`]'),
+         ' be a string or an object or an array of strings or objects, not the number 3'
+         ' [put it between quotes: `"3"`]'),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": []',
+         "3:53-54 field-value: `after` is empty"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", ""]',
+         "3:60-62 field-value: `after[1]` is empty"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 1}, ["Go"]]', "3:64-65 field-type:"
+         " `after[1]` must be a string or an object, not an array"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 1}, "Goo"]',
+         "3:64-69 lab-name: the lab has no button `Goo` [did you mean `Go`?]"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {}]',
+         "3:60-61 field-value: `after[1]` names no control"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {"mm": 1}]',
+         "3:61-65 lab-name: the lab has no control `mm` [did you mean `m`?]"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"Go": 1}, {"m": 1}]',
+         '3:55-59 lab-name: `Go` is a button and has no value [write `"Go"`]'),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 0},\n{"m": 1.5}]',
+         "4:7-10 field-value: `m` goes from 0 to 1, and cannot be `1.5`"),
+        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {"int": null}]',
+         "3:68-72 field-type: `int` must be a number or a string, not `null` [leave the field out]"),
     ],
 )  # fmt: skip
 def test_what_an_author_is_told(body: str, expected: str) -> None:

@@ -5,7 +5,7 @@
  *
  * 1. The main run: from the start, stepping as Play does. It gives the lab's static form and the material for parity.
  * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.
- * 3. Every claim (`expect`), from a fresh start; claims after the same act share a run.
+ * 3. Every claim (`expect`), from a fresh start; claims after the same steps share a run.
  *
  * The same request gives the same reply, but for `stepsPerSecond`, and for what did not fit into `wall`.
  */
@@ -306,10 +306,15 @@ class Trial {
     }
   }
 
+  /** @param {(string | Record<string, number | string>)[]} after buttons to press and values of controls, in order */
   describe(after) {
-    if (after === null) return 'claims from the start'
-    if (typeof after === 'string') return `claims after "${after}"`
-    return `claims with ${Object.entries(after).map(([label, value]) => `"${label}" at ${JSON.stringify(value)}`).join(', ')}`
+    if (after.length === 0) return 'claims from the start'
+    const steps = after.map((step) => {
+      if (typeof step === 'string') return `"${step}"`
+      return Object.entries(step).map(([label, value]) => `"${label}" at ${JSON.stringify(value)}`).join(', ')
+    })
+    const only = after.length === 1 && typeof after[0] !== 'string'
+    return `claims ${only ? 'with' : 'after'} ${steps.join(', then ')}`
   }
 
   prove(lab, claims) {
@@ -328,13 +333,14 @@ class Trial {
   }
 
   act(lab, after) {
-    if (after === null) return
     const index = (label) => {
       const i = this.config.controls.findIndex((control) => control.label === label)
       if (i < 0) throw new RangeError(`there is no control "${label}"`)
       return i
     }
-    if (typeof after === 'string') lab.press(index(after))
-    else for (const [label, value] of Object.entries(after)) lab.setControl(index(label), value)
+    for (const step of after) {
+      if (typeof step === 'string') lab.press(index(step))
+      else for (const [label, value] of Object.entries(step)) lab.setControl(index(label), value)
+    }
   }
 }
