@@ -23,6 +23,7 @@ from typing import Protocol
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
+from coursebuild.scripts.nearest import meant
 from coursebuild.scripts.printed import PrintedLine, lines_of_run, printed_lines
 from coursebuild.scripts.shown import Shown, text_places
 from coursebuild.source import Span
@@ -243,10 +244,9 @@ def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -
     windows = shown.windows(lines)
     label, better = "", ""
     if windows:
-        nearest = min(windows, key=shown.distance)
-        several = len(nearest.numbers) > 1
-        label = f"the nearest printed value{'s are' if several else ' is'} {nearest.text}"
-        better = shown.rewritten(binding.text, nearest) or ""
+        likeliest = meant(shown, windows)
+        label = likeliest.label
+        better = likeliest.rewritten(shown, binding.text)
     elif len(shown.numbers) > 1 and any(line.numbers for line in lines):
         label = f"no printed line has {len(shown.numbers)} numbers one after the other"
     else:

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from decimal import Decimal
 
 from coursebuild.scripts.celltext import plain
 from coursebuild.scripts.numbers import (
     Number,
-    difference,
     round_like,
     scan_prose,
     within_half_unit,
@@ -63,16 +61,6 @@ class Shown:
         """Whether the printed numbers are those shown, rounded."""
         pairs = zip(self.numbers, window.numbers, strict=True)
         return all(shows(shown, printed) for shown, printed in pairs)
-
-    def distance(self, window: Window) -> Decimal:
-        """How far the printed numbers are from those shown: the sum of the absolute differences."""
-        total = Decimal(0)
-        for shown, printed in zip(self.numbers, window.numbers, strict=True):
-            if shown.finite and printed.finite:
-                total += difference(shown.value, printed.value)
-            elif not shows(shown, printed):
-                return Decimal("Infinity")
-        return total
 
     def rewritten(self, text: str, window: Window) -> str | None:
         """The binding's text with printed numbers in it, rounded to the digits that it shows.

@@ -202,7 +202,7 @@ RIGHT = '''{
     {"after": "kick", "t": 0.5, "expr": "data.qpos[0]", "min": 0.4999, "max": 0.5001},
     {"after": {"g": -1.6}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.9, "max": 2},
     {"after": {"g": -1.6, "lift": 0}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.79, "max": 1.81},
-    {"after": [{"g": -1.6}, "kick"], "t": 0.5, "expr": "data.qpos[0]", "min": 0.4999, "max": 0.5001},
+    {"after": [{"g": -1.6}, "kick"], "t": 0.5, "expr": "data.qpos[0]", "min": 0.499, "max": 0.501},
     {"after": ["kick", {"g": -1.6}], "t": 0.5, "expr": "data.qpos[0]", "min": 0, "max": 0}
   ]
 }'''  # fmt: skip

@@ -110,7 +110,12 @@ def test_a_printed_value_rounded_to_the_digits_shown(binding: str) -> None:
     [
         ("+6.65 %", "the nearest printed value is +6.641", "write `+6.64 %`"),
         ("6.7 %", "the nearest printed value is +6.641", "write `6.6 %`"),
-        ("6.04 %", "the nearest printed value is +6.641", "write `6.64 %`"),
+        (
+            "6.04 %",
+            "the same number is printed with the other sign: -6.040",
+            "write `-6.04 %`",
+        ),
+        ("6.05 %", "the nearest printed value is -6.040", "write `-6.04 %`"),
         ("\u22126.1 %", "the nearest printed value is -6.040", "write `\u22126.0 %`"),
         ("4.0e-11 kg m^2/s", "the nearest printed value is 3.9e-11", "write `3.9e-11 kg m^2/s`"),
         ("5 flips", "the nearest printed value is 4", "write `4 flips`"),
@@ -130,6 +135,42 @@ def test_other_values_are_refused(binding: str, label: str, help_text: str) -> N
     assert found is not None and found.rule == "binding-mismatch"
     assert (found.label, found.help) == (label, help_text)
     assert found.span.text == binding
+
+
+@pytest.mark.parametrize(
+    ("binding", "printed", "label", "help_text"),
+    [
+        # the same number with the other sign, however near others are
+        ("829.030", "work -829.030 J, 263.1 W", "sign: -829.030", "write `-829.030`"),
+        ("829.03", "-829.0301 829.05", "sign: -829.0301", "write `-829.03`"),
+        ("+829", "-829.2 830.1", "sign: -829.2", "write `-829`"),
+        ("-4", "4 -5", "sign: 4", "write `4`"),
+        ("−1.5e-3", "1.5e-03", "sign: 1.5e-03", "write `1.5e-3`"),
+        ("1.50, -2.0", "1.50 2.00\n1.50 -2.1", "signs: 1.50, 2.00", "write `1.50, 2.0`"),
+        ("1.50, 2.0", "-1.50 -2.00", "signs: -1.50, -2.00", "write `-1.50, -2.0`"),
+        # the relatively nearest; another sign costs a digit
+        ("0.1", "0.0001 0.5", "value is 0.5", "write `0.5`"),
+        ("829.030", "-829.040 810.2", "value is -829.040", "write `-829.040`"),
+        ("829.030", "-829.040 829.041", "value is 829.041", "write `829.041`"),
+        ("3.0", "0 -3.1", "value is -3.1", "write `-3.1`"),
+        ("0", "2.5 -0.7", "value is -0.7", "write `-1`"),
+        ("5.1", "nan inf 9.0", "value is 9.0", "write `9.0`"),
+        # the same digits with another power of ten, unless by chance
+        ("6.64 %", "0.0664 31.2", "of ten: 0.0664", ""),
+        ("3.9e-12", "3.9e-11 6.0e-12", "of ten: 3.9e-11", "write `3.9e-11`"),
+        ("6.64 %", "0.0664 6.65", "value is 6.65", "write `6.65 %`"),
+        ("6.641 %", "0.06641 6.65", "of ten: 0.06641", ""),
+        ("49.1", "4.905 6.2", "of ten: 4.905", ""),
+        ("0.4905", "-4.905 1.3", "of ten: -4.905", "write `-4.9050`"),
+        ("5", "50 4", "value is 4", "write `4`"),
+    ],
+)
+def test_what_is_most_probably_meant(
+    binding: str, printed: str, label: str, help_text: str
+) -> None:
+    found = one(f"`{binding}`{{out}}", printed + "\n")
+    assert found is not None and found.label.endswith(label)
+    assert found.help == help_text
 
 
 def test_what_is_said() -> None:

@@ -365,7 +365,8 @@ CLAIM = LAB % (
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 0},\n{"m": 1.5}]',
          "4:7-10 field-value: `m` goes from 0 to 1, and cannot be `1.5`"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {"int": null}]',
-         "3:68-72 field-type: `int` must be a number or a string, not `null` [leave the field out]"),
+         "3:68-72 field-type: `int` must be a number or a string, not `null`"
+         " [leave the field out]"),
     ],
 )  # fmt: skip
 def test_what_an_author_is_told(body: str, expected: str) -> None:
