@@ -268,9 +268,7 @@ def _plot(node: ObjectNode, plot: Plot) -> LabPlot:
 
 
 def _expect(node: ObjectNode, claim: Expect) -> LabExpect:
-    after = tuple(
-        tuple(step.items()) if isinstance(step, dict) else step for step in _steps(claim)
-    )
+    after = tuple(tuple(step.items()) if isinstance(step, dict) else step for step in _steps(claim))
     return LabExpect(node.span, after, claim.t, claim.expr, claim.min, claim.max)
 
 
