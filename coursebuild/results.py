@@ -108,8 +108,8 @@ class Trace:
     """Whether there was an initial state to be moved, of a run that was to do so."""
     states: tuple[str, ...] = ()
     """Of such a run, for each `MjData` in words: its number in the order of their first use, the
-    length of `qpos`, the largest initial |qpos| and |qvel|, and the `qpos` and `qvel` that it ended
-    with, as hexadecimal numbers."""
+    length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
+    its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
 
 
 @dataclass(frozen=True, slots=True)

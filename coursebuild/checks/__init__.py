@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from coursebuild.checks.benches import bench_findings
 from coursebuild.checks.compiled import check_compiled as check_compiled
 from coursebuild.checks.compiled import mjcf_texts as mjcf_texts
 from coursebuild.checks.formulas import check_formulas as check_formulas
@@ -47,6 +48,7 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         found += document_links(course, document, known, anchors_of)
         found += quiz_findings(blocks, scripts, quizzes)
         found += lab_findings(blocks, course)
+        found += bench_findings(blocks, course)
         found += term_findings(blocks, known.terms)
     return tuple(found)
 
@@ -61,5 +63,5 @@ def check_document(
     """
     blocks = tuple(document_blocks(document))
     links = document_links(course, document, known)
-    own = term_findings(blocks, known.terms)
+    own = (*bench_findings(blocks, course), *term_findings(blocks, known.terms))
     return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)

@@ -6,7 +6,8 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
    number of lines put before it.
 2. `check_compiled` holds what compiling gave against what the lesson says, and a lab's names
    against its model. A file that only other models include need not compile by itself.
-3. Scenarios that are declared for a model are held against it.
+3. Scenarios that are declared for a model are held against it; of a model that declares none, the
+   scenarios that texts name.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from coursebuild.checks.benches import check_keyframes, declared_scenarios
 from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Course, Lab, Mjcf, document_blocks
+from coursebuild.model import Bench, Course, Lab, Mjcf, document_blocks
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Excerpt, Span
 from coursebuild.values import dataclass
@@ -73,7 +75,8 @@ def check_compiled(
     `readable` makes one line of a message of MuJoCo's.
     """
     blocks = (block for document in course.documents for block in document_blocks(document))
-    labs = [block for block in blocks if isinstance(block, Lab)]
+    using = [block for block in blocks if isinstance(block, Lab | Bench)]
+    labs = [block for block in using if isinstance(block, Lab)]
     found: list[Diagnostic] = []
     parts = _parts(course, models) - {lab.model for lab in labs}
     for model in course.models:
@@ -92,6 +95,11 @@ def check_compiled(
         known = compiled.facts if compiled is not None else facts.get(_place(lab))
         if known is not None:
             found += _check_names(lab, known)
+    for bench in (block for block in using if isinstance(block, Bench)):
+        compiled = models.get(bench.model)
+        undeclared = not declared_scenarios(course, bench.model)
+        if undeclared and compiled is not None and compiled.facts is not None:
+            found += check_keyframes(bench, compiled.facts)
     for declared in course.declarations:
         facts_of_model = models[declared.model].facts
         if facts_of_model is not None:

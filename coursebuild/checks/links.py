@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
+from coursebuild.checks.model_places import model_place
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import (
     Course,
@@ -26,6 +27,7 @@ from coursebuild.model import (
     LessonTarget,
     LevelTarget,
     Link,
+    MjcfModel,
     ModelTarget,
     PageTarget,
     Quiz,
@@ -67,7 +69,9 @@ class Places:
     lessons: Mapping[str, Document | None]
     levels: frozenset[str]
     pages: Mapping[str, Document | None]
-    models: frozenset[str]
+    models: Mapping[str, MjcfModel]
+    scenarios: Mapping[str, tuple[str, ...]]
+    """Those that models declare, by the model's name."""
     scripts: frozenset[str]
     files: frozenset[str]
     terms: Mapping[str, Span]
@@ -90,7 +94,8 @@ def places(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
         {page.id: page.document for page in course.pages},
-        frozenset(model.name for model in course.models),
+        {model.name: model for model in course.models},
+        {d.model: tuple(one.name for one in d.scenarios) for d in course.declarations},
         frozenset(scripts),
         frozenset(course.files),
         _all_terms(course.documents) if terms is None else terms,
@@ -224,6 +229,9 @@ def _check_link(
     if named.name not in named.among:
         help = did_you_mean(named.name, named.among)
         yield diagnose(named.rule, span, named.missing, help=help)
+    elif isinstance(target, ModelTarget):
+        declared = known.scenarios.get(target.name, ())
+        yield from model_place(span, target.anchor, known.models[target.name], declared)
     elif isinstance(target, LessonTarget):
         to, where = known.lessons[target.id], f"lesson {target.id}"
         yield from _anchor(span, target.anchor, to, where, anchors_of)

@@ -14,6 +14,7 @@ lets go of.
    not be moved at all: its coordinates become ±SIZE, and its bodies turn by as much.
 4. A state that the script puts back bit by bit is no initial state: it was moved already. Nor is a
    correction in the last places, such as the length of a quaternion.
+5. The final state is told, with the sizes that it is compared by (`mujoco_past`).
 
 The model, the time, controls and forces stay as they are.
 """
@@ -24,6 +25,7 @@ import _weakref
 import sys
 
 from coursebuild.effects import mujoco_tracing
+from coursebuild.effects.mujoco_past import Past
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -76,25 +78,12 @@ def last_look(data: Any) -> None:
 _nudging: _Nudging | None = None
 
 
-class _Past:
-    """What MuJoCo last computed from, or led to."""
-
-    def __init__(self, data: Any, number: int) -> None:
-        self.of: Any = _weakref.ref(data)
-        self.number = number
-        """Data in the order in which they were first computed with."""
-        self.time = float("inf")
-        self.states: tuple[bytes, ...] = ()
-        self.largest = [0.0, 0.0]
-        """Of all initial states: the largest |qpos| and |qvel|."""
-
-
 class _Nudging:
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
         self._run = run
-        self._pasts: dict[int, _Past] = {}
+        self._pasts: dict[int, Past] = {}
         self._known: set[int] = set()
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
@@ -125,7 +114,7 @@ class _Nudging:
         model, data = _model_and_data(args, keywords)
         past = self._pasts.get(id(data))
         if past is None or past.of() is not data:
-            past = self._pasts[id(data)] = _Past(data, self._count)
+            past = self._pasts[id(data)] = Past(data, self._count)
             self._count += 1
         elif _states(data) == past.states and data.time >= past.time:
             return
@@ -135,18 +124,19 @@ class _Nudging:
         data = _model_and_data(args, keywords)[1]
         past = self._pasts.get(id(data))
         if past is not None and past.of() is data:
+            past.cover(data)
             self._remember(past, data)
 
     def _nothing(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         """It goes on with a state that was looked at."""
 
-    def _remember(self, past: _Past, data: Any) -> None:
+    def _remember(self, past: Past, data: Any) -> None:
         past.time = data.time
         past.states = states = _states(data)
         if len(self._known) < _MOST_KNOWN:
             self._known.update(hash((i, state)) for i, state in enumerate(states))
 
-    def _move(self, model: Any, data: Any, past: _Past) -> None:
+    def _move(self, model: Any, data: Any, past: Past) -> None:
         begins = not past.states or data.time < past.time
         plan = self._plan(model)
         arrays = [getattr(data, name) for name in _FIELDS]
@@ -156,12 +146,12 @@ class _Nudging:
             for i, (array, before) in enumerate(zip(arrays, befores, strict=True))
         ]
         qpos, qvel, act = arrays
+        zeros = qpos == 0
         moved = plan.move(qpos, qvel, act, new, begins)
-        if moved:
-            for i, array in enumerate((qpos, qvel)):
-                if len(array):
-                    largest = float(self._numpy.abs(array).max())
-                    past.largest[i] = max(past.largest[i], largest)
+        if begins:
+            past.begin(data.time)
+        past.cover(data)
+        past.from_zero = past.from_zero or bool((qpos[zeros] != 0).any())
         if moved and not self._told:
             self._told = True
             self._note("p")
@@ -237,7 +227,7 @@ class _Nudging:
         self._numbers += len(numbers)
         if self._numbers <= _MOST_NUMBERS:
             parts = [str(past.number), str(len(data.qpos))]
-            parts += [x.hex() for x in (*past.largest, *numbers)]
+            parts += [x.hex() for x in (*past.sizes(), *numbers)]
             self._note(f"s{' '.join(parts)}")
 
     def _note(self, record: str) -> None:

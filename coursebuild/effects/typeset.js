@@ -79,6 +79,26 @@ const typeset = (() => {
     node.children = [inner]
   }
 
+  // What reaches no further below its line than a descender does.
+  const SHALLOW = new Set(['mi', 'mn', 'mo', 'mtext', 'mspace', 'mrow', 'mstyle', 'msup', 'mover'])
+  const LARGE = /[∏∐∑∫-∳⨀-⨜]/
+
+  const isShallow = ({ type, text, children = [] }) =>
+    text !== undefined ? !LARGE.test(text) : (type === undefined || SHALLOW.has(type)) && children.every(isShallow)
+
+  /**
+   * Browsers hang a radical at the line over what is in it. The smallest one of the font is made for what is as high as a capital
+   * letter: over a lower one it would hang below the line of text.
+   */
+  function mendRoot(node) {
+    const [inside, ...index] = node.children
+    if (inside === undefined || !isShallow(inside)) return
+    const strut = new node.constructor('mspace', [])
+    strut.setAttribute('width', '0em')
+    strut.setAttribute('height', '0.7em')
+    node.children = [new node.constructor('mrow', [inside, strut]), ...index]
+  }
+
   /** Whether a node becomes no markup at all: a fragment of nothing. */
   function isNothing(node) {
     return node.type === undefined && !node.text && (node.children ?? []).every(isNothing)
@@ -100,6 +120,7 @@ const typeset = (() => {
     }
     if (!Array.isArray(node.children)) node.children = [] // as Temml's own toMarkup takes it
     for (const child of node.children) mend(child, depth + 1)
+    if (node.type === 'msqrt' || node.type === 'mroot') mendRoot(node)
     if (node.type === 'semantics' && node.children.slice(0, -1).every(isNothing)) throw new Refusal('it is empty')
   }
 

@@ -67,6 +67,8 @@ def imports(modules: Iterable[str], own_model: bool) -> list[str]:
     if "from dataclasses import field" in wanted:
         wanted -= {"from dataclasses import field", "from dataclasses import dataclass"}
         wanted.add("from dataclasses import dataclass, field")
+    if any(line.startswith("from decimal import ") and "," in line for line in wanted):
+        wanted.discard("from decimal import Decimal")
     engine = {line for line in wanted if "mujoco" in line or "numpy" in line}
     standard = sorted(wanted - engine, key=lambda line: (line.startswith("from"), line))
     lines = [*standard, *([""] if standard else []), *sorted(engine)]

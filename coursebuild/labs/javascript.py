@@ -5,9 +5,9 @@ Entry points: `parse_statements(code)`, `parse_expression(code)`.
 1. The code is cut into tokens (see `javascript_tokens`).
 2. Statements are parsed by descent, expressions by the precedence of their operators. A line end
    ends a statement where JavaScript says so.
-3. Functions, objects, `new`, `switch`, templates and all else that the tree (`javascript_tree`) has
-   no place for are refused by `UntranslatableError`. Assignments are statements here; inside an
-   expression they are refused.
+3. Functions, objects, `new`, `switch`, tagged templates and all else that the tree
+   (`javascript_tree`) has no place for are refused by `UntranslatableError`. Assignments are
+   statements here; inside an expression they are refused.
 
 The code has been parsed by V8 before, so what is wrong JavaScript need not be found here.
 """
@@ -39,6 +39,7 @@ from coursebuild.labs.javascript_tree import (
     Spread,
     Statement,
     String,
+    Template,
     Unary,
     While,
 )
@@ -99,10 +100,10 @@ def parse_expression(code: str) -> Expression:
 
 
 class _Parser:
-    def __init__(self, tokens: tuple[Token, ...]) -> None:
+    def __init__(self, tokens: tuple[Token, ...], depth: int = 0) -> None:
         self._tokens = tokens
         self._at = 0
-        self._depth = 0
+        self._depth = depth
 
     # --- tokens
 
@@ -125,6 +126,8 @@ class _Parser:
     def _unexpected(self) -> UntranslatableError:
         if self._next.kind == "end":
             return UntranslatableError("code that ends too early")
+        if self._next.kind == "template":
+            return UntranslatableError("a template behind a name or a value")
         return UntranslatableError(f"`{self._next.text}`")
 
     def expect_end(self) -> None:
@@ -333,6 +336,9 @@ class _Parser:
             case "string":
                 self._at += 1
                 return String(token.text)
+            case "template":
+                self._at += 1
+                return Template(tuple(self._template_part(part) for part in token.parts))
             case "name" if token.text in ("true", "false"):
                 self._at += 1
                 return Boolean(token.text == "true")
@@ -344,6 +350,14 @@ class _Parser:
                 return self._array()
             case _:
                 raise self._unexpected()
+
+    def _template_part(self, part: str | tuple[Token, ...]) -> str | Expression:
+        if isinstance(part, str):
+            return part
+        parser = _Parser(part, self._depth)
+        expression = parser.expression()
+        parser.expect_end()
+        return expression
 
     def _array(self) -> Array:
         items: list[Expression] = []

@@ -2,8 +2,9 @@
 
 Entry point: `tokenize(code)`.
 
-What is not known here (regular expressions, templates, `#`, letters outside ASCII in names) is
-refused by `UntranslatableError` instead of being guessed at.
+What is not known here (regular expressions, `#`, letters outside ASCII in names) is refused by
+`UntranslatableError` instead of being guessed at. A template is one token, with those of the
+expressions in it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ class UntranslatableError(Exception):
     """JavaScript that has no counterpart in Python here; the text says what."""
 
 
-Kind: TypeAlias = Literal["number", "string", "name", "punctuator", "end"]
+Kind: TypeAlias = Literal["number", "string", "template", "name", "punctuator", "end"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,8 @@ class Token:
     text: str
     after_newline: bool
     """Whether a line ends between the token before and this one."""
+    parts: tuple[str | tuple[Token, ...], ...] = ()
+    """Of a template: its texts, and the tokens of each `${…}`, with one of kind `end` last."""
 
 
 _SPACE = re.compile(
@@ -42,6 +45,9 @@ _NUMBER = re.compile(
 )
 _NAME = re.compile(r"[A-Za-z_$][A-Za-z0-9_$]*")
 _STRING = re.compile(r"'(?:\\.|[^'\\\r\n])*'|\"(?:\\.|[^\"\\\r\n])*\"")
+_CHUNK = re.compile(r"(?:\\[^\r\n\u2028\u2029]|\$(?!\{)|[^\\`$])*+")
+"""The text of a template, up to its end or to an expression."""
+_DEEPEST = 20
 _PUNCTUATOR = re.compile(
     r">>>=|\.\.\.|===|!==|\*\*=|<<=|>>=|>>>|&&=|\|\|=|\?\?=|=>|==|!=|<=|>=|&&|\|\||\?\?|\?\.|\+\+|--"
     r"|\+=|-=|\*=|/=|%=|&=|\|=|\^=|<<|>>|\*\*|[{}()\[\];,<>+\-*/%&|^!~?:=.]"
@@ -62,6 +68,11 @@ def tokenize(code: str) -> tuple[Token, ...]:
 def _tokens(code: str) -> Iterator[Token]:
     at, newline = 0, False
     while at < len(code):
+        if code[at] == "`":
+            token, at = _template(code, at, newline, 0)
+            yield token
+            newline = False
+            continue
         space = _SPACE.match(code, at)
         if space is not None:
             newline = newline or _NEWLINE.search(space.group()) is not None
@@ -88,6 +99,46 @@ def _token(code: str, at: int) -> tuple[Kind, str, int]:
     if match := _PUNCTUATOR.match(code, at):
         return "punctuator", match.group(), match.end()
     raise UntranslatableError(f"`{code[at]}`")
+
+
+def _template(code: str, start: int, newline: bool, depth: int) -> tuple[Token, int]:
+    """The template that begins at `start`, and where it ends."""
+    if depth > _DEEPEST:
+        raise UntranslatableError("code that is nested too deeply")
+    parts: list[str | tuple[Token, ...]] = []
+    at = start + 1
+    while True:
+        match = _CHUNK.match(code, at)
+        assert match is not None  # it may be empty
+        chunk = match.group().replace("\r\n", "\n").replace("\r", "\n")
+        if chunk:
+            parts.append(_unescaped(chunk))
+        at = match.end()
+        if code.startswith("`", at):
+            return Token("template", code[start : at + 1], newline, tuple(parts)), at + 1
+        if not code.startswith("${", at):
+            raise UntranslatableError("a template with a line that goes on")
+        inner, at = _inside(code, at + 2, depth)
+        parts.append(inner)
+
+
+def _inside(code: str, at: int, depth: int) -> tuple[tuple[Token, ...], int]:
+    """The tokens up to the `}` that closes a `${`, and what comes after it."""
+    found: list[Token] = []
+    opened = 0
+    while at < len(code):
+        if space := _SPACE.match(code, at):
+            at = space.end()
+        elif code[at] == "`":
+            token, at = _template(code, at, False, depth + 1)
+            found.append(token)
+        elif code[at] == "}" and opened == 0:
+            return (*found, Token("end", "", False)), at + 1
+        else:
+            kind, text, at = _token(code, at)
+            opened += (kind == "punctuator") * ((text == "{") - (text == "}"))
+            found.append(Token(kind, text, False))
+    raise UntranslatableError("code that ends too early")
 
 
 def _unescaped(text: str) -> str:

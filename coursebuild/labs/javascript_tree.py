@@ -25,6 +25,13 @@ class String:
 
 
 @dataclass(frozen=True, slots=True)
+class Template:
+    """Texts and expressions that become one text."""
+
+    parts: tuple[str | Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Boolean:
     """`true` or `false`."""
 
@@ -103,7 +110,18 @@ class Conditional:
 
 
 Expression: TypeAlias = (
-    Number | String | Boolean | Name | Member | Index | Call | Array | Unary | Binary | Conditional
+    Number
+    | String
+    | Template
+    | Boolean
+    | Name
+    | Member
+    | Index
+    | Call
+    | Array
+    | Unary
+    | Binary
+    | Conditional
 )
 
 

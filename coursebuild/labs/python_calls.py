@@ -8,6 +8,7 @@ from __future__ import annotations
 from coursebuild.labs.engine_names import CALLS, RESULTS
 from coursebuild.labs.javascript_tree import Array, Call, Expression, Member, Name, Spread
 from coursebuild.labs.python_expressions import Expressions
+from coursebuild.labs.python_texts import METHODS, formatted
 from coursebuild.labs.python_values import Code, Type, floating, refuse
 from coursebuild.values import replace
 
@@ -44,6 +45,10 @@ class Calls(Expressions):
         function = call.function
         if isinstance(function, Member) and function.name in ("slice", "subarray"):
             return self.part(self.array(function.whole), function.name, self.plain(call))
+        if isinstance(function, Member) and function.name in METHODS:
+            number = self.number(function.whole)
+            digits = [self.number(argument) for argument in self.plain(call)]
+            return formatted(function.name, number, digits[0] if digits else None, self.used)
         raise refuse(f"a call of `{'.'.join(way)}`" if way else "a call")
 
     def plain(self, call: Call) -> tuple[Expression, ...]:

@@ -53,6 +53,7 @@ RESERVED = frozenset(
         minimum sign rounded random normal_force angular_momentum of_everything abs float int any
         Ctx Energy Random WORD load start reset step simulate readouts report main control range
         model_path struct print max min len Iterable NamedTuple dataclass
+        numeral fixed precise exponential str format Context Decimal DIGITS ROUND_HALF_UP
     """.split()
 ) | frozenset((*keyword.kwlist, *keyword.softkwlist))
 """Names that nothing else in a script may have."""

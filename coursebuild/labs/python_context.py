@@ -28,6 +28,7 @@ from coursebuild.labs.javascript_tree import (
     Name,
     Statement,
     String,
+    Template,
     Unary,
     While,
 )
@@ -86,7 +87,7 @@ def _guess(value: Expression, given: Type | None, types: Mapping[str, Type]) -> 
             return "bool"
         case Binary("==" | "!=" | "===" | "!==" | "<" | ">" | "<=" | ">=" | "&&" | "||", _, _):
             return "bool"
-        case String():
+        case String() | Template():
             return "str"
         case Array() | Call(Member(_, "slice" | "subarray"), _):
             return "vector"

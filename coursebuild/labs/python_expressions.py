@@ -29,8 +29,10 @@ from coursebuild.labs.javascript_tree import (
     Name,
     Number,
     String,
+    Template,
     Unary,
 )
+from coursebuild.labs.python_texts import joined
 from coursebuild.labs.python_values import (
     AND,
     ATOM,
@@ -83,10 +85,7 @@ class Expressions(ABC):
 
     def number(self, expression: Expression) -> Code:
         """An expression whose value is a number."""
-        code = self.value(expression, single=True)
-        if code.type not in NUMBERS:
-            raise refuse(f"{NAMED[code.type]} where a number should be")
-        return code
+        return _numeric(self.value(expression, single=True))
 
     def test(self, expression: Expression) -> Code:
         """An expression that is only asked whether it is true."""
@@ -139,7 +138,10 @@ class Expressions(ABC):
             case Number(text):
                 return literal(text)
             case String(text):
-                return Code(json.dumps(text, ensure_ascii=False), "str")
+                return _text(text)
+            case Template(parts):
+                values = [_text(p) if isinstance(p, str) else self.value(p) for p in parts]
+                return joined(values, self.used)
             case Boolean(value):
                 return Code(str(value), "bool")
             case Name(name):
@@ -250,7 +252,10 @@ class Expressions(ABC):
             return self.test(Binary(operator, left, right))
         if operator in _COMPARISONS:
             return self._comparison(operator, left, right)
-        a, b = self.number(left), self.number(right)
+        a, b = self.value(left, single=True), self.value(right, single=True)
+        if operator == "+" and "str" in (a.type, b.type):
+            return joined((a, b), self.used)
+        a, b = _numeric(a), _numeric(b)
         if operator in _BITS:
             _check_bits(operator, a, b)
             return Code(f"{a.within(ATOM)} {operator} {b.within(ATOM)}", "int", BITS)
@@ -264,6 +269,8 @@ class Expressions(ABC):
         a, b = self.value(left, single=True), self.value(right, single=True)
         numbers = a.type in NUMBERS and b.type in NUMBERS
         texts = a.type == b.type == "str" and operator[0] in "=!"
+        if a.type == b.type == "bool" and operator[0] in "=!":
+            return _same_truth(operator, (left, a), (right, b))
         if not numbers and not texts:
             raise refuse(f"`{operator}` between {NAMED[a.type]} and {NAMED[b.type]}")
         text = f"{a.within(BITS)} {_COMPARISONS[operator]} {b.within(BITS)}"
@@ -299,6 +306,29 @@ class Expressions(ABC):
     @abstractmethod
     def call(self, call: Call, single: bool) -> Code:
         """A call."""
+
+
+def _same_truth(
+    operator: str, left: tuple[Expression, Code], right: tuple[Expression, Code]
+) -> Code:
+    """Whether two truth values are the same, or not."""
+    for (_, code), (other, _) in ((left, right), (right, left)):
+        if isinstance(other, Boolean):
+            if other.value == (operator[0] == "="):
+                return code
+            return Code(f"not {code.within(NOT)}", "bool", NOT)
+    text = f"{left[1].within(BITS)} {_COMPARISONS[operator]} {right[1].within(BITS)}"
+    return Code(text, "bool", COMPARISON)
+
+
+def _numeric(code: Code) -> Code:
+    if code.type not in NUMBERS:
+        raise refuse(f"{NAMED[code.type]} where a number should be")
+    return code
+
+
+def _text(text: str) -> Code:
+    return Code(json.dumps(text, ensure_ascii=False), "str")
 
 
 def _check_bits(operator: str, *operands: Code) -> None:

@@ -189,6 +189,66 @@ def _rotated(x: int, by: int) -> int:
 WORD = 2**32 - 1
 '''
 
+_NUMERAL = '''
+def numeral(x: float) -> str:
+    """A number as JavaScript writes it: with the fewest digits that stand for it."""
+    x = float(x)
+    if not math.isfinite(x):
+        return "NaN" if math.isnan(x) else "Infinity" if x > 0 else "-Infinity"
+    if x == 0:
+        return "0"
+    minus = "-" if x < 0 else ""
+    _, written, power = Decimal(repr(abs(x))).as_tuple()
+    digits = "".join(map(str, written)).rstrip("0")
+    point = len(written) + int(power)
+    if 0 < point <= 21:
+        digits = digits.ljust(point, "0")
+        return minus + ".".join(filter(None, (digits[:point], digits[point:])))
+    if -6 < point <= 0:
+        return f"{minus}0.{'0' * -point}{digits}"
+    return minus + ".".join(filter(None, (digits[0], digits[1:]))) + f"e{point - 1:+d}"
+'''
+
+_FIXED = '''
+def fixed(x: float, decimals: int) -> str:
+    """A number with so many decimals; of two as near the larger, without its sign."""
+    x = float(x)
+    if not abs(x) < 1e21:
+        return numeral(x)
+    nearest = Decimal(abs(x)).quantize(Decimal(1).scaleb(-decimals), context=DIGITS)
+    return f"{'-' if x < 0 else ''}{nearest:f}"
+
+
+DIGITS = Context(prec=200, rounding=ROUND_HALF_UP)
+'''
+
+_EXPONENTIAL = '''
+def exponential(x: float, decimals: int) -> str:
+    """A number with so many decimals and a power of ten."""
+    x = float(x)
+    if not math.isfinite(x):
+        return numeral(x)
+    nearest = Context(prec=decimals + 1, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
+    digits = "".join(map(str, nearest.as_tuple().digits)).ljust(decimals + 1, "0")
+    digits = ".".join(filter(None, (digits[0], digits[1:])))
+    return f"{'-' if x < 0 else ''}{digits}e{nearest.adjusted():+d}"
+'''
+
+_PRECISE = '''
+def precise(x: float, digits: int) -> str:
+    """A number with so many digits in all."""
+    x = float(x)
+    if not math.isfinite(x):
+        return numeral(x)
+    nearest = Context(prec=digits, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
+    if not -6 <= nearest.adjusted() < digits:
+        return exponential(x, digits - 1)
+    return f"{'-' if x < 0 else ''}{nearest:.{digits - 1 - nearest.adjusted()}f}"
+'''
+
+_DECIMAL = "from decimal import Decimal"
+_ROUNDING = "from decimal import ROUND_HALF_UP, Context, Decimal"
+
 LIBRARY: dict[str, Helper] = {
     "Energy": Helper(_ENERGY_TYPE, ("from typing import NamedTuple",)),
     "energy": Helper(_ENERGY, needs=("Energy",)),
@@ -205,6 +265,10 @@ LIBRARY: dict[str, Helper] = {
     "sign": Helper(_SIGN, ("import math",)),
     "rounded": Helper(_ROUNDED, ("import math", "import numpy as np")),
     "power": Helper(_POWER, ("import math", "import numpy as np")),
+    "numeral": Helper(_NUMERAL, ("import math", _DECIMAL)),
+    "fixed": Helper(_FIXED, (_ROUNDING,), ("numeral",)),
+    "exponential": Helper(_EXPONENTIAL, ("import math", _ROUNDING), ("numeral",)),
+    "precise": Helper(_PRECISE, ("import math", _ROUNDING), ("exponential", "numeral")),
     "Random": Helper(_RANDOM, ("import struct",)),
 }
 """What a script can bring along, by name, in the order in which it stands there."""

@@ -126,10 +126,20 @@ _DEEP = "deep"
 
 
 def deep_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
-    """Bodies that lie deep in each other; once where the main run has some."""
+    """Bodies that lie deep in each other, and are not to; once where the main run has some."""
+    if lab.verify_deep:
+        return ()
     failures = [f for f in trial.failures if f.kind == _DEEP]
     always = [f for f in failures if f.entry == ()]
     return tuple(_failure(lab, failure) for failure in always or failures)
+
+
+def shallow_diagnostics(lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
+    """That no bodies lie deep in each other, though the lab says that they are to."""
+    if lab.verify_deep and not any(failure.kind == _DEEP for failure in trial.failures):
+        what = "the lab says `deep`, and no bodies lay deep in each other"
+        span = entry_span(lab, ("verify", "deep"))
+        yield diagnose("lab-shallow", span, what, help="take `deep` away")
 
 
 def _failure(lab: Lab, failure: Failure) -> Diagnostic:
@@ -159,7 +169,8 @@ def _told(lab: Lab, failure: Failure) -> tuple[str, str]:
         case "deep":
             help = (
                 "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
-                "(`solref`), or a narrower range"
+                "(`solref`), or a narrower range; if they are to lie so, say so: "
+                '`"verify": {"deep": true}`'
             )
             return f"bodies lie deep in each other{when}: {message}", help
         case "expect":

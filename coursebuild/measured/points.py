@@ -22,6 +22,8 @@ KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
 FLOORS = 10.0
 """No error under so many floors of the reference is given."""
+FEWEST_STEPS = 20
+"""Steps of a scenario at the longest timestep of which it is tried whether it is stable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +146,12 @@ def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
             )
         )
     return Chart(quantity, tuple(lines), timed)
+
+
+def is_cut_short(report: ScenarioReport) -> bool:
+    """Whether it is the duration that ended the search for stable timesteps."""
+    longest = report.duration / FEWEST_STEPS
+    return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
 
 
 def _rank(name: str) -> tuple[int, str]:

@@ -12,8 +12,12 @@ from coursebuild.model.addresses import line_anchor as line_anchor
 from coursebuild.model.addresses import linked_lines as linked_lines
 from coursebuild.model.addresses import listing_anchor as listing_anchor
 from coursebuild.model.addresses import local_file as local_file
+from coursebuild.model.addresses import model_anchors as model_anchors
 from coursebuild.model.addresses import output_anchor as output_anchor
 from coursebuild.model.addresses import resolve as resolve
+from coursebuild.model.addresses import scenario_anchor as scenario_anchor
+from coursebuild.model.blocks import Bench as Bench
+from coursebuild.model.blocks import BenchPart as BenchPart
 from coursebuild.model.blocks import Block as Block
 from coursebuild.model.blocks import BlockQuote as BlockQuote
 from coursebuild.model.blocks import Callout as Callout

@@ -1,14 +1,16 @@
 """Relative addresses in a document, as the files of the course that they name.
 
 Entry points: `local_file`, `resolve`; `listing_anchor` and its siblings, by which listings and
-outputs are linked to on their page. A link to the file of a lesson or of a page means the lesson
-or the page, so that the same link works on the site and where the files themselves are read.
+outputs are linked to on their page, and `model_anchors`, those of a model's. A link to the file of
+a lesson or of a page means the lesson or the page, so that the same link works on the site and
+where the files themselves are read.
 """
 
 from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Iterable
 from urllib.parse import unquote, urlsplit
 
 from coursebuild.model.course import Course
@@ -62,6 +64,16 @@ def output_anchor(path: str, number: int) -> str:
 
 def _stem(path: str) -> str:
     return listing_anchor(path).rpartition(".")[0]
+
+
+def model_anchors(scenarios: Iterable[str]) -> tuple[str, ...]:
+    """The ids of a model's page, but those of its file; `scenarios` are those that it declares."""
+    return ("facts", "measured", *map(scenario_anchor, scenarios), "diet", "used", "file")
+
+
+def scenario_anchor(name: str) -> str:
+    """The id of what was measured in a scenario that is declared."""
+    return f"measured-{name}"
 
 
 _LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")

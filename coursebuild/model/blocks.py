@@ -167,6 +167,8 @@ class Script:
     """The lines between the fences, to the start of the closing one."""
     diverges: bool = False
     """Whether a simulation in it is to be lost."""
+    deep: bool = False
+    """Whether bodies in it are to lie deep in each other."""
 
 
 class Mode(enum.Enum):
@@ -246,6 +248,24 @@ class Mjcf:
     error_span: Span | None
 
 
+BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
+"""What of a report is shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What was recorded of a model in one of its scenarios."""
+
+    span: Span
+    model: str
+    model_span: Span
+    scenario: str | None
+    """`None`: the first."""
+    scenario_span: Span | None
+    shows: tuple[BenchPart, ...]
+    """In the order in which it is shown."""
+
+
 @dataclass(frozen=True, slots=True)
 class PlainCode:
     """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
@@ -272,6 +292,7 @@ Block: TypeAlias = (
     | Recording
     | Io
     | Mjcf
+    | Bench
     | Lab
     | Quiz
 )

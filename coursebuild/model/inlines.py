@@ -130,9 +130,10 @@ class LevelTarget:
 
 @dataclass(frozen=True, slots=True)
 class ModelTarget:
-    """`model:tumbling_box`."""
+    """`model:tumbling_box#measured`."""
 
     name: str
+    anchor: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

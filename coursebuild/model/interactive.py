@@ -133,6 +133,8 @@ class Lab:
     seed: int | None
     verify_seconds: float | None
     verify_rtol: float | None
+    verify_deep: bool = False
+    """Whether bodies are to lie deep in each other."""
     trail_span: Span | None = None
     places: tuple[tuple[tuple[str | int, ...], Span], ...] = ()
     """Where each value of the JSON stands, by the way to it: `("controls", 2, "set")`."""

@@ -1,11 +1,12 @@
 """What a file `models/NAME.toml` says of the model beside it: scenarios, and findings to keep.
 
-Entry point: `Declarations`. What is left out is `None` or empty: whoever measures fills it in from
-the model.
+Entry points: `Declarations`; `keyframe_scenarios`, where there is no such file. What is left out is
+`None` or empty: whoever measures fills it in from the model.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from coursebuild.source import Source, Span
@@ -15,6 +16,17 @@ VISIBLE = 0.01
 """Share of a model's extent that a learner sees in a picture of it: 2 pixels of 200."""
 VISIBLE_ANGLE = 1.0
 """Degrees by which an attitude must be off for a learner to see it."""
+
+
+def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:
+    """The scenarios of a model that declares none, by name; one without a name is empty."""
+    found: list[str] = []
+    for number, own in enumerate(keyframes):
+        name = own if own.strip() else f"keyframe-{number}"
+        while not own.strip() and name in keyframes:
+            name += "-"
+        found.append(name)
+    return tuple(found) or ("start",)
 
 
 @dataclass(frozen=True, slots=True)

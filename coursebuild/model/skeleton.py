@@ -3,8 +3,8 @@
 Entry point: `skeleton(document)`, a document of the same type whose walk (`document_blocks`,
 `document_inlines`) meets, in the same order, everything that somebody other than the document's own
 page looks at, or for which that page looks up something elsewhere: headings with their anchors,
-scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, callouts, links, terms, pictures, raw
-HTML.
+scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, shown reports, callouts, links,
+terms, pictures, raw HTML.
 
 1. Containers are opened, since nobody outside the page asks what stands in what.
 2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from typing import assert_never
 
 from coursebuild.model.blocks import (
+    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -63,7 +64,7 @@ def _bones(block: Block) -> Iterator[Block]:
     match block:
         case Heading():
             yield replace(block, children=_inlines(block))
-        case Script() | Mjcf() | HtmlBlock():
+        case Script() | Mjcf() | Bench() | HtmlBlock():
             yield block
         case Recording():
             yield replace(block, caption=_inlines(block))

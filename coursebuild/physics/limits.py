@@ -3,7 +3,8 @@
 Entry point: `stable(model, scene, pilot)`.
 
 Stable is what stays within what can be, over the scenario: the grid and the bisection are those of
-the hard cases.
+the hard cases. No timestep is tried of which the scenario has fewer than 20: of so few steps none
+would tell.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 import mujoco
 
 from coursebuild.measured.bench import Setting, StableRow
+from coursebuild.measured.points import FEWEST_STEPS
 from coursebuild.physics.detector import Status
 from coursebuild.physics.engine import varied
 from coursebuild.physics.grid import apply
@@ -32,7 +34,7 @@ def stable(model: Any, scene: Scene, first: Pilot, *, quick: bool = False) -> tu
     """The largest stable timestep of every integrator."""
     duration = scene.scenario.duration
     low, high = (part * scene.own for part in SEARCH)
-    search = (max(low, duration / MOST_STEPS), min(high, duration / 20))
+    search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
     if search[1] <= search[0]:
         return ()
     one, thick = varied(model, Integrator.EULER, scene.own), thickness(model)

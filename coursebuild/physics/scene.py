@@ -17,7 +17,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.model.scenarios import Declarations, DeclaredScenario, Visible
+from coursebuild.model.scenarios import (
+    Declarations,
+    DeclaredScenario,
+    Visible,
+    keyframe_scenarios,
+)
 from coursebuild.physics.problem import Array, Scenario
 from coursebuild.source import Span
 from coursebuild.values import dataclass
@@ -81,9 +86,10 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
     visible = Visible() if declared is None else declared.visible
     step = float(model.opt.timestep)
     scenario = _timed(step, None, None, None, ())
+    names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
     found = []
     for key in range(int(model.nkey)) or (-1,):
-        name = "start" if key < 0 else _named(model, key)
+        name = names[max(key, 0)]
         title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
         one = Scenario(scenario.duration, scenario.sample, keyframe=key)
         found.append(Scene(name, title, one, _ladder(one, step, powers), step, visible, None))
@@ -135,18 +141,6 @@ def _declared(
         raise SceneError(message, place, "measure a shorter time, or longer timesteps")
     title = declared.title or declared.name
     return Scene(declared.name, title, scenario, ladder, step, visible, declared)
-
-
-def _named(model: Any, key: int) -> str:
-    """What the scenario of a keyframe is called: as no other is."""
-    own = str(model.key(key).name)
-    if own.strip():
-        return own
-    others = {str(model.key(other).name) for other in range(int(model.nkey))}
-    name = f"keyframe-{key}"
-    while name in others:
-        name += "-"
-    return name
 
 
 def _keyframe(model: Any, declared: DeclaredScenario) -> int:

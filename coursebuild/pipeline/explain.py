@@ -13,7 +13,9 @@ from typing import Literal
 
 from coursebuild.diagnostics import nearest
 from coursebuild.effects.mjcf import parts
+from coursebuild.measured.records import bench_path
 from coursebuild.model import (
+    Bench,
     Course,
     Document,
     ExampleTarget,
@@ -212,6 +214,8 @@ def _uses(document: Document, path: str) -> Iterator[object]:
     for block in document_blocks(document):
         if isinstance(block, Lab) and block.model and f"models/{block.model}.xml" == path:
             yield block
+        if isinstance(block, Bench) and path in _shown_of(block.model):
+            yield block
         for inline in walk_inlines(block_inlines(block)):
             match inline:
                 case Image(url=url) if local_file(url, document.source.path) == path:
@@ -226,6 +230,11 @@ def _uses(document: Document, path: str) -> Iterator[object]:
                     yield inline
                 case _:
                     pass
+
+
+def _shown_of(model: str) -> tuple[str, str]:
+    """The files of which a report on a model is shown."""
+    return f"models/{model}.xml", bench_path(model)
 
 
 def _local(url: str, document: Document, path: str) -> bool:

@@ -40,6 +40,7 @@ from coursebuild.labs.verdict import (
     entry_span,
     parity_diagnostics,
     reset_diagnostics,
+    shallow_diagnostics,
     trial_diagnostics,
 )
 from coursebuild.model import Course, Lab
@@ -212,6 +213,7 @@ class _Attempt:
         trial, parity = read_trial(reply), _parity(reply)
         seconds, made = _lasted(reply)
         found = [*trial_diagnostics(lab, trial), *self._version(trial)]
+        found += shallow_diagnostics(lab, trial)
         if parity is not None:
             found += parity_diagnostics(lab, parity)
         form = self._static(key, trial) if static and not found else None

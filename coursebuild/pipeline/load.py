@@ -75,10 +75,8 @@ def load(
 
         course_map = parse_course_map
     loader = _Loader(root, read.value, list(read.diagnostics), parse, ahead, course_map, aside)
-    course = loader.course()
     declared = loader.declared(declarations)
-    if course is not None:
-        course = replace(course, declarations=declared)
+    course = loader.course(declared)
     return Loaded(course, tuple(loader.found))
 
 
@@ -108,7 +106,7 @@ class _Loader:
         """Lesson files that the map does not name, by path; one that was surely meant is taken out.
         """
 
-    def course(self) -> Course | None:
+    def course(self, declared: tuple[Declarations, ...]) -> Course | None:
         """The whole course, or `None` where there is no usable map."""
         course = self._map()
         if course is None:
@@ -130,7 +128,12 @@ class _Loader:
         pages = self._pages(course.pages)
         self._unlisted_pages(course)
         course = replace(
-            course, levels=levels, pages=pages, models=self.files.models, files=self._others(course)
+            course,
+            levels=levels,
+            pages=pages,
+            models=self.files.models,
+            files=self._others(course),
+            declarations=declared,
         )
         self.found += check_course(course)
         self.found += _check_engine(course)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from coursebuild.model import (
+    Bench,
     Block,
     Document,
     Heading,
@@ -57,7 +58,7 @@ class _Group:
     after: tuple[Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Quiz, Lab, Table, HtmlBlock)
+_WIDE = (Script, Recording, Mjcf, Bench, Quiz, Lab, Table, HtmlBlock)
 """Blocks that take the whole width, so that no lab can stand beside them."""
 
 

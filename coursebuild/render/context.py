@@ -15,6 +15,7 @@ from urllib.parse import quote, unquote
 from markupsafe import Markup, escape
 
 from coursebuild.model import (
+    Bench,
     Block,
     Callout,
     Document,
@@ -33,7 +34,7 @@ from coursebuild.model import (
     child_blocks,
     document_blocks,
 )
-from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
+from coursebuild.render import benches, blocks, formulas, labs, markup, quizzes, urls
 from coursebuild.render.direction import direction
 from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
@@ -141,6 +142,8 @@ class PageContext:
                 return blocks.io(self, block)
             case Mjcf():
                 return blocks.mjcf(self, block)
+            case Bench():
+                return benches.bench(self, block)
             case PlainCode():
                 return blocks.plain_code(self, block)
             case Lab():

@@ -5,7 +5,9 @@ Entry points: `covered`, `measured`, what a font has; `cut`, a font with some of
 1. fontTools keeps the glyphs of the characters with all that they need, and cuts the weights.
 2. What was cut before without compression (a ready font) needs neither the weights nor the names
    looked at again, and is read in a fraction of the time.
-3. fontTools compresses at the finest level of Brotli; where another one is wanted, it gets a
+3. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
+   every root room for the widest of them, and leaves what is not needed as a gap behind the root.
+4. fontTools compresses at the finest level of Brotli; where another one is wanted, it gets a
    stand-in for the module.
 """
 
@@ -23,6 +25,9 @@ FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, _PER_MILLE.split())
 """How often characters stand in English text, per thousand."""
 
 _FINEST = 11
+_RADICAL = 0x221A
+_WIDEST = 1.07
+"""A radical's advance width in those of the smallest: what is more than 1 stays as a thin space."""
 _compressing = threading.RLock()
 
 
@@ -92,11 +97,41 @@ def cut(
             from fontTools.varLib import instancer
 
             instancer.instantiateVariableFont(font, {"wght": weights}, inplace=True)
+        _narrow_radicals(font)
         font.flavor = flavor
         out = io.BytesIO()
         with _compression(quality):
             font.save(out)
     return out.getvalue()
+
+
+def _narrow_radicals(font: Any) -> None:
+    """Press the larger radicals, and the pieces of the largest, together; done twice is done once.
+
+    MathML Core: the preferred inline size of a stretched operator is that of its widest variant.
+    """
+    smallest = font.getBestCmap().get(_RADICAL)
+    if smallest is None or "MATH" not in font or "glyf" not in font:
+        return
+    variants = font["MATH"].table.MathVariants
+    drawn = dict(
+        zip(variants.VertGlyphCoverage.glyphs, variants.VertGlyphConstruction, strict=True)
+    ).get(smallest)
+    if drawn is None:
+        return
+    names = {variant.VariantGlyph for variant in drawn.MathGlyphVariantRecord}
+    if drawn.GlyphAssembly is not None:
+        names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    advances, glyphs = font["hmtx"], font["glyf"]
+    widest = round(_WIDEST * advances[smallest][0])
+    for name in sorted(names):
+        advance, _ = advances[name]
+        glyph = glyphs[name]
+        if advance > widest and glyph.numberOfContours > 0:
+            glyph.coordinates.scale((widest / advance, 1))
+            glyph.coordinates.toInt()
+            glyph.recalcBounds(glyphs)
+            advances[name] = (widest, glyph.xMin)
 
 
 class _Brotli:

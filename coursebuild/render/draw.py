@@ -55,16 +55,17 @@ def _drawn(value: object, tools: Tools) -> object:
         case Graphed():
             return drawings(value, tools.words)
         case Plotted():
-            return tuple(_plots(n, report) for n, report in enumerate(value.reports, 1))
+            return tuple(plots(f"_plot-{n}", one) for n, one in enumerate(value.reports, 1))
         case _:
             return value
 
 
-def _plots(number: int, report: ScenarioReport) -> tuple[Markup, ...]:
+def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
+    """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
     from coursebuild.measured.plot import plot_svg  # which few pages need
 
     drawn = (
-        plot_svg(report, name=f"_plot-{number}-{kind}", narrow=kind == "narrow")
+        plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
         for kind in ("wide", "narrow")
     )
     return tuple(Markup(svg) for svg in drawn if svg)

@@ -37,7 +37,7 @@ WEIGHTS = {TEXT: (400, 700), CODE: (400, 700)}
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
 
-VERSION = 2
+VERSION = 3
 """Part of a job's key: to be raised when the way of cutting changes."""
 _QUALITY = 10
 """Of compression: the finest, 11, would take half of the time of cutting for a hundredth of the

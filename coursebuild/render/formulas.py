@@ -9,7 +9,9 @@ So
    the binary operators of its outermost level;
 2. a piece that may be wider than a narrow window scrolls inside itself;
 3. a formula is held together with the punctuation that touches it, and with a unit behind a space
-   that does not break.
+   that does not break;
+4. an operator at an end of a formula, next to a space of the text, brings no space of its own, as
+   in TeX.
 """
 
 from __future__ import annotations
@@ -30,11 +32,17 @@ _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
 _TOUCHING = re.compile(
-    r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16})?[,.;:!?)\]’”"'…%]*)""", re.DOTALL
+    r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
+_SIGN = "|".join(re.escape(escape(sign)) for sign in sorted(_RELATIONS | _BINARY))
+_FIRST = re.compile(rf"(?<=\s)(<math>(?:<semantics>)?(?:<mrow>)*)<mo>(?=(?:{_SIGN})</mo>)")
+_LAST = re.compile(
+    rf"""<mo( lspace="0em")?>(?=(?:{_SIGN})</mo>(?:</mrow>)*"""
+    r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
+)
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 
@@ -114,7 +122,8 @@ def contained(html: str, label: str) -> str:
 
 
 def glue(html: str) -> str:
-    """The page with each inline formula held together with what must not leave it."""
+    """The page with each inline formula set to what stands beside it: see 3 and 4."""
+    html = _LAST.sub(r'<mo\1 rspace="0em">', _FIRST.sub(r'\1<mo lspace="0em">', html))
     parts: list[str] = []
     at = 0
     start = html.find("<math>")

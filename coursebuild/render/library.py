@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from coursebuild.measured.shown import Reports
 from coursebuild.model import (
+    Bench,
     CalloutKind,
     Course,
     Document,
@@ -265,7 +266,8 @@ def named_models(document: Document) -> NamedModels:
     scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
     targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
     links = {target.name for target in targets if isinstance(target, ModelTarget)}
-    return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links))
+    shown = {block.model for block in blocks if isinstance(block, Bench)}
+    return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
 
 
 def course_scripts(

@@ -18,6 +18,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from coursebuild.model import (
+    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -60,7 +61,7 @@ from coursebuild.model import (
 from coursebuild.render.quantities import in_order, joined, quantities, unit_length
 from coursebuild.values import dataclass, field
 
-OwnBlock: TypeAlias = Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
+OwnBlock: TypeAlias = Bench | Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
 """The blocks that are more than Markdown."""
 
 
@@ -235,7 +236,9 @@ class _Writer:
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
-            case Callout() | Io() | Lab() | Mjcf() | PlainCode() | Quiz() | Recording() | Script():
+            case Bench() | Callout() | Io() | Lab() | Mjcf() | PlainCode() | Quiz():
+                return self.context.block(block)
+            case Recording() | Script():
                 return self.context.block(block)
             case _:
                 assert_never(block)

@@ -24,7 +24,7 @@ from coursebuild.render.figures import (
     sentence,
 )
 from coursebuild.render.library import Library
-from coursebuild.render.measured import ORDERS, largest
+from coursebuild.render.scenarios import ORDERS, largest
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
 from coursebuild.values import dataclass

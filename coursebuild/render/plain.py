@@ -12,6 +12,7 @@ from typing import assert_never
 from markupsafe import Markup
 
 from coursebuild.model import (
+    Bench,
     Callout,
     Document,
     ExampleTarget,
@@ -65,7 +66,7 @@ class PlainContext:
             case LevelTarget():
                 return f"level:{target.id}"
             case ModelTarget():
-                return f"model:{target.name}"
+                return f"model:{target.name}" + (f"#{target.anchor}" if target.anchor else "")
             case TermTarget():
                 return f"term:{target.id}"
             case ExampleTarget():
@@ -123,6 +124,8 @@ class PlainContext:
                 return Markup(
                     "".join(f"<p>{render_inlines(part, self, PLAIN)}</p>\n" for part in parts)
                 )
+            case Bench():
+                return Markup(f"<p>{escape(block.model)}</p>\n")
             case Lab() | Quiz():
                 return Markup(f"<p>{escape(block.title)}</p>\n")
             case _:

@@ -3,7 +3,8 @@
 Entry points: `text_html(text, direction)`; its steps `joined` and `quantities`; `unit_length`;
 `in_order(html)`.
 
-1. No line ends between a number and its unit: the space becomes one that does not break.
+1. No line ends between a number and its unit, nor inside a unit (`kg m²`): the space becomes one
+   that does not break.
 2. In text from the right a sign, or a unit, would come to stand on the wrong side of its number,
    since neither belongs to the one direction or the other. Such a quantity is a text of its own.
 
@@ -27,14 +28,15 @@ _UNIT = (
     rf"(?:{_PREFIXED}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
     r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
 )
-_UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*(?![^\W_])"
 _SPACES = "[ \u00a0\u202f]"
+_END = r"(?![^\W_])"
+_UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}(?:{_SPACES}{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}){{0,3}}"
 _NUMBER = (
     r"[0-9][0-9.,]*(?<![.,])(?:[eE][+-]?[0-9]+|[ \u00a0\u2009]?[×·][ \u00a0\u2009]?10"
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_BEFORE_UNIT = re.compile(rf"(?<=[0-9]) (?={_UNITS})")
+_WITH_UNIT = re.compile(rf"(?<=[0-9]) {_UNITS}")
 _UNIT_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
 _QUANTITY = re.compile(
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
@@ -57,8 +59,12 @@ def in_order(html: Markup) -> Markup:
 
 
 def joined(text: str) -> str:
-    """The text with no line end between a number and its unit."""
-    return _BEFORE_UNIT.sub("\u00a0", text) if " " in text else text
+    """The text with no line end between a number and its unit, nor inside the unit."""
+    return _WITH_UNIT.sub(_unbroken, text) if " " in text else text
+
+
+def _unbroken(found: re.Match[str]) -> str:
+    return found[0].replace(" ", "\u00a0")
 
 
 def unit_length(text: str) -> int:

@@ -18,7 +18,7 @@ from typing import Literal
 
 from markupsafe import Markup
 
-from coursebuild.measured.bench import ScenarioReport
+from coursebuild.measured.bench import Machine, ScenarioReport
 from coursebuild.model import Comparison, Target
 from coursebuild.results import Outcome
 from coursebuild.values import dataclass, field
@@ -75,6 +75,18 @@ class ShownLab:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownBench:
+    """What a page shows of a report."""
+
+    href: str
+    """Where the model's page shows the same."""
+    report: ScenarioReport | None
+    """`None` where none fits the course."""
+    machine: Machine | None
+    """Where it was measured."""
+
+
+@dataclass(frozen=True, slots=True)
 class ShownCallout:
     """The words of a kind of callout."""
 
@@ -101,6 +113,7 @@ class Shown:
     """By path of the script."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
     labs: Mapping[int, ShownLab] = field(default_factory=dict)
+    benches: Mapping[int, ShownBench] = field(default_factory=dict)
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""

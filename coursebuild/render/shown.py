@@ -9,6 +9,7 @@ from typing import assert_never
 from urllib.parse import urlsplit
 
 from coursebuild.model import (
+    Bench,
     Block,
     Callout,
     Document,
@@ -33,12 +34,14 @@ from coursebuild.model import (
     walk_inlines,
 )
 from coursebuild.render import urls
+from coursebuild.render.benches import shown_bench
 from coursebuild.render.characters import visible
 from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import owner_path
 from coursebuild.render.sheet import (
     Shown,
+    ShownBench,
     ShownCallout,
     ShownLab,
     ShownRecord,
@@ -65,6 +68,7 @@ def shown(library: Library, place: urls.Place, document: Document) -> Shown:
         runs=page.runs(),
         verdicts=page.verdicts,
         labs=page.labs,
+        benches=page.benches,
         keyframes=page.keyframes,
         address=urls.absolute(library.course, place.path),
     )
@@ -82,6 +86,7 @@ class _Page:
         self.callouts: dict[str, ShownCallout] = {}
         self.verdicts: dict[int, ShownVerdict] = {}
         self.labs: dict[int, ShownLab] = {}
+        self.benches: dict[int, ShownBench] = {}
         self.keyframes: dict[str, tuple[str, ...]] = {}
         self.scripts: dict[str, set[int]] = {}
         """Paths of scripts, and the numbers of the lines that questions ask for."""
@@ -95,6 +100,8 @@ class _Page:
                 self._recording(block)
             case Lab():
                 self._lab(block)
+            case Bench():
+                self.benches[block.span.start] = shown_bench(self.library, self.place, block)
             case Quiz():
                 for question in block.questions:
                     if isinstance(question, OutputQuestion):
@@ -179,7 +186,7 @@ def address(library: Library, place: urls.Place, path: str, target: Target) -> s
         case LevelTarget():
             return place.href(urls.level_path(library.levels[target.id]))
         case ModelTarget():
-            return place.href(urls.model_page_path(target.name))
+            return place.href(urls.model_page_path(target.name), target.anchor)
         case PageTarget():
             return place.href(urls.page_path(library.pages[target.id]), target.anchor)
         case ExampleTarget():

@@ -23,6 +23,8 @@ from coursebuild.measured.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.measured.points import (
+    FEWEST_STEPS,
+    is_cut_short,
     seconds_text,
     solving_parts,
     status_text,
@@ -75,7 +77,7 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         lines.append("")
         told = _wrapped(report.verdict.text, style, 2 * _INDENT)
         lines += [style.paint(line, colour) for line in told]
-    for part in (_orders(report.orders), _stable(report.stable, style)):
+    for part in (_orders(report.orders), _stable(report, style)):
         if part:
             lines += ["", *part]
     lines += _lost(report, style)
@@ -162,7 +164,8 @@ def _orders(orders: Sequence[OrderRow]) -> list[str]:
     return [f"{2 * _INDENT}{line}".rstrip() for line in table(columns, 10_000)]
 
 
-def _stable(rows: Sequence[StableRow], style: Style) -> list[str]:
+def _stable(report: ScenarioReport, style: Style) -> list[str]:
+    rows = report.stable
     if not rows:
         return []
     columns = [
@@ -174,6 +177,10 @@ def _stable(rows: Sequence[StableRow], style: Style) -> list[str]:
     if lost:
         text = f"not monotone, stable again beyond: {', '.join(lost)}"
         lines.append(2 * _INDENT + style.paint(text, _RED))
+    if is_cut_short(report) and any(one.largest is None for one in rows):
+        longest = seconds_text(report.duration / FEWEST_STEPS)
+        text = f"longer ones than {longest} were not tried: {FEWEST_STEPS} are the whole scenario"
+        lines.append(2 * _INDENT + style.paint(text, _FAINT))
     return lines
 
 

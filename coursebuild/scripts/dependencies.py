@@ -29,7 +29,8 @@ SPECIAL = "special"
 """States of files that are none; other states are hashes, or say why nothing can be read."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
-_PERTURBATION = "perturbation"
+_PERTURBATION = "moved states"
+"""Another name, once what is kept of such runs means something else: then they run again."""
 _SHOWN = 6
 """Names of modules that are shown of a list."""
 _CHANGING = ("/proc/", "/sys/", "/dev/")

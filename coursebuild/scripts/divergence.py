@@ -3,8 +3,8 @@
 Entry points: `divergence` (what a script did not say of itself), `is_lost`.
 
 A warning of MuJoCo's and a state that is not finite are errors, unless the fence says `diverges`;
-bodies deep in each other are a warning, since some scripts put them there. A script that says
-`diverges` and does not is wrong about itself.
+bodies deep in each other are a warning, unless it says `deep`. A script that says either and does
+not is wrong about itself.
 """
 
 from __future__ import annotations
@@ -31,18 +31,21 @@ def divergence(
 ) -> Iterator[Diagnostic]:
     """What is wrong with the simulations of a script that was run."""
     found = () if run.trace is None else run.trace.divergences
-    if extraction.script.diverges:
-        if run.outcome is Outcome.OK and run.trace is not None and not found:
-            yield _stable(extraction)
-        return
-    if not found:
+    script = extraction.script
+    deep = [each for each in found if each.sign is Sign.CONTACT]
+    if run.outcome is Outcome.OK and run.trace is not None:
+        if script.diverges and not found:
+            yield _unlike(extraction, "script-stable", "diverges", "none of its simulations did")
+        if script.deep and not deep:
+            what = "no bodies lay deep in each other"
+            yield _unlike(extraction, "script-shallow", "deep", what)
+    if script.diverges or not found:
         return
     by_path = {each.path: each for each in extractions}
     lost = _lost(run)
     if lost:
         yield _diverged(extraction, lost, by_path)
-    deep = [each for each in found if each.sign is Sign.CONTACT]
-    if deep and not lost:  # what is lost may as well lie anywhere
+    if deep and not lost and not script.deep:  # what is lost may as well lie anywhere
         yield _deep(extraction, deep, by_path)
 
 
@@ -51,10 +54,10 @@ def _lost(run: ScriptRun) -> tuple[Divergence, ...]:
     return tuple(each for each in found if each.sign is not Sign.CONTACT)
 
 
-def _stable(extraction: Extraction) -> Diagnostic:
+def _unlike(extraction: Extraction, rule: str, key: str, what: str) -> Diagnostic:
     fence = extraction.script.span.first_line()
-    message = f"`{extraction.path}` says `diverges`, and none of its simulations did"
-    return diagnose("script-stable", fence, message, help="take `diverges` away")
+    message = f"`{extraction.path}` says `{key}`, and {what}"
+    return diagnose(rule, fence, message, help=f"take `{key}` away")
 
 
 def _diverged(
@@ -74,7 +77,7 @@ def _deep(
     said = f"bodies of `{extraction.path}` lie deep in each other"
     help = (
         "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), "
-        "or look at where they start"
+        "or look at where they start; if they are to, say so by `deep` on its fence"
     )
     return _found("script-penetration", extraction, deep, by_path, said, help)
 

@@ -8,7 +8,9 @@ Entry points: `sensitivity` (a script), `noise` (the warnings).
 2. The spread of a number is how far the values printed in its place are from the one that the
    script prints unmoved. It holds to the first place of which the spread is no more than half a
    unit. A number that is printed alike by all runs holds in all its digits.
-3. States at the end of runs of a pair, which began in opposite directions, tell how fast they part.
+3. States at the end of runs of a pair, which began in opposite directions, tell how fast they part:
+   compared by the largest positions and velocities since the simulation began, not by those that
+   it happens to end with.
 4. A warning is given where the verification would take a difference for drift: what a tolerance or
    `digits` allows for is no mistake. Nor is a number that came no further than its initial states
    were moved: more than about twelve of its digits cannot be judged, unless it has more than the
@@ -235,7 +237,7 @@ def amplification(moved: Sequence[ScriptRun]) -> float | None:
 
 
 def _ends(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
-    """For each `MjData` its positions and velocities at the end, with the largest at first."""
+    """For each `MjData` its positions and velocities at the end, with what they are compared by."""
     states = () if run.trace is None else run.trace.states
     found: dict[int, list[tuple[float, list[float]]]] = {}
     for state in states:
@@ -249,11 +251,11 @@ def _ends(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
 def _growth(
     one: list[tuple[float, list[float]]], other: list[tuple[float, list[float]]], apart: float
 ) -> Iterator[float]:
-    for (first, mine), (_, theirs) in zip(one, other, strict=True):
+    for (size, mine), (other_size, theirs) in zip(one, other, strict=True):
         if not mine or len(mine) != len(theirs):
             continue
         gap = max(abs(a - b) for a, b in zip(mine, theirs, strict=True))
-        largest = max(first, *map(abs, mine)) or 1.0
+        largest = max(size, other_size, *map(abs, mine)) or 1.0
         yield gap / largest / apart if math.isfinite(gap / largest) else math.inf
 
 

@@ -41,6 +41,8 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
             mjcf = parse_mjcf(fence)
             session.diagnostics += mjcf.diagnostics
             return mjcf.value
+        case "bench":
+            return _bench(fence, session)
         case "quiz" | "lab":
             return _interactive(fence, session, texts)
         case _:
@@ -72,6 +74,18 @@ def _python(fence: Fence, session: Session) -> Block:
         session.script, session.script_wrong = parsed.value.path, False
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed.diagnostics):
         session.script, session.script_wrong = None, True
+    return parsed.value
+
+
+def _bench(fence: Fence, session: Session) -> Block:
+    from coursebuild.syntax.bench import parse_bench
+
+    parsed = parse_bench(fence)
+    session.diagnostics += parsed.diagnostics
+    if fence.nested:
+        message = "a text of a quiz or lab cannot hold a bench"
+        session.report(diagnose("fence-info", fence.head, message))
+        return fence.code()
     return parsed.value
 
 

@@ -17,7 +17,7 @@ from coursebuild.syntax.info import kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
 from coursebuild.values import dataclass
 
-OURS = ("io", "lab", "mjcf", "python", "quiz", "text")
+OURS = ("bench", "io", "lab", "mjcf", "python", "quiz", "text")
 
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.

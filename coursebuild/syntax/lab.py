@@ -118,6 +118,7 @@ def sim_lab(
         seed=fields.seed,
         verify_seconds=verify.seconds if verify is not None else None,
         verify_rtol=verify.rtol if verify is not None else None,
+        verify_deep=verify is not None and verify.deep,
         trail_span=_span(node, "trail"),
         places=tuple(_places(node, ())),
     )

@@ -25,7 +25,7 @@ LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
 _VALUES = ("timeout", "requires", "args")
-_FLAGS = ("norun", "diverges")
+_FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
@@ -106,6 +106,7 @@ def _script(fence: Fence, file: Word, keys: Keys) -> tuple[Script | None, list[D
         norun,
         fence.body_span,
         keys.get("diverges") is not None,
+        keys.get("deep") is not None,
     ), diagnostics
 
 

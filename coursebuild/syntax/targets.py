@@ -40,7 +40,7 @@ def classify(url: str) -> Target:
             return PageTarget(unquote(name), place)
         if scheme == "term":
             return TermTarget(term_id(unquote(url[len(scheme) + 1 :])))
-        return ModelTarget(unquote(url[len(scheme) + 1 :]))
+        return ModelTarget(unquote(name), place)
     if url.startswith("examples/"):
         return ExampleTarget(unquote(url))
     return UrlTarget(url)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -309,7 +310,35 @@ def test_what_became_of_the_states_is_noted(run: Callable[..., ScriptRun]) -> No
     number, length, position, velocity, *end = state.split()
     assert (number, length, len(end)) == ("0", "2", 4)
     assert moved(float.fromhex(position), 0.5)
-    assert float.fromhex(velocity) == 0.0
+    assert float.fromhex(velocity) == pytest.approx(0.5 / 0.002), "as far in the whole time"
+
+
+def sizes(run: Callable[..., ScriptRun], text: str) -> tuple[float, float]:
+    trace = run(text, 1).trace
+    assert trace is not None
+    _, _, position, velocity, *_ = trace.states[0].split()
+    return float.fromhex(position), float.fromhex(velocity)
+
+
+def test_states_are_compared_by_the_largest_since_the_simulation_began(
+    run: Callable[..., ScriptRun],
+) -> None:
+    to_zero = "data.qpos[:] = 0.5\nwhile data.qpos[0] > 0: mujoco.mj_step(model, data)\n"
+    position, velocity = sizes(run, to_zero)
+    assert position == pytest.approx(0.5)
+    assert velocity == pytest.approx(0.5 * math.sqrt(10), rel=1e-3)
+    anew = "mujoco.mj_resetData(model, data)\ndata.qpos[:] = 0.001\nmujoco.mj_step(model, data)\n"
+    position, velocity = sizes(run, to_zero + anew)
+    assert (position, velocity) == pytest.approx((0.001, 0.001 / 0.002))
+    lost = "data.qpos[:] = 0.5\ndata.qvel[0] = 1e12\nmujoco.mj_step(model, data)\n"
+    assert sizes(run, lost + to_zero)[0] < 1
+
+
+def test_what_was_moved_from_zero_is_of_size_one_at_least(run: Callable[..., ScriptRun]) -> None:
+    steps = "for _ in range(1000): mujoco.mj_step(model, data)\n"
+    assert sizes(run, steps) == pytest.approx((1.0, 1 / 2.0))
+    assert sizes(run, "data.qvel[0] = 40\n" + steps)[0] > 10
+    assert sizes(run, "data.qpos[:] = 0.01\n" + steps)[0] == pytest.approx(0.01, rel=1e-3)
 
 
 def test_without_a_simulation_nothing_is_moved(run: Callable[..., ScriptRun]) -> None:

@@ -83,6 +83,9 @@ RICH: dict[str, Any] = {
         {"label": "state", "expr": "data.ncon > 0 ? 'touches' : 'flies'"},
         {"label": "colour", "expr": "model.geom_rgba[5] * 3 + model.jnt_qposadr[1]"},
         {"label": "steps", "expr": "ctx.count", "digits": 0},
+        {"label": "told", "expr": "`${data.xpos[2].toFixed(2)} m, ${ctx.count} ${ctx.gain}`"},
+        {"label": "told too", "expr": "`${(ctx.high === true) !== (data.ncon >= 0)} ` + "
+         "(1 / 3).toPrecision(3)"},
     ],
     "verify": {"seconds": 1},
 }  # fmt: skip
@@ -161,7 +164,8 @@ def test_everything_at_once(course: Path) -> None:
     assert result.unexported == ""
     printed = script(course, result, 2, 0.3, -9.81, 0.125, 1, "free").splitlines()
     assert printed[6] == "state: flies" or printed[6] == "state: touches"
-    assert printed[8] == "steps: 200" and printed[9] == "time: 1 s"
+    assert printed[8] == "steps: 200" and printed[11] == "time: 1 s"
+    assert printed[9:11] == ["told: 0.00 m, 200 2", "told too: true 0.333"]
     other = script(course, result, 4, 0.3, -9.81, 0.125, 0, "held").splitlines()
     assert other[0] != printed[0]
 
@@ -198,7 +202,8 @@ def test_a_script_reads_well(course: Path) -> None:
         ({"setup": "[1, 2].forEach((x) => x)"}, "`=>`"),
         ({"setup": "data.contact.get(0)"}, "a call of `data.contact.get`"),
         ({"readouts": [{"label": "x", "expr": "ctx.unknown"}]}, "`ctx.unknown`"),
-        ({"readouts": [{"label": "x", "expr": "data.qpos[2].toFixed(1)"}]}, "a call"),
+        ({"readouts": [{"label": "x", "expr": "data.qpos[2].toString()"}]}, "a call"),
+        ({"readouts": [{"label": "x", "expr": "`${data.qpos}`"}]}, "an array in a text"),
         ({"readouts": [{"label": "{{control:0}}", "expr": "1"}]}, "a text that no script can hold"),
         (
             {

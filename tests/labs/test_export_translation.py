@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 
 import mujoco
@@ -13,6 +15,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+sys.path.insert(0, str(Path(__file__).parent))
+from labkit import Bench, make_lab
 
 from coursebuild.effects.v8 import Isolate
 from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
@@ -83,6 +88,14 @@ def translated(code: str, *, button: bool = False) -> str:
         ("ctx.n = 1 / 3 - .5e1", "ctx.n = 1 / 3 - 0.5e1"),
         ("ctx.n = ctx.on ? 1 : 2.5", "ctx.n = 1.0 if ctx.on else 2.5"),
         ("ctx.n = a\n/* b */ // c\n".replace("a", "0x10"), "ctx.n = float(0x10)"),
+        ("ctx.on = ctx.on === (ctx.n > 1)", "ctx.on = ctx.on == (ctx.n > 1)"),
+        ("ctx.on = ctx.n !== 1 !== ctx.on", "ctx.on = (ctx.n != 1) != ctx.on"),
+        ("ctx.on = ctx.on === true || ctx.on == false", "ctx.on = ctx.on or not ctx.on"),
+        ("ctx.n = true !== ctx.on ? 1 : 2", "ctx.n = float(1 if not ctx.on else 2)"),
+        ("if (!ctx.on === ctx.on) ctx.n = 1", "if (not ctx.on) == ctx.on:\n    ctx.n = 1.0"),
+        ("const s = `a`, t = `${s} ${ctx.k}`", 's = "a"\nt = s + " " + str(ctx.k)'),
+        ("const u = 'n = ' + ctx.n + 1", 'u = "n = " + numeral(ctx.n) + str(1)'),
+        ("const u = 1 + ctx.k + ` m`", 'u = str(1 + ctx.k) + " m"'),
         ("data.qpos[ctx.n] = 1", "data.qpos[index(ctx.n)] = 1"),
         ("data.qpos[-1] = 1", "data.qpos[index(-1)] = 1"),
         ("data.qpos[7 * ctx.k + 1] = 1", "data.qpos[7 * ctx.k + 1] = 1"),
@@ -115,7 +128,6 @@ data.qpos[0] = ctx.on + 1
 data.qpos[0] = data.qpos ? 1 : 2
 data.qpos[0] = 'a' + 1
 data.qpos[0] = 1 < 2 < 3
-data.qpos[0] = ctx.on == true
 data.qpos[0] ??= 1
 data.qpos[0] = 5 & ctx.n
 data.qpos[0] = 1 << 2
@@ -130,7 +142,21 @@ ctx.v = [...data.qpos]
 ctx.v.push(1)
 ctx.k.x = 1
 ctx.on = 1
-const s = `text`
+data.qpos[0] = `1`
+data.qpos[0] = f`1`
+data.qpos[0] = `a`.length
+const s = `${data.qpos}`
+const s = `${ctx.n.toFixed(ctx.k)}`
+const s = `${ctx.n.toString()}`
+const s = ctx.n.toFixed(101)
+const s = ctx.n.toPrecision()
+const s = ctx.n.toExponential()
+const s = `${ctx.n = 1}`
+const s = `${ctx.n; 1}`
+const s = `${}`
+const s = `${{a: 1}.a}`
+ctx.on = ctx.on === 1
+ctx.on = ctx.on < true
 const o = {a: 1}
 const model = 1
 const c = 1; c = 2
@@ -172,6 +198,11 @@ def test_refusals(code: str) -> None:
         statements(code, NAMES, Used())
 
 
+def test_a_template_with_a_line_that_goes_on_is_refused() -> None:
+    with pytest.raises(UntranslatableError):
+        statements("const s = `a\\\nb`", NAMES, Used())
+
+
 @pytest.mark.parametrize(
     "code, python",
     [
@@ -181,6 +212,14 @@ def test_refusals(code: str) -> None:
         ("lib.qpos('hinge') * 2", 'data.joint("hinge").qpos.item() * 2'),
         ("lib.qpos('ball')[2]", 'data.joint("ball").qpos.copy()[2]'),
         ("data.ncon > 0 ? 'a' : \"b\\n\"", '"a" if data.ncon > 0 else "b\\n"'),
+        ("`z = ${data.qpos[2].toFixed(2)} m`", '"z = " + fixed(data.qpos[2], 2) + " m"'),
+        ("`${data.time > 1}`", '"true" if data.time > 1 else "false"'),
+        ("`${ctx.on ? `on ${`!`}` : 'off}'}`", '"on " + "!" if ctx.on else "off}"'),
+        ("`${ctx.on}, ${1}`", '("true" if ctx.on else "false") + ", " + str(1)'),
+        ("(data.ncon === 0) === false ? 'a' : ''", '"a" if not data.ncon == 0 else ""'),
+        ("Math.abs(ctx.n).toPrecision(3)", "precise(abs(ctx.n), 3)"),
+        ("(-5).toExponential(1)", "exponential(-5.0, 1)"),
+        ("data.ncon.toFixed()", "fixed(float(data.ncon), 0)"),
         ("Math.hypot(...data.qvel.slice(3, 6))", "math.hypot(*data.qvel[3:6].copy())"),
         ("data.xpos[3 * 2 + 1]", "data.xpos.flat[3 * 2 + 1]"),
         ("model.body_parentid[1]", "int(model.body_parentid[1])"),
@@ -217,6 +256,49 @@ def test_the_names_of_the_engine_are_those_of_the_bindings() -> None:
         assert isinstance(value, float if kind == "float" else int), way
     assert all(isinstance(getattr(model, name), int) for name in SIZES)
     assert all(callable(getattr(mujoco, name)) for name in CALLS)
+
+
+RICH = Path(__file__).with_name("rich.xml")
+"""A model with something of nearly every kind, in contact from the first step."""
+ARRAY_KINDS = {"Float64Array": "f64", "Float32Array": "f32", "Int32Array": "int"}
+LISTED = """
+  mj.mj_forward(model, data)
+  const found = []
+  for (const [owner, object] of [['model', model], ['data', data]])
+    for (const name of Object.getOwnPropertyNames(Object.getPrototypeOf(object))) {
+      const value = object[name]
+      if (ArrayBuffer.isView(value)) found.push([owner, name, value.constructor.name, value.length])
+      else if (typeof value === 'number') found.push([owner, name, 'number', value])
+    }
+  ctx.found = JSON.stringify(found)
+"""
+
+
+def test_every_array_that_both_bindings_give_has_a_name(tmp_path: Path) -> None:
+    bench, xml = Bench(tmp_path), RICH.read_text()
+    lab = make_lab(xml=xml, setup=LISTED, readouts=[{"label": "all", "expr": "ctx.found"}])
+    with bench.browser, bench.native:
+        reply = bench.trial(lab)
+    assert not reply["failures"], reply["failures"]
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    owners = {"model": model, "data": data}
+    arrays, sizes = set(), set()
+    for owner, name, kind, length in json.loads(reply["main"]["pictures"][0]["readouts"][0]):
+        value = getattr(owners[owner], name, None)
+        if isinstance(value, np.ndarray) and not name.startswith("plugin"):
+            is_bool = (str(value.dtype), kind) == ("bool", "Uint8Array")
+            known = "int" if is_bool else ARRAY_KINDS.get(kind)
+            if known is not None and value.itemsize * 8 <= (64 if known == "f64" else 32):
+                assert value.size == length, (owner, name)
+                arrays.add((owner, name))
+                assert ARRAYS[owner, name].element == known, (owner, name)
+        elif owner == "model" and kind == "number" and name not in ("nbuffer", "narena"):
+            assert value == length
+            sizes.add(name)
+    assert arrays == {way for way in ARRAYS if len(way) == 2}
+    assert sizes == SIZES
 
 
 # --- values beside V8's
@@ -288,6 +370,43 @@ def same(mine: float, theirs: float) -> bool:
     return mine == theirs and math.copysign(1, mine) == math.copysign(1, theirs)
 
 
+FORMS = ["", ".toFixed()", ".toFixed(2)", ".toFixed(100)", ".toPrecision(1)", ".toPrecision(3)"]
+FORMS += [".toPrecision(17)", ".toPrecision(100)", ".toExponential(0)", ".toExponential(4)"]
+TIES = [
+    0.5,
+    1.5,
+    2.5,
+    -0.5,
+    1.25,
+    1.005,
+    0.045,
+    9.5,
+    99.95,
+    1e21,
+    1e-6,
+    1e-7,
+    123456789012345680000,
+]
+WRITTEN = st.one_of(
+    st.floats(),
+    st.floats(-100, 100),
+    st.sampled_from([*TIES, 1e20, 999999999999999868928, 5e-324, -0.0, 0.1 + 0.2, 1e300, 9.995]),
+    st.integers(-4000, 4000).map(lambda n: n / 8),
+)
+
+
+@given(x=WRITTEN, form=st.sampled_from(FORMS))
+def test_numbers_are_written_as_v8_writes_them(v8: Isolate, x: float, form: str) -> None:
+    used = Used()
+    made = expression(f"`${{ctx.n{form}}}`", NAMES, used).text
+    scope: dict[str, object] = {"ctx": SimpleNamespace(n=np.float64(x)), "math": math}
+    exec("from decimal import ROUND_HALF_UP, Context, Decimal", scope)
+    for name in helpers(used.helpers):
+        exec(LIBRARY[name].source, scope)
+    number = "NaN" if math.isnan(x) else repr(x).replace("inf", "Infinity")
+    assert eval(made, scope) == v8.call("run", f"`${{({number}){form}}}`", 10.0)
+
+
 @given(code=formulas(FUNCTIONS))
 def test_numbers_are_those_of_v8(v8: Isolate, code: str) -> None:
     mine = python_value(code)
@@ -319,6 +438,9 @@ def test_powers_are_those_of_v8(v8: Isolate, base: str, exponent: str) -> None:
         "'say \"a\\n\"'",
         "'\\u00e9\\x41\\u{1F600} é 😀'",
         "'\\\\ \\' \\0 \\q'",
+        '`it\'s "a"\r\n$ {} \\` \\${1} \\u00e9 $`',
+        "`$${`}`}${ `{${'`'}` }`",
+        "''+``",
     ],
 )
 def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -53,6 +54,61 @@ data.qvel[:3] = 3, 0, 4
 while data.time < 0.9999:
     mujoco.mj_step(model, data)
 print(f"x {data.qpos[0]:.9f} m, z {data.qpos[2]:.4e} m, bodies {model.nbody}")
+"""
+DOWN = """
+import mujoco
+
+XML = '''
+<mujoco>
+  <option integrator="RK4" gravity="0 0 -10"/>
+  <worldbody><body><joint type="slide" axis="0 0 1"/><geom size=".1"/></body></worldbody>
+</mujoco>
+'''
+model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+data.qvel[0] = 5
+highest = 0
+for _ in range(500):
+    mujoco.mj_step(model, data)
+    highest = max(highest, data.qpos[0])
+print(f"{highest:.6f} m high, and back within 1e-9 m: {abs(data.qpos[0]) < 1e-9}")
+"""
+REST = """
+import mujoco
+
+XML = '''
+<mujoco>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0" damping="0.1"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02"/>
+    </body>
+    <body pos="1 0 0">
+      <joint type="slide" axis="1 0 0" stiffness="40" springref="0.25"/>
+      <geom size="0.1"/>
+    </body>
+  </worldbody>
+</mujoco>
+'''
+model = mujoco.MjModel.from_xml_string(XML)
+for start in 0, 0.25:
+    data = mujoco.MjData(model)
+    data.qpos[1] = start
+    while data.time < 5:
+        mujoco.mj_step(model, data)
+    print(f"{data.qpos[1]:.9f}")
+"""
+PENDULUMS = """
+import mujoco
+
+from mjcourse import model_path
+
+model = mujoco.MjModel.from_xml_path(str(model_path("double_pendulums")))
+data = mujoco.MjData(model)
+data.qpos[:] = 2.0, 2.0, 2.0, 2.001
+while data.time < SECONDS:
+    mujoco.mj_step(model, data)
+print("steps", round(data.time / 0.001))
 """
 LIMIT = """
 import mujoco
@@ -108,6 +164,25 @@ def test_a_projectile_holds_in_all_digits(make: Make) -> None:
     assert (script["status"], script["numbers"], script["doubts"]) == ("measured", 3, [])
     assert not script["chaotic"]
     assert found["rules"] == []
+
+
+def test_what_ends_near_zero_or_rests_is_not_chaotic(make: Make) -> None:
+    found = measured(recorded(make, DOWN, REST))
+    for path in ("examples/a.py", "examples/b.py"):
+        assert (found[path]["status"], found[path]["doubts"]) == ("measured", [])
+        assert not found[path]["chaotic"]
+        assert found[path]["amplification"] < 1e4
+
+
+def test_the_double_pendulums_of_the_course_are_chaotic_after_a_while(make: Make) -> None:
+    root = Path(__file__).parents[2]
+    blocks = [block(f"{s}s.py", PENDULUMS.replace("SECONDS", s), "?") for s in ("20", "1")]
+    folder = make("## One\n\n" + "".join(blocks))
+    folder.write("models/double_pendulums.xml", (root / "models/double_pendulums.xml").read_text())
+    folder.main("update", "--quiet")
+    found = measured(folder)
+    assert found["examples/20s.py"]["chaotic"]
+    assert not found["examples/1s.py"]["chaotic"]
 
 
 def test_a_script_at_a_border_prints_other_words(make: Make) -> None:

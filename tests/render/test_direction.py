@@ -44,6 +44,8 @@ def test_from_the_left(language: str) -> None:
         ("see 4.2 and 4.3", "see 4.2 and 4.3"),
         ("30 °C, 2 kΩ, 4 µm, 4 μm", "30\u00a0°C, 2\u00a0kΩ, 4\u00a0µm, 4\u00a0μm"),
         ("in 2 steps a 5 kg\nbox", "in 2 steps a 5\u00a0kg\nbox"),
+        ("3 kg m² of 4 N m s/rad", "3\u00a0kg\u00a0m² of 4\u00a0N\u00a0m\u00a0s/rad"),
+        ("5 kg mass, 2 m in 3 s more", "5\u00a0kg mass, 2\u00a0m in 3\u00a0s more"),
     ],
 )
 def test_numbers_keep_their_units(text: str, found: str) -> None:

@@ -52,3 +52,30 @@ Y = "<math><mi>y</mi></math>"
 )  # fmt: skip
 def test_punctuation_is_held(html: str, expected: str) -> None:
     assert glue(html) == expected
+
+
+START, TWO = "of <math><mrow>", "<mn>2</mn>"
+NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></math>'
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        (f"{START}<mo>=</mo>{TWO}</mrow>", f'{START}<mo lspace="0em">=</mo>{TWO}</mrow>'),
+        (f"\n<math><semantics><mo>≈</mo>{TWO}", f'\n<math><semantics><mo lspace="0em">≈</mo>{TWO}'),
+        (f"{TWO}<mo>&lt;</mo></mrow>{NOTE} 3", f'{TWO}<mo rspace="0em">&lt;</mo></mrow>{NOTE} 3'),
+        ("a <math><mo>=</mo></math> b", 'a <math><mo lspace="0em" rspace="0em">=</mo></math> b'),
+        *((same, same) for same in (
+            f"of {X}<math><mo>=</mo>{TWO}</math> m",
+            f"of <math>{TWO}<mo>=</mo></math><math>{TWO}</math> m",
+            f"of <math><mo>sin</mo>{TWO}</math> m",
+            f'of <math><mo lspace="0em">−</mo>{TWO}</math> m',
+        )),
+    ],
+)  # fmt: skip
+def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: str) -> None:
+    assert glue(html) == expected
+
+
+def test_a_unit_of_several_is_held() -> None:
+    assert glue(f"{X}\u00a0kg\u00a0m², so") == f'<span class="held">{X}\u00a0kg\u00a0m²,</span> so'

@@ -117,6 +117,7 @@ def same_frame(old: Course, new: Course) -> bool:
     return (
         old.map.text == new.map.text
         and old.models == new.models
+        and old.declarations == new.declarations
         and old.files == new.files
         and [d.source.path for d in old.documents] == [d.source.path for d in new.documents]
     )

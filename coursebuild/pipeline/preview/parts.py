@@ -15,6 +15,7 @@ from coursebuild.effects.v8 import MathEngine
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.measured.shown import Reports
 from coursebuild.model import (
+    Bench,
     Course,
     Document,
     Lab,
@@ -98,7 +99,7 @@ class Parts:
         self._scripts_of = PerDocument(document_scripts)
         self._labs_of = PerDocument(_labs)
         self.has_models = PerDocument(_has_models)
-        """Whether MJCF stands in a document."""
+        """Whether MJCF stands in a document, or what is held against compiled models."""
         self._formulas_of = PerDocument(document_formulas)
         self._lexicon_of = PerDocument(self._lexicon)
         self._asked_of = PerDocument(asked)
@@ -357,7 +358,9 @@ def _labs(document: Document) -> tuple[Lab, ...]:
 
 def _has_models(document: Document) -> bool:
     blocks = document_blocks(document)
-    return any(isinstance(b, Mjcf) or (isinstance(b, Lab) and b.xml is not None) for b in blocks)
+    return any(
+        isinstance(b, Mjcf | Bench) or (isinstance(b, Lab) and b.xml is not None) for b in blocks
+    )
 
 
 def _leans_on(document: Document) -> tuple[str, ...]:

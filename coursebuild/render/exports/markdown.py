@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from typing import Protocol, assert_never
 
 from coursebuild.model import (
+    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -117,7 +118,10 @@ def write_footnotes(footnotes: Iterable[Footnote], context: Context) -> str:
     )
 
 
-_APART = (HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Lab, Quiz, Table, MathBlock)
+_APART = (
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Bench, Lab, Quiz),
+    *(Table, MathBlock),
+)
 """Blocks that an empty line parts from others, even in a tight list."""
 
 
@@ -167,7 +171,9 @@ class _Writer:
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case Table():
                 return self._table(block)
-            case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf() | Lab() | Quiz():
+            case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf():
+                return self.context.own(block)
+            case Bench() | Lab() | Quiz():
                 return self.context.own(block)
             case _:
                 assert_never(block)

@@ -17,8 +17,9 @@ from coursebuild.values import dataclass
 
 SHOWN = frozenset("gif jpeg jpg png svg webp".split())
 """Endings of the pictures that every reading system shows."""
-_ON_PAPER = frozenset(("anchor", "bar-tools", "qr"))
-"""Classes of what an e-book does not need: links of headings to themselves, downloads, QR codes."""
+_ON_PAPER = frozenset(("anchor", "bar-tools", "plot-wide", "qr"))
+"""Classes of what an e-book does not need: links of headings to themselves, downloads, QR codes; of
+two drawings of a plot the one that small screens cannot show."""
 _TOP = "_top"
 _DOWN = 2
 """The course is the first heading, its levels are the second."""

@@ -14,6 +14,7 @@ from typing import assert_never
 
 from coursebuild.model import (
     AnyQuestion,
+    Bench,
     Block,
     Callout,
     ChoiceQuestion,
@@ -35,13 +36,16 @@ from coursebuild.model import (
     Target,
     plain_text,
 )
+from coursebuild.render.benches import bench_text
 from coursebuild.render.blocks import output_receipt, script_receipt
 from coursebuild.render.context import PageContext
+from coursebuild.render.exports.fromhtml import markdown_of
 from coursebuild.render.exports.markdown import write_blocks, write_inlines
 from coursebuild.render.exports.marks import (
     code_span,
     escaped,
     fence,
+    guarded,
     hang,
     link,
     picture,
@@ -112,6 +116,8 @@ class Plain:
                 return self._io(block)
             case Mjcf():
                 return self._mjcf(block)
+            case Bench():
+                return self._bench(block)
             case Lab():
                 return self._lab(block)
             case Quiz():
@@ -157,6 +163,12 @@ class Plain:
         if block.error is not None:
             receipt = f"*{self.words('mjcf.fails', engine=shown.engine)}* {code_span(block.error)}"
         return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
+
+    def _bench(self, block: Bench) -> str:
+        html, said = bench_text(self.page, block)
+        parts = [guarded(escaped(said))] if said else []
+        head, *rest = markdown_of(str(html), self.locate).split("\n\n")
+        return "\n\n".join((head, *parts, *rest))
 
     # --- scripts and outputs
 

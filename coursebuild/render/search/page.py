@@ -15,7 +15,7 @@ from coursebuild.render.search.drawn import drawn_sections
 from coursebuild.render.search.sections import document_sections
 from coursebuild.render.search.values import PageText, Piece, Searched, Section
 from coursebuild.render.search.words import counted
-from coursebuild.render.sheet import Highlighted, Sheet
+from coursebuild.render.sheet import Highlighted, Sheet, Shown, ShownBench
 
 _LEFT_OUT = frozenset({"home", "notfound", "search"})
 """Kinds of pages that nobody looks for: all that stands on them stands on others as well."""
@@ -51,13 +51,19 @@ def page_text(sheet: Sheet, document: Document | None, body: str) -> PageText | 
     name = head.id if isinstance(head, LessonHead) else ""
     lead = (sheet.description, *(head.objectives if isinstance(head, LessonHead) else ()))
     if document is not None:
-        kinds = sheet.shown.callouts if sheet.shown is not None else {}
-        labels = {kind: shown.label for kind, shown in kinds.items()}
-        return PageText(sheet.title, name, document_sections(document, lead, labels))
+        known = sheet.shown or Shown()
+        labels = {kind: shown.label for kind, shown in known.callouts.items()}
+        measured = {at: _scenario(shown) for at, shown in known.benches.items()}
+        return PageText(sheet.title, name, document_sections(document, lead, labels, measured))
     code = [v.text for v in sheet.values.values() if isinstance(v, Highlighted)]
     pieces = [Piece("text", text) for text in lead if text] + [Piece("code", t) for t in code if t]
     drawn = drawn_sections(body) if sheet.kind not in _LEADS else ()
     return PageText(sheet.title, name, (Section("", "", 0, tuple(pieces)), *drawn))
+
+
+def _scenario(shown: ShownBench) -> str:
+    """What a shown report is about."""
+    return "" if shown.report is None else shown.report.title or shown.report.name
 
 
 def call(kind: str, name: str, value: object) -> bytes:

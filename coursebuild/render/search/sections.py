@@ -1,6 +1,6 @@
 """A document as sections that are searched.
 
-Entry point: `document_sections(document, lead, labels)`.
+Entry point: `document_sections(document, lead, labels, measured)`.
 
 1. The blocks are walked in order, what stands in containers included; a heading begins a section.
 2. Formulas become lines of plain text (`tex`); the names of their commands are kept beside.
@@ -15,6 +15,7 @@ from html import unescape
 from typing import assert_never
 
 from coursebuild.model import (
+    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -61,7 +62,10 @@ _BLANKS = re.compile(r"\s+")
 
 
 def document_sections(
-    document: Document, lead: Iterable[str], labels: Mapping[str, str]
+    document: Document,
+    lead: Iterable[str],
+    labels: Mapping[str, str],
+    measured: Mapping[int, str] | None = None,
 ) -> tuple[Section, ...]:
     """The sections of a document.
 
@@ -69,8 +73,9 @@ def document_sections(
         document: with its prose, not its skeleton.
         lead: paragraphs that stand above the document on its page.
         labels: of the kinds of callouts, by name.
+        measured: what the reports that it shows are about, by their offset.
     """
-    reader = _Reader(labels)
+    reader = _Reader(labels, measured or {})
     for text in lead:
         reader.add("text", text)
     reader.blocks(document.blocks)
@@ -80,8 +85,9 @@ def document_sections(
 
 
 class _Reader:
-    def __init__(self, labels: Mapping[str, str]) -> None:
+    def __init__(self, labels: Mapping[str, str], measured: Mapping[int, str]) -> None:
         self._labels = labels
+        self._measured = measured
         self._done: list[Section] = []
         self._begin("", "", 0)
 
@@ -136,7 +142,7 @@ class _Reader:
                 pass
             case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
                 self._code(block)
-            case Io() | Lab() | Quiz():
+            case Bench() | Io() | Lab() | Quiz():
                 self._card(block)
             case _:
                 assert_never(block)
@@ -156,8 +162,11 @@ class _Reader:
             case _:
                 assert_never(block)
 
-    def _card(self, block: Io | Lab | Quiz) -> None:
+    def _card(self, block: Bench | Io | Lab | Quiz) -> None:
         match block:
+            case Bench():
+                self._also[block.model] = None
+                self.add("text", self._measured.get(block.span.start, ""))
             case Io():
                 for part in (block.input, block.process, block.output):
                     self.add("text", self._text(part))

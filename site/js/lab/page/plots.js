@@ -8,6 +8,7 @@ import { h } from './dom.js'
 import { History } from './history.js'
 import { formatLabel, superscript } from './numbers.js'
 import { palette, watchTheme } from './palette.js'
+import { spanOf } from './span.js'
 import { spread } from './spread.js'
 
 const HEIGHT = 170 // CSS pixels
@@ -93,7 +94,7 @@ export class Plot {
         x: { time: false, range: () => this.spanX() },
         y: {
           distr: config.log ? LOGARITHMIC : LINEAR,
-          range: (_, min, max) => (config.log ? decades(config, min, max) : this.spanY(min, max)),
+          range: (_, min, max) => (config.log ? decades(config, min, max) : spanOf(config, min, max)),
         },
       },
       axes: [
@@ -118,20 +119,6 @@ export class Plot {
     const { last } = this.history
     if (window !== null) return last <= window ? [0, window] : [last - window, last]
     return [0, Math.max(1, last)]
-  }
-
-  // Bounds that the author leaves open follow the data, with room on both sides; a flat line gets a scale too.
-  spanY(low, high) {
-    const { ymin, ymax, refLines } = this.config
-    const marks = refLines.map(({ y }) => y)
-    let min = ymin ?? Math.min(low ?? Infinity, ...marks)
-    let max = ymax ?? Math.max(high ?? -Infinity, ...marks)
-    if (!Number.isFinite(min) || !Number.isFinite(max)) {
-      min = ymin ?? (ymax ?? 1) - 1
-      max = ymax ?? min + 1
-    }
-    const room = max > min ? 0.06 * (max - min) : Math.max(1e-9, 0.05 * Math.abs(max))
-    return [ymin ?? min - room, ymax ?? max + room]
   }
 
   /** Width of the labels at the ends of the lines. */

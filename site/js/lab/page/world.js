@@ -116,6 +116,8 @@ export class World {
     const geometry = type === GEOM.MESH ? this.mesh(data >> 1) : null
     const solid = new Solid(this.scene, this.materials, { type, geometry, model: false, extent: this.description.extent })
     for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
+    // A box of inertia may lie in the faces of a geom: what is added is seen before what it is added to.
+    Object.assign(solid.material, { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1 })
     return solid
   }
 

@@ -1,0 +1,123 @@
+"""A recorded report in a text: the plot of a scenario, its tables, and where it was measured.
+
+Entry points: `bench`, the block as HTML; `bench_text`, as what a Markdown file is made from;
+`shown_bench`, what its page must know of the reports.
+
+What is shown is what the page of the model shows. Where no report fits the course, the block says
+so, with the command that makes one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from coursebuild.measured.bench import ScenarioReport
+from coursebuild.model import Bench, document_blocks, scenario_anchor
+from coursebuild.render import urls
+from coursebuild.render.figures import Grid, again, where
+from coursebuild.render.library import Library
+from coursebuild.render.scenarios import scenario_view
+from coursebuild.render.sheet import ShownBench
+from coursebuild.values import dataclass, replace
+
+if TYPE_CHECKING:
+    from coursebuild.render.context import PageContext
+
+
+@dataclass(frozen=True, slots=True)
+class BenchView:
+    """The block, ready for its template."""
+
+    model: str
+    href: str
+    """Where the model's page shows the same."""
+    command: str
+    title: str = ""
+    """Of the scenario; empty where nothing was measured, like all that follows."""
+    verdict: str = ""
+    notes: tuple[str, ...] = ()
+    tables: tuple[Grid, ...] = ()
+    folded: Grid | None = None
+    """The settings, where they stand below something else."""
+    about: tuple[str, ...] = ()
+    where: str = ""
+
+
+def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
+    """What the reports have for a block on a page."""
+    scene = library.reports.scenes.get(bench.model)
+    scenarios = () if scene is None else scene.scenarios
+    named = (one for one in scenarios if bench.scenario in (None, one.name))
+    report = next(named, None)
+    declared = {
+        one.name
+        for each in library.course.declarations
+        if each.model == bench.model
+        for one in each.scenarios
+    }
+    anchor = "measured"
+    if report is not None and report.name in declared:
+        anchor = scenario_anchor(report.name)
+    href = place.href(urls.model_page_path(bench.model), anchor)
+    machine = None if scene is None or report is None else scene.machine
+    return ShownBench(href, report, machine)
+
+
+def bench(page: PageContext, block: Bench) -> Markup:
+    """A recorded report."""
+    return page.template("blocks/bench.html", bench=_view(page, block), plots=_plots(page, block))
+
+
+def bench_text(page: PageContext, block: Bench) -> tuple[Markup, str]:
+    """The block without its plot, and what is to be seen in the plot."""
+    from coursebuild.measured.points import chart, telling
+    from coursebuild.measured.words import described
+
+    report = _shown(page, block).report
+    quantity = None if report is None or "plot" not in block.shows else telling(report)
+    said = ""
+    if report is not None and quantity is not None:
+        silent = replace(report, verdict=replace(report.verdict, text=""))  # the block says it
+        said = ". ".join(described(silent, chart(report, quantity)))
+    return page.template("blocks/bench.html", bench=_view(page, block), plots=()), said
+
+
+def _shown(page: PageContext, block: Bench) -> ShownBench:
+    return page.shown.benches[block.span.start]
+
+
+def _view(page: PageContext, block: Bench) -> BenchView:
+    words, shown = page.tools.words, _shown(page, block)
+    command = again("bench", block.model, "--record")
+    if shown.report is None or shown.machine is None:
+        return BenchView(block.model, shown.href, command)
+    view = scenario_view(words, shown.report, "")
+    grids = {"stable": view.stable, "orders": view.orders}
+    tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
+    alone = block.shows == ("table",)
+    settings = bool({"plot", "table"}.intersection(block.shows))
+    return BenchView(
+        model=block.model,
+        href=shown.href,
+        command=command,
+        title=view.title,
+        verdict=view.verdict if settings else "",
+        notes=view.notes if settings else (),
+        tables=(view.settings,) if alone else tuple(tables),
+        folded=view.settings if "table" in block.shows and not alone else None,
+        about=view.about,
+        where=where(words, shown.machine),
+    )
+
+
+def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
+    """The plot, for wide and for narrow screens; their ids are numbered through the page."""
+    from coursebuild.render.draw import plots  # which draws pages, and so blocks
+
+    report: ScenarioReport | None = _shown(page, block).report
+    if report is None or "plot" not in block.shows:
+        return ()
+    places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
+    return plots(f"_bench-{places.index(block.span.start) + 1}", report)
