@@ -2,10 +2,10 @@
 
 Entry points: `ARRAYS`, `SCALARS`, `CALLS`.
 
-In JavaScript every array is flat, in Python one of several numbers a row has two dimensions. Here is
-every array of floats, whole numbers or booleans that both bindings give in the same size. Left out
-are bytes, which wrap when they are assigned to, numbers of 64 bits, which JavaScript does not have,
-and what plugins keep. A test holds these tables against both bindings, and fails where one is
+In JavaScript every array is flat, in Python one of several numbers a row has two dimensions. These
+are the arrays of floats, whole numbers or booleans that both bindings give in the same size. Left
+out are bytes, which wrap when they are assigned to, numbers of 64 bits, which JavaScript does not
+have, and what plugins keep. A test holds these tables against both bindings, and fails where one is
 missing.
 """
 

@@ -79,9 +79,11 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
             scenario_view(words, one, anchors.get(one.name, f"_scenario-{n}"))
             for n, one in enumerate(scenarios, 1)
         ),
-        waiting=()
-        if scenarios
-        else tuple((anchors[one], title) for one, title in declared.items()),
+        waiting=tuple(
+            (anchors[one], title)
+            for one, title in declared.items()
+            if one not in {scenario.name for scenario in scenarios}
+        ),
         where="" if scene is None else where(words, scene.machine),
         command=again("bench", name, "--record"),
         file="" if scene is None else place.href(urls.file_path(bench_path(name))),

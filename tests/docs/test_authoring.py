@@ -220,7 +220,7 @@ def test_every_callout_kind_is_named() -> None:
     assert [kind.name for kind in CALLOUTS if not quoted(kind.name)] == []
 
 
-@pytest.mark.parametrize("kind", ["python", "text", "io", "mjcf", "quiz", "lab"])
+@pytest.mark.parametrize("kind", ["python", "text", "io", "mjcf", "bench", "quiz", "lab"])
 def test_every_key_of_a_fence_is_named(
     kind: str, course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -51,6 +51,11 @@ def translated(code: str, *, button: bool = False) -> str:
             "model.geom_rgba[3] *= 0.1",
             "model.geom_rgba.flat[3] = float(model.geom_rgba.flat[3]) * 0.1",
         ),
+        ("model.pair_solref[0] = -value", "model.pair_solref.flat[0] = -GAIN"),
+        (
+            "for (let i = 0; i < model.npair; i++) model.pair_margin[i] = 0",
+            "for i in range(model.npair):\n    model.pair_margin[i] = 0",
+        ),
         (
             "data.mocap_quat.set([1, 0, 0, value], 4)",
             "data.mocap_quat.reshape(-1)[4:8] = [1, 0, 0, GAIN]",

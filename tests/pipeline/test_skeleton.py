@@ -83,6 +83,8 @@ PARTS = [
     block("b.py", 'print("x 1")\nprint("y 2")\n')
     + "Output:\n\n| n | v |\n| - | - |\n| x | 1 |\n| [y](lesson:1.2) | $2$ |\n\n",
     "```mjcf\n<mujoco/>\n```\n\n",
+    "```bench box\n```\n\n",
+    "```bench arm scenario=swing show=table\n```\n\n",
     '```mjcf fragment="worldbody" error="no"\n<body/>\n```\n\n',
     '```lab simlab\n{"model": "box", "note": "A [n](lesson:1.2) `4`{out}", "key": 1}\n```\n\n',
     '```lab other\n{"model": "gone"}\n```\n\n',

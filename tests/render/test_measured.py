@@ -112,6 +112,16 @@ def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> Non
     assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in told
 
 
+def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) -> None:
+    told = (
+        "implicit all up to 100 ms longer ones were not tried: 20 of these are the whole scenario"
+    )
+    for duration, expected in ((2.0, True), (2.1, False)):
+        one = replace(box().scenarios[0], duration=duration)
+        found = pages(make, Reports({"box": scene(one, model="box")}))["models/box.html"]
+        assert (told in text(found)) is expected
+
+
 def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) -> None:
     flat = [row(velocity=(1e-11, 1e-11), position=(2e-3, 1e-3), own=True)]
     found = Reports({"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")})

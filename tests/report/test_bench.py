@@ -40,6 +40,15 @@ def test_text_at_160_columns() -> None:
     assert all(cells_of(line) <= 160 for line in text.splitlines())
 
 
+def test_where_the_duration_ended_the_search_for_stable_timesteps() -> None:
+    found = scene()
+    (one, *_) = found.scenarios
+    told = "    longer ones than 100 ms were not tried: 20 are the whole scenario\n"
+    for duration, expected in ((2.0, True), (2.1, False)):
+        text = bench_text([replace(found, scenarios=(replace(one, duration=duration),))], Style())
+        assert (told in text) is expected
+
+
 def test_orders_and_limits_and_the_verdict() -> None:
     text = bench_text([scene()], Style(width=80))
     assert "    >    5  Euler           2 ms  4.80e-03  9.60e-03      1  ok        →14\n" in text

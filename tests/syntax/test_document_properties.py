@@ -63,6 +63,7 @@ PIECES = [
     ),
     *("```python file=examples/x.py\nprint(1)\n```\n", "```python\n", "```text digits\n1\n```\n"),
     *("```\n", "~~~\n", "Output:\n\n", "```io\nINPUT: a\nPROCESS: b\n", "```mjcf error=x\n"),
+    "```bench box show=plot\n",
     *(
         '```quiz\n{"id": "q", "questions": [{"kind": "open", "q": "<p>$x$ \\\\$ a</p>",',
         "```lab\n{}",
