@@ -205,6 +205,11 @@ test('only a plane or a box whose material reflects makes a mirror', () => {
   assert.deepEqual(both.surfaces.map(({ solid, reflectance }) => [solid.type, reflectance]), [[6, 0.3], [0, 0.3]]) // prettier-ignore
 })
 
+test('what is added to a scene is seen before a face that it lies in', () => {
+  const { material } = new World(described()).decoration(6, 0)
+  assert.ok(material.polygonOffset && material.polygonOffsetFactor < 0 && material.polygonOffsetUnits < 0)
+})
+
 test('textures are made small by the mean of their texels', () => {
   const grey = (width, height, type, value) => ({
     name: 'a', type, width, height, channels: 1, srgb: false, data: Uint8Array.from({ length: width * height }, (_, i) => value(i % width, Math.floor(i / width))),

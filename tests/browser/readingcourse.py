@@ -95,6 +95,16 @@ PROCESS: ${WIDE}$
 OUTPUT: {URL}
 ```
 
+> [!solution] Code
+> Words of a solution, which keep to the column of the text however long they are, as they do here.
+>
+> ```text
+> {"code " * 30}
+> ```
+
+- A line with $\\sqrt u$, $x$ and $\\omega/2$.
+- A line without.
+
 ## Lab
 
 Before the lab.[^dock]

@@ -95,6 +95,33 @@ def test_wide_things_scroll_in_themselves(hosts: dict[str, Host], open_page: Any
         assert room[0] > 0 and room[1] == 0, selector
 
 
+@pytest.mark.parametrize("width", [800, 1200, 1440])
+def test_code_in_a_callout_is_as_wide_as_elsewhere(
+    hosts: dict[str, Host], open_page: Any, width: int
+) -> None:
+    page = open_page(hosts["nasty"].url + LESSON, width)
+
+    def end(selector: str) -> float:
+        box = page.locator(selector).first.bounding_box()
+        return float(box["x"] + box["width"])
+
+    assert end(".callout-solution > .code") == pytest.approx(end(".prose > .script"), abs=1)
+    assert end(".callout-solution > p >> nth=1") == pytest.approx(end(".prose > p"), abs=1)
+
+
+def test_formulas_of_usual_height_leave_lines_where_they_are(
+    hosts: dict[str, Host], open_page: Any
+) -> None:
+    page = open_page(hosts["nasty"].url + LESSON)
+    item = page.locator("li:has(msqrt)")
+    height = "e => e.getBoundingClientRect().height"
+    without = item.locator("xpath=following-sibling::li[1]")
+    assert item.evaluate(height) == without.evaluate(height)
+    end = "getBoundingClientRect().right"
+    gap = item.locator("msqrt").evaluate(f"e => e.{end} - e.querySelector('mi').{end}")
+    assert gap < 2, "nothing behind a root"
+
+
 # ------------------------------------------------------------------------------- line links
 
 

@@ -147,6 +147,25 @@ class TestMarkup:
         root = mathml(one(engine, r"a \not= b \not\in C"))
         assert [mo.text for mo in root.iter("mo")] == ["≠", "∉"]
 
+    @pytest.mark.parametrize(
+        ("tex", "is_propped"),
+        [
+            (r"\sqrt u", True),
+            (r"\sqrt{1-x^2}", True),
+            (r"\sqrt[3]{\dot q}", True),
+            (r"\sqrt{x_i}", False),
+            (r"\sqrt{\frac12}", False),
+            (r"\sqrt{\sum k}", False),
+        ],
+    )
+    def test_over_what_is_low_a_root_stands_as_over_a_capital(
+        self, engine: MathEngine, tex: str, is_propped: bool
+    ) -> None:
+        root = mathml(one(engine, tex))
+        heights = [space.get("height") for space in root.iter("mspace")]
+        assert ("0.7em" in heights) is is_propped
+        assert all(len(cubic) == 2 for cubic in root.iter("mroot"))
+
     def test_labels_become_no_ids(self, engine: MathEngine) -> None:
         result = one(engine, r"\tag{1}\label{introduction} x", True)
         assert isinstance(result, str) and " id=" not in result

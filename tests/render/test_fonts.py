@@ -81,6 +81,23 @@ def test_the_math_font_keeps_its_table_variants_and_italics(assets: Assets) -> N
     assert len(subset_font(job)) < 80_000
 
 
+def test_no_radical_is_much_wider_than_the_smallest(assets: Assets) -> None:
+    """A browser leaves room for the widest behind each root."""
+    (job,) = only(jobs(assets, ""), MATH)
+    font = cut(job)
+    radical = font.getBestCmap()[ord("√")]
+    variants = font["MATH"].table.MathVariants
+    drawn = variants.VertGlyphConstruction[variants.VertGlyphCoverage.glyphs.index(radical)]
+    names = {each.VariantGlyph for each in drawn.MathGlyphVariantRecord}
+    names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    assert len(names) >= 5
+    for name in names:
+        advance, bearing = font["hmtx"][name]
+        assert advance <= 1.07 * font["hmtx"][radical][0] + 1
+        assert bearing == font["glyf"][name].xMin
+        assert font["glyf"][name].xMax >= 0.7 * advance, "it meets the line"
+
+
 def test_even_every_math_letter_stays_far_below_the_whole_font(assets: Assets) -> None:
     letters = "".join(map(chr, [*range(0x1D400, 0x1D7FF), *range(0x2200, 0x2300)]))
     (job,) = only(jobs(assets, "", letters), MATH)
