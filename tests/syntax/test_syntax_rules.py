@@ -12,19 +12,9 @@ from coursebuild.rules import RULES
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "syntax"
 PACKAGE = Path(coursebuild.syntax.__file__).parent
 MODULES = [
-    *(
-        "bench",
-        "block_parser",
-        "callout",
-        "dispatch",
-        "document",
-        "fence",
-        "footnotes",
-        "headings",
-        "html",
-    ),
-    *("info", "inline_parser", "inlines", "io", "math", "mention", "mjcf", "recording", "script"),
-    *("session", "spans", "tables", "targets", "tree"),
+    *("bench", "block_parser", "callout", "dispatch", "document", "fence", "footnotes"),
+    *("headings", "html", "info", "inline_parser", "inlines", "io", "math", "mention", "mjcf"),
+    *("recording", "script", "session", "spans", "tables", "targets", "tree"),
 ]
 
 
