@@ -238,14 +238,19 @@ def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -
 
 _MODEL_NAMED = re.compile(
     r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?P<file>[\w./-]+)\.xml\b"""
+    r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
 )
 
 
 def models_named(script: Script) -> frozenset[str]:
-    """What may be models in a script: what it asks `model_path` for, and files that it names."""
+    """What may be models in a script.
+
+    What it asks `model_path` for, files that it names, and words that stand in quotes by
+    themselves, which a function of its own may hand on to `model_path`.
+    """
     found: set[str] = set()
     for match in _MODEL_NAMED.finditer(script.code.text):
-        name = (match["name"] or match["file"]).removesuffix(".xml")
+        name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")
         found.add(name.removeprefix("models/"))
     return frozenset(found)
 

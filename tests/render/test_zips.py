@@ -109,15 +109,22 @@ def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
         assert archive.testzip() is None
 
 
-def test_an_unpacked_script_finds_its_library_and_its_models(make: Make, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "load",
+    ['model_path("box")', '(lambda name: model_path(name))("box")'],
+    ids=["named", "handed on"],
+)
+def test_an_unpacked_script_finds_its_library_and_its_models(
+    make: Make, tmp_path: Path, load: str
+) -> None:
     root = Path(__file__).parents[2]
     library = tuple(
         OutputFile(path.relative_to(root).as_posix(), path.read_bytes())
         for path in sorted((root / "mjcourse").rglob("*.py"))
     )
-    text = """```python file=examples/a.py
+    text = f"""```python file=examples/a.py
 from mjcourse import model_path, spatial
-print(model_path("box").read_text().strip().splitlines()[0], spatial.__name__)
+print({load}.read_text().strip().splitlines()[0], spatial.__name__)
 ```
 """
     site = make(text).site(
