@@ -296,7 +296,8 @@ class _Writer:
         parts = ["<tr>\n"]
         for cell, align in zip(cells, table.align, strict=True):
             mark = f' class="align-{align}"' if align else ""
-            parts.append(f"<{tag}{mark}>{self.inlines(cell.children)}</{tag[:2]}>\n")
+            shown = tag if cell.children else "td"  # what is empty is the header of nothing
+            parts.append(f"<{shown}{mark}>{self.inlines(cell.children)}</{shown[:2]}>\n")
         return "".join([*parts, "</tr>\n"])
 
     # -- inlines

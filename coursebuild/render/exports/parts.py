@@ -40,8 +40,11 @@ class LessonPart:
 
 
 def anchor(lesson: str, id: str = _TOP) -> str:
-    """The id on the page of the whole course of what has an id in a lesson; of the lesson."""
-    return f"{lesson}--{id}"
+    """The id on the page of the whole course of what has an id in a lesson; of the lesson.
+
+    In a drawing an id must be a name of XML, which does not begin with a digit.
+    """
+    return f"_{lesson}--{id}"
 
 
 def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:

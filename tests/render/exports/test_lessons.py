@@ -225,9 +225,9 @@ def test_the_whole_course_is_one_page(files: dict[str, bytes]) -> None:
     assert len(ids) == len(set(ids))
     assert "data-lab" not in page and "data-quiz" not in page and "data-script" not in page
     assert '<meta name="robots" content="noindex">' in page
-    assert 'href="#1.1--more"' in page and 'id="1.1--more"' in page
-    assert 'href="#0.1--part"' in page and 'href="#1.1--_top"' in page
-    assert page.index('id="0.1--_top"') < page.index('id="1.1--_top"')
+    assert 'href="#_1.1--more"' in page and 'id="_1.1--more"' in page
+    assert 'href="#_0.1--part"' in page and 'href="#_1.1--_top"' in page
+    assert page.index('id="_0.1--_top"') < page.index('id="_1.1--_top"')
     assert page.count("<h1") == 1
     sound = [OutputFile(path, data) for path, data in files.items()]
     assert check_links(sound, "https://example.org/course/") == ()
@@ -243,8 +243,8 @@ def test_a_long_course_is_a_page_for_each_level(
         "course/1.html",
         "course/index.html",
     }
-    assert b'href="1.html#1.1--more"' in files["course/0.html"]
-    assert b'href="0.html#0.1--_top"' in files["course/index.html"]
+    assert b'href="1.html#_1.1--more"' in files["course/0.html"]
+    assert b'href="0.html#_0.1--_top"' in files["course/index.html"]
     sound = [OutputFile(path, data) for path, data in files.items()]
     assert check_links(sound, "https://example.org/course/") == ()
 
