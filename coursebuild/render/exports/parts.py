@@ -53,7 +53,8 @@ def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:
     assert isinstance(head, LessonHead), "the sheet of a lesson has its head"
     values = {"lesson": head, "draft": sheet.values["draft"], "article": article, "top": _TOP}
     html = str(tools.render("exports/lesson.html", **values))
-    page = Rules(sheet.path, prefix=anchor(head.id, ""), down=_DOWN, opened=_is_no_answer)
+    prefix = anchor(head.id, "")
+    page = Rules(sheet.path, prefix, down=_DOWN, opened=_is_no_answer, part=head.id)
     book = Rules(sheet.path, xml=True, pictures=SHOWN, without=_ON_PAPER)
     section, chapter = Rewriter(page), Rewriter(book)
     return LessonPart(

@@ -71,6 +71,8 @@ class Rules:
     """Endings of the pictures that can be shown; empty where all can."""
     without: frozenset[str] = frozenset()
     """Classes of elements that are left out, with all that is in them."""
+    part: str = ""
+    """What is added to the names of sections, which are to be unlike those of other parts."""
 
 
 class Rewriter:
@@ -187,6 +189,8 @@ class Rewriter:
             value = self._id(value)
         elif name in _REFERRING:
             value = " ".join(map(self._id, value.split()))
+        elif name == "aria-label" and start.name == "section" and rules.part:
+            value = f"{value}, {rules.part}"
         elif name in ("href", "xlink:href", "src"):
             # A picture inside a drawing is no part of the book.
             return "" if rules.xml and start.name == "image" else self._address(name, value)

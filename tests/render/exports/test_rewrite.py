@@ -20,7 +20,7 @@ def xml(html: str) -> str:
 
 
 def moved(html: str) -> str:
-    rules = Rules(PAGE, prefix="1.1--", down=2)
+    rules = Rules(PAGE, prefix="1.1--", down=2, part="1.1")
     return filled(Rewriter(rules).text(html), lambda path, anchor, shown: f"{path}#{anchor}")
 
 
@@ -75,6 +75,8 @@ def test_as_xml(html: str, expected: str) -> None:
         ('<a href="../about.html">c</a>', '<a href="about.html#">c</a>'),
         ('<a href="https://x.example/?a=1&amp;b=2">c</a>', '<a href="https://x.example/?a=1&amp;b=2">c</a>'),
         ('<p aria-labelledby="a b">c</p>', '<p aria-labelledby="1.1--a 1.1--b">c</p>'),
+        ('<section aria-label="Quiz">c</section>', '<section aria-label="Quiz, 1.1">c</section>'),
+        ('<p aria-label="Quiz">c</p>', '<p aria-label="Quiz">c</p>'),
         ('<path clip-path="url(#a)"/>', '<path clip-path="url(#1.1--a)"/>'),
         ("a &amp; b &nbsp;", "a &amp; b &nbsp;"),
     ],
