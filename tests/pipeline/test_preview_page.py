@@ -138,9 +138,11 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
               }
               return page.innerHTML
             }"""
+            see(page.locator(".question.is-live"))  # its script comes when it is needed
             living = page.evaluate(structure)
             opened.unbroken()
             page.reload()
+            see(page.locator(".question.is-live"))
             assert page.evaluate(structure) == living
 
 
