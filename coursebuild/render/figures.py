@@ -1,17 +1,19 @@
 """Measured figures as a page sets them: numbers in words of a book, and tables.
 
 Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, numbers; `said`,
-`sentence`; `again`, the command that makes them again.
+`sentence`, `about_reference`; `again`, the command that makes them again.
 """
 
 from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Iterator
 
 from markupsafe import Markup, escape
 
-from coursebuild.measured.bench import Machine
+from coursebuild.measured.bench import Machine, ScenarioReport
+from coursebuild.measured.cases import ReferenceLine
 from coursebuild.render.strings import Strings
 from coursebuild.values import dataclass
 
@@ -168,3 +170,15 @@ def sentence(text: str) -> str:
 def again(command: str, *names: str) -> str:
     """What to type to have it measured again."""
     return " ".join(["coursebuild", command, *map(shlex.quote, names)])
+
+
+def about_reference(
+    words: Strings, kind: str, reference: ScenarioReport | ReferenceLine
+) -> Iterator[str]:
+    """What errors were measured against, in sentences; `kind` is `closed`, `ode` or `self`."""
+    floor = power(reference.floor, 1)
+    yield said(words, f"measured.reference_{kind}", source=reference.source, floor=floor)
+    if reference.second:
+        yield words("measured.second", source=reference.second)
+    if reference.agreement is not None:
+        yield said(words, "measured.agreement", difference=power(reference.agreement, 2))

@@ -14,13 +14,13 @@ from coursebuild.render import urls
 from coursebuild.render.figures import (
     Grid,
     Part,
+    about_reference,
     again,
     bounded,
     exact,
     grid,
     percent,
     power,
-    said,
     sentence,
 )
 from coursebuild.render.library import Library
@@ -113,14 +113,7 @@ def _case(words: Strings, report: CaseReport) -> CaseView:
 def _about(words: Strings, report: CaseReport) -> list[str]:
     told = [sentence(report.note)] if report.note else []
     found = report.reference
-    if found is not None:
-        kind = f"measured.reference_{found.kind}"
-        told.append(said(words, kind, source=found.source, floor=power(found.floor, 1)))
-        if found.second:
-            told.append(words("measured.second", source=found.second))
-        if found.agreement is not None:
-            told.append(said(words, "measured.agreement", difference=power(found.agreement, 2)))
-    return told
+    return told if found is None else [*told, *about_reference(words, found.kind, found)]
 
 
 def _merged(rows: _Rows) -> tuple[list[str], list[tuple[str, ...]]]:

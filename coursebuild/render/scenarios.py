@@ -24,6 +24,7 @@ from coursebuild.measured.points import (
 )
 from coursebuild.render.figures import (
     Grid,
+    about_reference,
     bounded,
     factor,
     grid,
@@ -94,13 +95,7 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
     parts = [] if usual is None else solving_parts(usual)
     if parts:
         told.append(words("measured.usual", setting=", ".join(parts)))
-    kind = f"measured.reference_{report.reference}"
-    told.append(said(words, kind, source=report.source, floor=power(report.floor, 1)))
-    if report.second:
-        told.append(words("measured.second", source=report.second))
-        if report.agreement is not None:
-            told.append(said(words, "measured.agreement", difference=power(report.agreement, 2)))
-    return told
+    return [*told, *about_reference(words, report.reference, report)]
 
 
 def _settings(words: Strings, report: ScenarioReport) -> Grid:

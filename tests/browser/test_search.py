@@ -65,23 +65,16 @@ def site(folder: Folder) -> Iterator[str]:
         yield address
 
 
-@pytest.fixture
-def window(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
-    size = {"width": 1000, "height": 800}
-    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
-        yield context
-
-
 Opened = Callable[..., Page]
 
 
 @pytest.fixture
-def opened(window: BrowserContext, site: str) -> Iterator[Opened]:
+def opened(calm: BrowserContext, site: str) -> Iterator[Opened]:
     """Opens a page, by default that of lesson 1.1; what it says to the console must be nothing."""
     said: list[str] = []
 
     def opened(path: str = "lessons/1.1-one.html", base: str = site) -> Page:
-        page, lines = watched(window)
+        page, lines = watched(calm)
         page.goto(base + path)
         said.extend(lines)
         page.on("console", lambda message: said.append(message.text))
@@ -273,9 +266,9 @@ def test_a_lesson_is_marked_as_read(opened: Opened) -> None:
 
 
 def test_a_link_to_the_section_is_copied_and_it_is_said(
-    opened: Opened, window: BrowserContext
+    opened: Opened, calm: BrowserContext
 ) -> None:
-    window.grant_permissions(["clipboard-read", "clipboard-write"])
+    calm.grant_permissions(["clipboard-read", "clipboard-write"])
     page = opened("lessons/1.1-one.html#tensor")
     open_by_key(page)
     ask(page, "> copy link")
@@ -333,8 +326,8 @@ def test_from_a_disk(folder: Folder, opened: Opened) -> None:
     assert page.locator(".found-pages a").first.inner_text() == "1.1 Lesson one"
 
 
-def test_closed_storage_is_no_matter(opened: Opened, window: BrowserContext) -> None:
-    window.add_init_script(
+def test_closed_storage_is_no_matter(opened: Opened, calm: BrowserContext) -> None:
+    calm.add_init_script(
         "Object.defineProperty(window, 'localStorage', { get() { throw new Error('closed') } })"
     )
     page = opened()
@@ -385,9 +378,9 @@ def test_without_a_script_the_page_says_so(browsers: dict[str, Browser], site: s
         assert page.url == site + "index.html"
 
 
-def test_an_index_that_does_not_come_is_told(opened: Opened, window: BrowserContext) -> None:
-    window.route("**/assets/search/*.js", lambda route: route.abort())
-    page, _ = watched(window)
+def test_an_index_that_does_not_come_is_told(opened: Opened, calm: BrowserContext) -> None:
+    calm.route("**/assets/search/*.js", lambda route: route.abort())
+    page, _ = watched(calm)
     page.goto(opened().url)
     open_by_key(page)
     page.locator("#_search-field").fill("inertia")
@@ -396,16 +389,16 @@ def test_an_index_that_does_not_come_is_told(opened: Opened, window: BrowserCont
 
 
 def test_a_list_of_pages_from_before_is_loaded_anew(
-    opened: Opened, window: BrowserContext, folder: Folder
+    opened: Opened, calm: BrowserContext, folder: Folder
 ) -> None:
     """The site was built anew since the browser kept the list, and the files in it have gone."""
     text = folder.text("public/search/index.js")
     names = json.loads(text.partition(',"",')[2].rstrip()[:-1])["files"]
     old = text.replace(names, "0" * len(names))
-    window.route(
+    calm.route(
         "**/search/index.js", lambda route: route.fulfill(body=old, content_type="text/javascript")
     )
-    page, _ = watched(window)
+    page, _ = watched(calm)
     page.goto(opened().url)
     open_by_key(page)
     assert ask(page, "inertia tensor")[0].startswith("1.1 Lesson one")
