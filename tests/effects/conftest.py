@@ -1,4 +1,4 @@
-"""Scripts that several tests run stand beside them; and a user whom permissions hold back."""
+"""Scripts that several tests run stand beside them; ways to run them, and a user who may little."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from runnerkit import Run, job, run_scripts, way
+
+from coursebuild.results import ScriptRun
+
 NOBODY = 65534
 
 
@@ -27,3 +32,27 @@ def held_back() -> Iterator[Path]:
         finally:
             if root:
                 os.seteuid(0)
+
+
+@pytest.fixture(params=[True, False], ids=["forked", "spawned"])
+def both_ways(request: pytest.FixtureRequest) -> None:
+    """Scripts are run forked from a server, and each with an interpreter of its own."""
+    way["fork"] = request.param
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    root = tmp_path / "a course"
+    (root / "examples").mkdir(parents=True)
+    return root
+
+
+@pytest.fixture
+def run(root: Path) -> Run:
+    def run_one(code: str | bytes, **options: object) -> ScriptRun:
+        data = code if isinstance(code, bytes) else code.encode()
+        (root / "examples/x.py").write_bytes(data)
+        (result,) = run_scripts(root, [job(**options)], parallel=1)  # type: ignore[arg-type]
+        return result
+
+    return run_one

@@ -1,0 +1,79 @@
+"""A desk: a course folder on which runs of scripts are made up, and files are real."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from coursebuild.effects.shared import shared_cache
+from coursebuild.effects.store import Store
+from coursebuild.pipeline.remember import Memory
+from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
+
+SCRIPT = b"print('hello')\n"
+PATH = "examples/a.py"
+JOB = ScriptJob(PATH, (), 10.0, (), False)
+NOTHING = Trace((), (), (), (), "")
+LOOKED = Trace(("models/a.xml", "models/none.xml"), (), (), (), "")
+
+
+@dataclass
+class Desk:
+    """A course folder, and commands on it one after the other."""
+
+    root: Path
+    fresh: bool = False
+    shared: str | None = None
+    told: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.write(PATH, SCRIPT)
+        self.write("models/a.xml", b"<mujoco/>")
+        self.settle()
+
+    def write(self, path: str, data: bytes) -> None:
+        full = self.root / path
+        full.parent.mkdir(parents=True, exist_ok=True)
+        full.write_bytes(data)
+
+    def settle(self) -> None:
+        """Let the clock of the file system go on: what was written was written before."""
+        time.sleep(0.012)
+
+    def memory(self) -> Memory:
+        """That of a new command."""
+        shared = None if self.shared is None else shared_cache(self.shared)
+        store = Store(self.root, fresh=self.fresh, shared=shared)
+        store.listen(self.told.append)
+        return Memory(self.root, store)
+
+    def recall(self, job: ScriptJob = JOB, text: bytes = SCRIPT) -> ScriptRun | None:
+        memory = self.memory()
+        return memory.recall([memory.inputs(job, text)]).get(job.path)
+
+    def run(
+        self,
+        trace: Trace | None = NOTHING,
+        job: ScriptJob = JOB,
+        text: bytes = SCRIPT,
+        during: object = None,
+        **fields: object,
+    ) -> Memory:
+        """A run that looked at these things, and what is remembered of it."""
+        memory = self.memory()
+        memory.begin()
+        memory.started(job.path)
+        if callable(during):
+            self.settle()
+            during()
+        made = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
+        memory.keep(memory.inputs(job, text), replace(made, **fields))  # type: ignore[arg-type]
+        memory.close()
+        memory.store.close()
+        return memory
+
+    def why(self) -> str:
+        last = self.memory().last(PATH)
+        assert last is not None
+        return last.forgotten
