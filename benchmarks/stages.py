@@ -20,7 +20,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from coursebuild.checks import course_formulas
+from coursebuild.checks.formulas import course_formulas
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.store import kept
 from coursebuild.effects.v8 import MathEngine

@@ -18,14 +18,15 @@ length can be held, of which few places are ever shown.
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass, field
 
-_NEWLINE = re.compile(r"\r\n|\r|\n")
+_NEWLINE = pattern(r"\r\n|\r|\n")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,12 @@ class Source:
     def line_starts(self) -> list[int]:
         """Offsets at which lines begin; a line ends with LF, CRLF or CR, as in CommonMark."""
         if not self._line_starts:
-            starts = [0, *(m.end() for m in _NEWLINE.finditer(self.text))]
+            text = self.text
+            if "\r" in text:
+                starts = [0, *[m.end() for m in _NEWLINE.finditer(text)]]
+            else:
+                sizes = [len(line) + 1 for line in text.split("\n")]
+                starts = list(accumulate(sizes[:-1], initial=0))
             if self._read is not None:
                 return starts
             self._line_starts.extend(starts)
@@ -220,15 +226,22 @@ class Excerpt:
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The source span that `text[start:end]` came from, with what lies between its pieces."""
         end = len(self.text) if end is None else end
+        pieces, size = self.pieces, len(self.source.text)
+        if len(pieces) == 1:
+            shift = pieces[0][1] - pieces[0][0]
+            first = min(start + shift, size)
+            return Span(self.source, first, max(first, min(end + shift, size)))
         first = self.offset(start)
         last = self.offset(end - 1) + 1 if end > start else first
-        return Span(self.source, first, max(first, min(last, len(self.source.text))))
+        return Span(self.source, first, max(first, min(last, size)))
 
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
         end = len(self.text) if end is None else end
         if len(self.pieces) == 1:
-            return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)),))
+            text_at, source_at = self.pieces[0]
+            at = min(source_at + start - text_at, len(self.source.text))
+            return Excerpt(self.source, self.text[start:end], ((0, at),))
         first = bisect_right(self.pieces, start, key=_text_offset)
         last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
         inner = ((t - start, s) for t, s in self.pieces[first:last])

@@ -6,7 +6,8 @@ go with it, and `dataclasses.fields` and `dataclasses.replace` work with its cla
 The standard one writes and compiles half a dozen methods for each class, when it is defined: for
 the classes of this tool that takes longer than building a lesson. Here
 
-1. a class gets its `__init__` when it is first called;
+1. a class gets its `__init__` when it has been called some times: of most only few values are made
+   in a run, and to write it takes as long as making thirty without;
 2. the other methods are the same for all classes, and know the fields;
 3. fields of frozen values are set through their slots, which is four times as fast as
    `object.__setattr__`.
@@ -124,13 +125,54 @@ else:
 
     # --- making a value
 
+    _calls = {}
+    _FEW = 12
+    """Calls of a class for which no `__init__` is written."""
+
     def _first_init(self, *args, **kwargs):
-        """Writes the class's own `__init__`, and calls it."""
+        """Makes the first values of a class, then writes the class's own `__init__`."""
         cls = type(self)
         while "__init__" not in cls.__dict__:  # a class that was derived without being decorated
             cls = cls.__mro__[1]
+        calls = _calls[cls] = _calls.get(cls, 0) + 1
+        if calls <= _FEW and _is_call(cls, args, kwargs):
+            _init(cls, self, args, kwargs)
+            return
         cls.__init__ = _written_init(cls)
+        _calls.pop(cls, None)
         cls.__init__(self, *args, **kwargs)
+
+    def _is_call(cls, args, kwargs):
+        """Whether there is a value for each parameter; what else is wrong a written one tells."""
+        parameters = [one for one in cls.__value_fields__ if one.init]
+        if len(args) > len(parameters):
+            return False
+        named = parameters[len(args) :]
+        left = len(kwargs)
+        for one in named:
+            if one.name in kwargs:
+                left -= 1
+            elif one.default is _MISSING and one.factory is _MISSING:
+                return False
+        return left == 0
+
+    def _init(cls, self, args, kwargs):
+        """What a written `__init__` does."""
+        given = iter(args)
+        for one in cls.__value_fields__:
+            value = next(given, _MISSING) if one.init else _MISSING
+            if value is _MISSING and one.init:
+                value = kwargs.get(one.name, _MISSING)
+            if value is _MISSING:
+                if one.factory is not _MISSING:
+                    value = one.factory()
+                elif one.default is not _MISSING:
+                    value = one.default
+                else:
+                    continue
+            getattr(cls, one.name).__set__(self, value)
+        if hasattr(cls, "__post_init__"):
+            self.__post_init__()
 
     def _written_init(cls):
         parameters, lines, names = [], [], {"_missing": _MISSING}

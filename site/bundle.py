@@ -10,8 +10,8 @@ command line for work on site/ itself:
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
 new folder beside; install the packages of the lock file there unless site/node_modules has them;
-run build.mjs; cut fonts, draw icons and compile templates (prepare_*.py); put the result in the
-place of site/dist. One process at a time does this (`exclusive`). Killed at any
+run build.mjs; cut fonts, draw icons, compile templates and compress scripts (prepare_*.py); put
+the result in the place of site/dist. One process at a time does this (`exclusive`). Killed at any
 point, it leaves site/dist whole or absent, and the next run clears up.
 
 Only the standard library is used here: the module runs in pip's build environment. POSIX only.
@@ -52,10 +52,12 @@ _SCRATCH = ".bundle-"
 _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
 _AHEAD = (
+    "site/prepare_copies.py",
     "site/prepare_fonts.py",
     "site/prepare_icons.py",
     "site/prepare_templates.py",
     "coursebuild/render/assets.py",
+    "coursebuild/render/compressed.py",
     "coursebuild/render/cutting.py",
     "coursebuild/render/fonts.py",
     "templates/icon.svg",
@@ -131,6 +133,7 @@ def bundle() -> bool:
             _run((sys.executable, str(SITE / "prepare_fonts.py"), str(out), str(DIST)), scratch)
             _run((sys.executable, str(SITE / "prepare_icons.py"), str(out), str(DIST)), scratch)
             _run((sys.executable, str(SITE / "prepare_templates.py"), str(out)), scratch)
+            _run((sys.executable, str(SITE / "prepare_copies.py"), str(out)), scratch)
         stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
         (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
         if DIST.exists():

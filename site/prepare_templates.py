@@ -2,8 +2,8 @@
 
     python site/prepare_templates.py FOLDER
 
-`site/bundle.py` calls it with the bundle that it makes. What Jinja makes of a template is Python;
-the tool only has to compile that, which takes a fifth of the time.
+`site/bundle.py` calls it with the bundle that it makes. A template becomes Python; the tool only
+has to compile that, and needs no Jinja.
 """
 
 import json
@@ -12,12 +12,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from coursebuild.effects.resources import template_texts
-from coursebuild.render.assets import generated
+from coursebuild.render.templates import made_ahead
 
 
 def prepared() -> bytes:
-    """The Python of all templates by the names that `generated` gives them."""
-    text = json.dumps(generated(template_texts()), indent=1, ensure_ascii=False, sort_keys=True)
+    """The Python of all templates by the names that `made_ahead` gives them."""
+    text = json.dumps(made_ahead(template_texts()), indent=1, ensure_ascii=False, sort_keys=True)
     return f"{text}\n".encode()
 
 

@@ -15,7 +15,7 @@ PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"values"}),
+    frozenset({"values", "patterns"}),
     frozenset({"source", "drawing"}),
     frozenset({"rules"}),
     frozenset({"diagnostics"}),

@@ -187,3 +187,70 @@ def test_like_the_same_class_of_the_standard_library(ours: Any, options: dict[st
         if a.__hash__ is not None:
             assert hash(a) == hash(b)
         assert (a == ours(1, "a")) == (b == theirs(1, "a"))
+
+
+CALLS: list[tuple[tuple[object, ...], dict[str, object]]] = [
+    ((), {}),
+    ((1,), {}),
+    ((1, 2), {}),
+    ((1, 2, [3]), {}),
+    ((1, 2, [3], 4), {}),
+    ((1, 2, [3], 4, 5), {}),
+    ((), {"a": 1}),
+    ((1,), {"b": 2}),
+    ((1,), {"a": 2}),
+    ((1,), {"d": 5}),
+    ((), {"c": [3], "b": 2, "a": 1}),
+    ((1, 2), {"e": 0}),
+]
+
+
+def some_classes() -> tuple[Any, ...]:
+    """New classes, none of which was ever called."""
+
+    @values.dataclass(slots=True)
+    class Some:
+        a: object
+        b: object = 2
+        c: list[int] = values.field(default_factory=list)
+        d: object = values.field(default=4, init=False)
+        seen: object = values.field(init=False)
+
+        def __post_init__(self) -> None:
+            self.seen = (self.a, self.b)
+
+    @values.dataclass(slots=True)
+    class Other(Some):
+        e: object = 1
+
+    class Plain(Other):
+        pass
+
+    return Some, Other, Plain
+
+
+@pytest.mark.parametrize("call", CALLS, ids=repr)
+@pytest.mark.parametrize("which", range(3))
+def test_the_first_values_are_made_like_the_others(which: int, call: Any) -> None:
+    def outcome(cls: Any) -> object:
+        try:
+            value = cls(*call[0], **call[1])
+        except TypeError as error:
+            return str(error)
+        return [getattr(value, name, None) for name in ("a", "b", "c", "d", "e", "seen")]
+
+    new, used = some_classes()[which], some_classes()[which]
+    for _ in range(30):
+        used(1)
+    assert outcome(new) == outcome(used)
+    assert outcome(new) == outcome(used)
+
+
+def test_the_first_values_do_not_share_what_is_made_for_them() -> None:
+    @values.dataclass(frozen=True, slots=True)
+    class Holder:
+        items: list[int] = values.field(default_factory=list)
+
+    one, other = Holder(), Holder()
+    one.items.append(1)
+    assert other.items == []

@@ -91,10 +91,15 @@ def all_tools(places: Places) -> list[Tool]:
 
 
 def environment(places: Places) -> dict[str, str]:
-    """For all of them."""
+    """For all of them.
+
+    Python keeps what it compiled, as it does for readers: a tool that is tried out of its sources
+    would otherwise compile them anew in each run, which those that are installed do not.
+    """
     paths = [str(HERE), os.environ.get("PYTHONPATH", "")]
+    kept = {name: v for name, v in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return {
-        **os.environ,
+        **kept,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
         "NO_MKDOCS_2_WARNING": "1",
         "ELEVENTY_TELEMETRY": "0",

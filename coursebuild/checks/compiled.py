@@ -19,11 +19,12 @@ from coursebuild.checks.benches import check_keyframes, declared_scenarios
 from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Bench, Course, Lab, Mjcf, document_blocks
+from coursebuild.patterns import pattern
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Excerpt, Span
 from coursebuild.values import dataclass
 
-_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+_PART = pattern(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)

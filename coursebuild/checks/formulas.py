@@ -25,8 +25,10 @@ from coursebuild.source import Excerpt
 def _uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
     """Every formula that says something; an empty one is the parser's to report."""
     for block in document_blocks(document):
-        if isinstance(block, MathBlock) and block.tex.text.strip():
-            yield Formula(block.tex.text, True), block.tex
+        if isinstance(block, MathBlock):
+            if block.tex.text.strip():
+                yield Formula(block.tex.text, True), block.tex
+            continue
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Math) and inline.tex.text.strip():
                 yield Formula(inline.tex.text, inline.display), inline.tex
@@ -54,6 +56,8 @@ def formula_findings(
 ) -> tuple[Diagnostic, ...]:
     """The same of one document."""
     found: list[Diagnostic] = []
+    if not any(isinstance(result, MathError) for result in typeset.values()):
+        return ()
     for formula, tex in _uses(document):
         result = typeset[formula]
         if not isinstance(result, MathError):

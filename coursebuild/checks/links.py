@@ -50,6 +50,7 @@ from coursebuild.model import (
     walk_inlines,
 )
 from coursebuild.model.equations import equation_ids
+from coursebuild.patterns import pattern
 from coursebuild.source import Span
 from coursebuild.values import dataclass
 
@@ -58,8 +59,8 @@ _Name: TypeAlias = (
     LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
 )
 
-_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
-_HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
+_HTML_ID = pattern(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ANCHOR = pattern(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ import enum
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -171,20 +172,32 @@ class _Update:
 
     def _look(self, path: str) -> tuple[Obstacle | None, bytes | None]:
         """What stands at a path: an obstacle, or the bytes of a file, or nothing."""
-        full = self.root / path
-        for folder in reversed(full.relative_to(self.root).parents[:-2]):
-            if (self.root / folder).is_symlink():
+        folders = [at for at, c in enumerate(path) if c == "/"][1:]  # not `examples` itself
+        for end in folders:
+            mode = self._mode(path[:end])
+            if mode is not None and stat.S_ISLNK(mode):
                 return Obstacle.LINK, None
-            if (self.root / folder).exists() and not (self.root / folder).is_dir():
+            if mode is not None and not stat.S_ISDIR(mode):
                 return Obstacle.FOLDER, None
-        if full.is_symlink():
+        mode = self._mode(path)
+        if mode is None:
+            return None, None
+        if stat.S_ISLNK(mode):
             return Obstacle.LINK, None
-        if full.exists() and not full.is_file():
+        if not stat.S_ISREG(mode):
             return Obstacle.FOLDER, None
         try:
-            return None, full.read_bytes()
+            with open(f"{self.root}/{path}", "rb", buffering=0) as file:  # noqa: PTH123
+                return None, file.read()
         except FileNotFoundError:
             return None, None
+
+    def _mode(self, path: str) -> int | None:
+        """What stands at a path itself, where a link is a link; `None` for nothing."""
+        try:
+            return os.lstat(f"{self.root}/{path}").st_mode
+        except (FileNotFoundError, NotADirectoryError):
+            return None
 
     def _write(self, path: str) -> None:
         (self.root / path).parent.mkdir(parents=True, exist_ok=True)

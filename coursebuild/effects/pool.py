@@ -61,9 +61,18 @@ class _Copy:
 class Pool(Generic[Ask, Answer]):
     """Forked processes that all answer with the same function, or none."""
 
-    def __init__(self, answer: Callable[[Ask], Answer], count: int) -> None:
-        """Fork `count` copies now; with none, or where that fails, all is answered here."""
+    def __init__(
+        self,
+        answer: Callable[[Ask], Answer],
+        count: int,
+        begin: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Fork `count` copies now; with none, or where that fails, all is answered here.
+
+        `begin` is called in each copy before its first request.
+        """
         self._answer = answer
+        self._begin = begin
         self._copies: list[_Copy | None] = []
         try:
             gc.freeze()  # what there is now is not looked through in the copies
@@ -182,7 +191,7 @@ class Pool(Generic[Ask, Answer]):
                 os.close(fd)
             raise
         if process == 0:
-            _serve(self._answer, inward, outward)
+            _serve(self._begin, self._answer, inward, outward)
         os.close(inward)
         os.close(outward)
         return _Copy(process, requests, answers)
@@ -208,7 +217,9 @@ class _Work:
         return None
 
 
-def _serve(answer: Callable[[Any], Any], inward: int, outward: int) -> NoReturn:
+def _serve(
+    begin: Callable[[], None], answer: Callable[[Any], Any], inward: int, outward: int
+) -> NoReturn:
     """What a copy does until its input ends."""
     status = 1
     try:
@@ -216,6 +227,7 @@ def _serve(answer: Callable[[Any], Any], inward: int, outward: int) -> NoReturn:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         _close_others(inward, outward)
+        begin()
         while (data := _read(inward)) is not None:
             try:
                 reply = pickle.dumps((True, answer(pickle.loads(data))), pickle.HIGHEST_PROTOCOL)

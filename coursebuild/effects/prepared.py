@@ -1,7 +1,7 @@
-"""What comes with the tool made ahead: fonts cut already, or ready to be cut, and templates.
+"""What comes with the tool made ahead: fonts cut or ready to be cut, templates, compressed copies.
 
-Entry points: `prepared_cut`, `prepared_source`; `prepared_template`. `site/prepare_fonts.py` and
-`site/prepare_templates.py` make the files when site/dist is made.
+Entry points: `prepared_cut`, `prepared_source`; `prepared_template`; `prepared_copy`. The modules
+`site/prepare_*.py` make the files when site/dist is made.
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
 2. Every font is there a second time, with all done that does not depend on the course: what is cut
@@ -9,7 +9,8 @@ Entry points: `prepared_cut`, `prepared_source`; `prepared_template`. `site/prep
    often.
 
 Where the way of cutting is another than when the files were made, no key is found, and everything
-is cut from the whole fonts. So it is with templates that were changed since, which are compiled.
+is cut from the whole fonts. So it is with templates that were changed since, which are compiled,
+and with what is to be compressed.
 """
 
 from __future__ import annotations
@@ -44,8 +45,24 @@ def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
 
 
 def prepared_template(name: str) -> str | None:
-    """The Python of a template, by the name that `render.assets.generated` gives it."""
+    """The Python of a template, by the name that `render.templates.made_ahead` gives it."""
     return _templates().get(name)
+
+
+def prepared_copy(key: str) -> bytes | None:
+    """A compressed copy, by the key that `render.compressed` gives it."""
+    file = _copies().get(key)
+    return None if file is None else (assets_dir() / FOLDER / file).read_bytes()
+
+
+@functools.cache
+def _copies() -> dict[str, str]:
+    try:
+        text = (assets_dir() / FOLDER / "copies.json").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return {}
+    copies: dict[str, str] = json.loads(text)
+    return copies
 
 
 @functools.cache

@@ -193,12 +193,12 @@ class _Reader:
         if not _is_text(path):
             self._refuse(path, "has a name that is not UTF-8")
             return
-        full = self.root / path
+        full = f"{self.root}/{path}"
         if is_link and not Path(os.path.realpath(full)).is_relative_to(self.root):
             self._refuse(path, _OUTSIDE)
             return
         try:
-            mode = full.stat().st_mode
+            mode = os.stat(full).st_mode  # noqa: PTH116
         except FileNotFoundError:
             if is_link:
                 self._refuse(path, "is a link to a file that is not there")
@@ -267,15 +267,21 @@ class _Reader:
 def _read_regular(path: Path | str, flags: int = 0) -> bytes:
     """The bytes of a regular file; never waits, whatever stands at the path."""
     fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
-    with os.fdopen(fd, "rb") as file:
-        if not stat.S_ISREG(os.fstat(fd).st_mode):
+    try:
+        status = os.fstat(fd)
+        if not stat.S_ISREG(status.st_mode):
             raise OSError("it is not a regular file")
-        return file.read()
+        parts = [os.read(fd, status.st_size + 1)]
+        while parts[-1]:
+            parts.append(os.read(fd, 1 << 20))
+        return b"".join(parts)
+    finally:
+        os.close(fd)
 
 
 def _is_text(path: str) -> bool:
     """Whether a path is proper Unicode (Python keeps other bytes as lone surrogates)."""
-    return not any("\udc80" <= c <= "\udcff" for c in path)
+    return path.isascii() or not any("\udc80" <= c <= "\udcff" for c in path)
 
 
 def _guess(data: bytes) -> str:

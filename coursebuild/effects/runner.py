@@ -137,14 +137,13 @@ class ScriptServer:
         if server is not None:
             server.close()
 
-    def expect(self, root: Path, paths: Iterable[str]) -> None:
-        """Begin to import what these scripts import, without waiting for it."""
+    def expect(self, packages: Sequence[str]) -> None:
+        """Begin to import packages that scripts will import, without waiting for it."""
         if not self._fork:
             return
         environment = _environment(self._place)
-        with contextlib.suppress(ServerLostError):  # which the run will find too
-            server = self._usable(environment)
-            server.expect(wanted_packages(root / path for path in paths))
+        with contextlib.suppress(ServerLostError, OSError):  # which the run will find too
+            self._usable(environment).expect(packages)
 
     def run(
         self,

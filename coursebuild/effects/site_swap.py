@@ -6,9 +6,9 @@ for those who serve.
 1. The place is checked: never the project or what its author wrote, never a folder with files that
    we did not put there.
 2. What killed builds left beside it is removed; what a running build has there is not.
-3. Every file is written into a fresh folder beside the place, on the same file system. One that was
-   published before under the same key, and is whole, is linked from the old site instead; where all
-   are, the old site stays.
+3. Every file is written into a fresh folder beside the place, on the same file system
+   (`site_files`). One that was published before under the same key, and is whole, is linked from
+   the old site instead; where all are, the old site stays.
 4. The two folders are exchanged in one step. Where the system cannot, the old one is renamed away
    and the new one renamed in; a build that was killed between the two is mended by `recover`.
 5. The old site is removed.
@@ -21,19 +21,20 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import functools
 import hashlib
 import os
 import shutil
 import stat
 import unicodedata
 from collections.abc import Callable, Container, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 from coursebuild.effects.exchange import exchange
 from coursebuild.effects.locks import is_abandoned, try_lock
 from coursebuild.effects.published import Entry, Published, write_published
+from coursebuild.effects.site_files import write_file, writing
 from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
 from coursebuild.values import dataclass
 
@@ -87,7 +88,13 @@ def check_out(root: Path, out: Path) -> Path:
 
 
 def publish(
-    root: Path, out: Path, files: Iterable[SiteFile], listed: FileList | None = None
+    root: Path,
+    out: Path,
+    files: Iterable[SiteFile],
+    listed: FileList | None = None,
+    *,
+    jobs: int = 1,
+    stage: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> tuple[str, ...]:
     """Replace the site at `out` by these files.
 
@@ -96,6 +103,8 @@ def publish(
         out: where the site goes; a link to a folder stays one.
         files: each path once; POSIX, relative, without `..`.
         listed: a file that is made of what all these are.
+        jobs: copies of this process, at most, that make and write files where there are many.
+        stage: is entered when the files are made.
 
     Returns:
         The paths of the files that were written, sorted: the others are as they were.
@@ -117,7 +126,7 @@ def publish(
         _clean(place)
         staging = _Staging.make(place)
         try:
-            entries, made = site.write(staging.path)
+            entries, made = site.write(staging.path, jobs, stage)
             staging.path.chmod(_mode(place))
             _swap(staging.path, place)
         finally:
@@ -198,32 +207,36 @@ class _Site:
             return False
         return len(found) == len(paths) and paths.issuperset(found) and marker == _marker(paths)
 
-    def write(self, folder: Path) -> tuple[dict[str, Entry], list[str]]:
+    def write(
+        self, folder: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
+    ) -> tuple[dict[str, Entry], list[str]]:
         """Fill a folder; gives its record, and what is new in it."""
-        folders = {""}
+        folders, paths = {""}, set[str]()
         entries: dict[str, Entry] = {}
-        made: list[str] = []
-
-        def put(path: str, key: str, make: Callable[[], Iterable[bytes]]) -> None:
-            _check_path(path, entries)
-            parent = path.rpartition("/")[0]
-            if parent not in folders:
-                _make_folders(folder, parent, folders)
-            target = f"{folder}/{path}"
-            if self._linked(path, key, target):
-                digest = self.old.entries[path].digest
-            else:
-                digest = _write_file(target, make())
-                made.append(path)
-            entries[path] = Entry.of(key, digest, os.lstat(target))
-
+        new: list[tuple[SiteFile, str]] = []
         for file, key in self.files:
-            put(file.path, key, functools.partial(_pieces, file))
+            target = _room(folder, file.path, folders, paths)
+            if self._linked(file.path, key, target):
+                digest = self.old.entries[file.path].digest
+                entries[file.path] = Entry.of(key, digest, os.lstat(target))
+            else:
+                new.append((file, key))
+        with writing(folder, new, jobs) as written, stage():
+            entries |= written()
+        made = [file.path for file, _ in new]
         if self.listed is not None:
-            facts = [FileFacts(p, e.digest, e.size) for p, e in sorted(entries.items())]
-            listed = self.listed
-            put(listed.path, self._list_key(listed), lambda: (listed.make(facts),))
-        _write_file(f"{folder}/{MARKER}", (_marker(entries),))
+            listed, key = self.listed, self._list_key(self.listed)
+            target = _room(folder, listed.path, folders, paths)
+            if self._linked(listed.path, key, target):
+                entries[listed.path] = Entry.of(
+                    key, self.old.entries[listed.path].digest, os.lstat(target)
+                )
+            else:
+                facts = [FileFacts(p, e.digest, e.size) for p, e in sorted(entries.items())]
+                digest = write_file(target, (listed.make(facts),))
+                entries[listed.path] = Entry.of(key, digest, os.lstat(target))
+                made.append(listed.path)
+        write_file(f"{folder}/{MARKER}", (_marker(entries),))
         return entries, made
 
     def _list_key(self, listed: FileList) -> str:
@@ -263,6 +276,16 @@ def _check_path(path: str, written: Container[str]) -> None:
         raise ValueError(f"the site has two files {path}")
 
 
+def _room(folder: Path, path: str, folders: set[str], paths: set[str]) -> str:
+    """Where a file is to be, in a folder that is there."""
+    _check_path(path, paths)
+    paths.add(path)
+    parent = path.rpartition("/")[0]
+    if parent not in folders:
+        _make_folders(folder, parent, folders)
+    return f"{folder}/{path}"
+
+
 def _make_folders(folder: Path, path: str, made: set[str]) -> None:
     parent = path.rpartition("/")[0]
     if parent not in made:
@@ -270,29 +293,6 @@ def _make_folders(folder: Path, path: str, made: set[str]) -> None:
     (folder / path).mkdir()
     (folder / path).chmod(0o755)
     made.add(path)
-
-
-def _pieces(file: SiteFile) -> Iterable[bytes]:
-    """The bytes of a file, at once or one after the other."""
-    if isinstance(file, OutputFile):
-        return (file.data,)
-    return (file.make(),) if file.pieces is None else file.pieces()
-
-
-def _write_file(path: str, pieces: Iterable[bytes]) -> str:
-    """Write a file; gives the hash of its bytes."""
-    digest = hashlib.sha256()
-    fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-    try:
-        for piece in pieces:
-            digest.update(piece)
-            rest = memoryview(piece)
-            while rest:
-                rest = rest[os.write(fd, rest) :]
-        os.fchmod(fd, 0o644)  # whatever the umask is
-    finally:
-        os.close(fd)
-    return digest.hexdigest()
 
 
 def _swap(staging: Path, place: Path) -> None:

@@ -1,6 +1,6 @@
 """JavaScript in this process: V8 with limits on time and memory, and Temml in it.
 
-Entry points: `MathEngine.typeset`; `Isolate`, for other scripts; `preload`.
+Entry points: `MathEngine.typeset`; `Isolate`, for other scripts.
 
 1. An isolate is made when it is first needed, and reused. mini-racer is imported then.
 2. Formulas cross the border many at a time, as JSON (see `typeset.js`).
@@ -13,8 +13,6 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import contextlib
-import ctypes
-import importlib.util
 import json
 import re
 import threading
@@ -25,6 +23,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar
 
 from coursebuild.effects.resources import assets_dir
+from coursebuild.effects.v8_start import start
 from coursebuild.results import Formula, MathError
 
 if TYPE_CHECKING:
@@ -37,13 +36,6 @@ _BATCH = 100
 _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
-
-
-_FLAGS = ("--single-threaded", "--wasm-sync-tier-up", "--no-opt")
-"""V8 has no threads here that would compile hot WebAssembly anew, and would stay with its first,
-several times slower code; so it does that at once, where it is. Of the two compilers for hot
-JavaScript the slower one is left out: typesetting a course would be over before it pays, and takes
-a fifth less without; the code of labs runs as fast with the other."""
 
 T = TypeVar("T")
 
@@ -178,22 +170,11 @@ class Isolate:
             raise ScriptError(str(error)) from None
 
 
-def preload() -> None:
-    """Load V8's code, so that copies of this process share it; none of it runs before they do.
-
-    To load it takes as long as to start it.
-    """
-    found = importlib.util.find_spec("py_mini_racer")
-    if found is not None and found.origin is not None:
-        with contextlib.suppress(OSError):
-            ctypes.CDLL(str(Path(found.origin).with_name("libmini_racer.so")))
-
-
 async def _make_context() -> MiniRacer:
     # Made inside a running loop, a context needs no thread of its own, and can be interrupted.
-    from py_mini_racer import MiniRacer, init_mini_racer
+    from py_mini_racer import MiniRacer
 
-    init_mini_racer(flags=_FLAGS, ignore_duplicate_init=True)
+    start()
     return MiniRacer()
 
 

@@ -1,164 +1,72 @@
 """Waiting for the author to save: changes of the course's files.
 
-Entry point: `Watcher`. What reading a course leaves out (caches, editors' own files) is no change.
+Entry point: `watcher`. What reading a course leaves out (caches, editors' own files) is no change.
 
 The folders of the course are watched with all that is in them. Pages may lie elsewhere
 (`docs/guide.md`, `README.md`): of their folders only these files count. Folders that are made later
 are watched from then on.
+
+Linux is asked itself (`watch_inotify`): it says at once what happened, and when a file that was
+written is closed. Elsewhere, and where its messages do not come, `watchfiles` is asked.
 """
 
 from __future__ import annotations
 
-import queue
-import threading
-from collections.abc import Callable, Iterator
+import os
+import sys
 from pathlib import Path
-
-from coursebuild.effects.errors import EffectError, reason
-
-_FOLDERS = ("content", "models", "mjcourse")
-_LOOK = 200
-"""Milliseconds from one look for new and removed folders to the next."""
-_STEP = 2
-"""Milliseconds from one look for events to the next: a save is told of within two of them."""
+from typing import Protocol
 
 
-class Watcher:
+class Watcher(Protocol):
     """Tells of saves, also of those while the caller does something else."""
-
-    def __init__(self, root: Path) -> None:
-        self._root = root
-        self._stop = threading.Event()
-        self._others: frozenset[str] = frozenset()
-        self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
-        self._begun = [threading.Event(), threading.Event()]
-        self._threads = [
-            threading.Thread(target=self._run, args=(watch, begun), name="watch", daemon=True)
-            for watch, begun in zip((self._folders, self._files), self._begun, strict=True)
-        ]
 
     def start(self) -> None:
         """Begin to watch; `wait` says when nothing is missed any more."""
-        for thread in self._threads:
-            thread.start()
 
     def wait(self) -> None:
         """Until no change is missed."""
-        for begun in self._begun:
-            begun.wait()
 
     @property
     def stopped(self) -> bool:
         """Whether it was stopped."""
-        return self._stop.is_set()
 
     def stop(self) -> None:
         """Watch no longer."""
-        self._stop.set()
-        self._events.put(frozenset())
-        for thread in self._threads:
-            if thread.is_alive():
-                thread.join(1.0)
 
     def watch_also(self, paths: frozenset[str]) -> None:
         """Files elsewhere that count as well, by POSIX path relative to the course's folder."""
-        self._others = frozenset(path for path in paths if path.split("/")[0] not in _FOLDERS)
 
-    def get(self, seconds: float | None = None) -> frozenset[str]:
+    def get(self, seconds: float) -> frozenset[str]:
         """Paths that changed, POSIX and relative to the root; empty where there is nothing new.
 
-        Waits for so long; without end if nothing is said.
+        Waits for so long.
 
         Raises:
             EffectError: changes cannot be watched.
         """
-        try:
-            found = self._events.get(timeout=seconds) if seconds != 0 else self._events.get_nowait()
-        except queue.Empty:
-            return frozenset()
-        if isinstance(found, OSError):
-            raise EffectError(
-                f"changes of files cannot be watched: {reason(found)}",
-                help="the system's limit of watched files may be reached (fs.inotify on Linux)",
-            )
-        return found
 
-    def _run(self, watch: Callable[[Callable[[], None]], None], begun: threading.Event) -> None:
-        try:
-            watch(begun.set)
-        except OSError as error:
-            self._events.put(error)
-        finally:
-            begun.set()
-
-    # --- the course's own folders
-
-    def _folders(self, begun: Callable[[], None]) -> None:
-        before: tuple[Path, ...] | None = None
-        while not self._stop.is_set():
-            folders = self._present()
-            if before is not None:
-                # Told of once they are watched: a file may be put into a new one at any time.
-                names = frozenset(path.name for path in {*folders} ^ {*before})
-                self._events.put(names)
-            for changed in self._watch(folders, recursive=True):
-                begun()
-                if changed:
-                    self._events.put(changed)
-                if self._present() != folders:
-                    break
-            before = folders
-
-    def _present(self) -> tuple[Path, ...]:
-        return tuple(self._root / name for name in _FOLDERS if (self._root / name).is_dir())
-
-    # --- files elsewhere
-
-    def _files(self, begun: Callable[[], None]) -> None:
-        begun()
-        while not self._stop.is_set():
-            others = self._others
-            folders = {(self._root / path).parent for path in others}
-            there = tuple(sorted(folder for folder in folders if folder.is_dir()))
-            for changed in self._watch(there, recursive=False):
-                if wanted := changed & others:
-                    self._events.put(wanted)
-                if self._others != others or any(not folder.is_dir() for folder in there):
-                    break
-                if len(there) < sum(folder.is_dir() for folder in folders):
-                    break
-
-    # --- both
-
-    def _watch(self, folders: tuple[Path, ...], *, recursive: bool) -> Iterator[frozenset[str]]:
-        """Changes in these folders; an empty set at first, and now and then."""
-        if not folders:
-            while not self._stop.is_set():
-                yield frozenset()
-                self._stop.wait(_LOOK / 1000)
-            return
-        from watchfiles import watch
-
-        for batch in watch(
-            *folders,
-            watch_filter=lambda _, path: self._is_source(path),
-            stop_event=self._stop,
-            debounce=5 * _STEP,
-            step=_STEP,
-            rust_timeout=_LOOK,
-            yield_on_timeout=True,
-            recursive=recursive,
-        ):
-            yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
-
-    def _is_source(self, path: str) -> bool:
-        try:
-            parts = Path(path).relative_to(self._root).parts
-        except ValueError:
-            return False
-        return bool(parts) and not any(map(_is_dropping, parts))
+    @property
+    def writing(self) -> bool:
+        """Whether something that `get` has told of is known to be not written to its end yet."""
 
 
-def _is_dropping(name: str) -> bool:
-    """Whether a file or folder of this name is an editor's, or Python's."""
-    return name.startswith((".", "#")) or name.endswith("~") or name in ("4913", "__pycache__")
+def watcher(root: Path) -> Watcher:
+    """What watches a course best on this machine."""
+    if _inotify_is_enough():
+        from coursebuild.effects.watch_inotify import InotifyWatcher
+
+        return InotifyWatcher(root)
+    from coursebuild.effects.watch_files import FilesWatcher
+
+    return FilesWatcher(root)
+
+
+def _inotify_is_enough() -> bool:
+    """Whether this is a Linux whose kernel sees every save: one inside of Windows does not.
+
+    Who has `watchfiles` look for changes itself knows why.
+    """
+    if sys.platform != "linux" or os.environ.get("WATCHFILES_FORCE_POLLING"):
+        return False
+    return "microsoft" not in os.uname().release.lower()

@@ -281,6 +281,9 @@ class ForkServer:
 
     def close(self) -> None:
         """End it; its supervisors have been dismissed."""
+        with contextlib.suppress(OSError):  # it has gone
+            # Copies of this process may hold the socket as well.
+            self._control.shutdown(socket.SHUT_RDWR)
         self._control.close()
         try:
             with contextlib.suppress(subprocess.TimeoutExpired):

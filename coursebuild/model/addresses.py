@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 
 from coursebuild.model.course import Course
 from coursebuild.model.inlines import LessonTarget, PageTarget, Target, UrlTarget
+from coursebuild.patterns import pattern
 
 
 def local_file(url: str, document_path: str) -> str:
@@ -76,7 +77,7 @@ def scenario_anchor(name: str) -> str:
     return f"measured-{name}"
 
 
-_LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
+_LINES = pattern(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
 
 
 def linked_lines(anchor: str) -> tuple[str, int, int] | None:

@@ -6,7 +6,8 @@ Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_b
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from coursebuild.model.blocks import (
     Block,
@@ -34,10 +35,9 @@ from coursebuild.model.interactive import (
 from coursebuild.source import Excerpt
 from coursebuild.values import replace
 
-_HOLDERS = (BlockQuote, Callout, ListBlock, Lab, Quiz, Recording)
+_HOLDERS = frozenset((BlockQuote, Callout, ListBlock, Lab, Quiz, Recording))
 """Blocks that may have others in them."""
-_LINES = (Heading, Paragraph, HtmlFlow)
-_AROUND = (Emphasis, Strong, Strikethrough, Link, Term)
+_AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
 """Inlines that may have others in them."""
 
 
@@ -68,21 +68,11 @@ def _question_blocks(question: AnyQuestion) -> tuple[Block, ...]:
 
 def block_inlines(block: Block) -> tuple[Inline, ...]:
     """The inlines directly inside a block (not inside its child blocks)."""
-    if isinstance(block, _LINES):
-        return block.children
-    if isinstance(block, Callout):
-        return block.title
-    if isinstance(block, Table):
-        return tuple(
-            i for row in (block.header, *block.rows) for cell in row for i in cell.children
-        )
-    if isinstance(block, Recording):
-        return block.caption
-    if isinstance(block, Io):
-        return (*block.input, *block.process, *block.output)
-    if isinstance(block, Quiz):
-        return tuple(i for q in block.questions for i in _question_inlines(q))
-    return ()
+    kind = type(block)
+    if kind in _LINES:
+        return block.children  # type: ignore[union-attr]
+    inner = _INLINES.get(kind)
+    return () if inner is None else inner(block)
 
 
 def _question_inlines(question: AnyQuestion) -> tuple[Inline, ...]:
@@ -93,11 +83,23 @@ def _question_inlines(question: AnyQuestion) -> tuple[Inline, ...]:
     return ()
 
 
+_LINES = frozenset((Paragraph, Heading, HtmlFlow))
+_INLINES: dict[type, Callable[[Any], tuple[Inline, ...]]] = {
+    Callout: lambda callout: callout.title,
+    Table: lambda table: tuple(
+        i for row in (table.header, *table.rows) for cell in row for i in cell.children
+    ),
+    Recording: lambda recording: recording.caption,
+    Io: lambda io: (*io.input, *io.process, *io.output),
+    Quiz: lambda quiz: tuple(i for q in quiz.questions for i in _question_inlines(q)),
+}
+
+
 def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
     """Every block in document order, a container before what it holds."""
     for block in blocks:
         yield block
-        if isinstance(block, _HOLDERS):
+        if type(block) in _HOLDERS:
             yield from walk_blocks(child_blocks(block))
 
 
@@ -129,8 +131,8 @@ def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
     """Every inline in order, a container before what it holds."""
     for inline in inlines:
         yield inline
-        if isinstance(inline, _AROUND):
-            yield from walk_inlines(inline.children)
+        if type(inline) in _AROUND:
+            yield from walk_inlines(inline.children)  # type: ignore[union-attr]
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coursebuild.checks import mjcf_texts
+from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.diagnostics import Severity
 from coursebuild.effects.environments import environment, needed, other_version
 from coursebuild.effects.errors import EffectError

@@ -5,6 +5,7 @@ Entry points: `build(options, out)`; `prepare(options, progress)`, what it would
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.site_swap import check_out, publish
-from coursebuild.pipeline.check import no_lessons
+from coursebuild.pipeline.check import no_lessons, scripts_ahead
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import judge
@@ -29,6 +30,7 @@ from coursebuild.results import FileList, Results, SiteFile
 from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
+    from coursebuild.effects.foresight import RunAll
     from coursebuild.measured.shown import Reports
     from coursebuild.model import Course
     from coursebuild.pipeline.site import Site
@@ -53,8 +55,14 @@ def build(options: Options, out: Path) -> Report:
     with project_lock(options.root, progress.say), prepare(options, progress) as prepared:
         if not prepared.report.ok:
             return replace(prepared.report, remarks=(_unpublished(options.root, out),))
-        with progress.stage("publishing"):
-            publish(options.root, options.root / out, prepared.files, prepared.listed)
+        publish(
+            options.root,
+            options.root / out,
+            prepared.files,
+            prepared.listed,
+            jobs=options.jobs,
+            stage=functools.partial(progress.stage, "publishing"),
+        )
     count = len(prepared.files) + (prepared.listed is not None)
     return replace(prepared.report, remarks=(f"published {count} files in {out}",))
 
@@ -75,12 +83,19 @@ def prepare(options: Options, progress: Progress, make: Make | None = None) -> I
     `make` puts other files together than those of the site.
     """
     aside = Aside(options.store.folder)
-    with Documents(options.store, options.jobs, progress.stage, aside) as documents:
-        yield _prepared(options, progress, documents, make)
+    with (
+        scripts_ahead(options) as run_all,
+        Documents(options.store, options.jobs, progress.stage, aside) as documents,
+    ):
+        yield _prepared(options, progress, documents, make, run_all)
 
 
 def _prepared(
-    options: Options, progress: Progress, documents: Documents, make: Make | None
+    options: Options,
+    progress: Progress,
+    documents: Documents,
+    make: Make | None,
+    run_all: RunAll | None,
 ) -> Prepared:
     began = time.monotonic()
     loaded = load(
@@ -90,11 +105,12 @@ def _prepared(
         documents.course_map,
         documents.declarations,
         documents.aside,
+        documents.check,
     )
     if loaded.course is None:
         report = judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
         return Prepared(report, ())
-    verified = verify(loaded.course, options, progress, static=True)
+    verified = verify(loaded.course, options, progress, static=True, run_all=run_all)
     reports = shown_reports(options.root, loaded.course)
     found = [*loaded.diagnostics, *verified.diagnostics, *no_lessons(loaded.course)]
     found += reports.diagnostics

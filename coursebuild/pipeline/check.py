@@ -1,16 +1,18 @@
 """`coursebuild check`: verify the course, or some lessons of it; publish nothing.
 
-Entry point: `check(options, names)`.
+Entry points: `check(options, names)`; `scripts_ahead`, what runs scripts, begun before reading.
 """
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.aside import Aside
+from coursebuild.effects.foresight import RunAll, early_server
 from coursebuild.effects.locks import project_lock
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.depends import depends_on
@@ -19,7 +21,6 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.shards import Shard, write_timings
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
@@ -29,6 +30,7 @@ from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.measured.sensitivity import Sensitivity
+    from coursebuild.pipeline.shards import Shard
 
 
 def check(
@@ -46,14 +48,25 @@ def check(
     are moved a little.
     """
     progress = Progress(quiet=options.quiet)
-    with project_lock(options.root, progress.say):
-        return _check(options, names, progress, shard, timings, sensitivity)
+    with project_lock(options.root, progress.say), scripts_ahead(options, names) as run_all:
+        return _check(options, names, progress, run_all, shard, timings, sensitivity)
+
+
+@contextlib.contextmanager
+def scripts_ahead(options: Options, names: tuple[str, ...] = ()) -> Iterator[RunAll | None]:
+    """What runs the scripts, where it is worth beginning before the texts are read."""
+    if names or options.jobs == 1 or options.executor is not None:
+        yield None
+        return
+    with early_server(options.root, options.store) as run_all:
+        yield run_all
 
 
 def _check(
     options: Options,
     names: tuple[str, ...],
     progress: Progress,
+    run_all: RunAll | None,
     shard: Shard | None,
     timings: str | None,
     sensitivity: bool,
@@ -68,13 +81,16 @@ def _check(
             documents.course_map,
             documents.declarations,
             documents.aside,
+            documents.check,
         )
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
     chosen = select(course, names, options.root)
-    verified = verify(course, options, progress, chosen.documents, shard=shard)
+    verified = verify(course, options, progress, chosen.documents, shard=shard, run_all=run_all)
     if timings is not None:
+        from coursebuild.pipeline.shards import write_timings
+
         write_timings(timings, _seconds(verified), _names(course))
     found = [*loaded.diagnostics, *verified.diagnostics]
     found += no_lessons(course)

@@ -19,12 +19,12 @@ from itertools import islice
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
-from coursebuild.diagnostics import Parsed
+from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
-from coursebuild.pipeline.bundles import Bundle
+from coursebuild.pipeline.faces import course_face
 from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
 from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Drawn, Later, Read, Request
 from coursebuild.pipeline.shelf import Shelf
@@ -46,6 +46,8 @@ def _silent(name: str) -> AbstractContextManager[None]:
 
 _MAPS, _DECLARATIONS, _FONTS = "maps", "declarations", "fonts"
 """Kinds of entries in the store: course maps, and cut fonts."""
+_CHECKED = "checked"
+"""The kind of the entry that says in what nothing was wrong."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
 _AT_ONCE = 256
@@ -69,6 +71,7 @@ class Documents:
         self._jobs = jobs
         self._tasks: dict[str, Task] = {}
         self._outlines: dict[str, Outline] = {}
+        self._face: tuple[Course, str | None] | None = None
         self._readers: dict[str, int | None] = {}
         """Which copy has read a text, by its path."""
         self._reader: Reader | None = None
@@ -92,14 +95,33 @@ class Documents:
         """All that are known."""
         return tuple(self._outlines.values())
 
+    def face(self, course: Course) -> str | None:
+        """The face of a course whose documents these are (`faces`); `None` for any other."""
+        if self._face is None or self._face[0] is not course:
+            faces = ((outline.skeleton, outline.face) for outline in self._outlines.values())
+            self._face = course, course_face(course, faces)
+        return self._face[1]
+
+    def check(self, course: Course) -> tuple[Diagnostic, ...]:
+        """What `check_course` finds; nothing where it found nothing in a course of this face."""
+        key = hashlib.sha256(f"checked course\0{tool_digest()}".encode()).hexdigest()
+        face = (self.face(course) or "").encode()
+        if face and not self._store.fresh and self._store.peek(_CHECKED, key) == face:
+            return ()
+        from coursebuild.checks.course import check_course
+
+        found = check_course(course)
+        if face and not found:
+            self._store.keep(_CHECKED, key, face, packed=True)
+        return found
+
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the outlines of sources, of which it is said which are lessons."""
         missing: list[Task] = []
-        bundled = Bundle(self._store, len(sources))
         for source, lesson in sources:
             task = Task.of(source, callouts, lesson)
             self._tasks[source.path] = task
-            outline = self._stored(task, bundled)
+            outline = self._stored(task)
             if outline is None:
                 missing.append(task)
             else:
@@ -110,17 +132,14 @@ class Documents:
             prepare_to_read(missing[0])
         rest = iter(missing)
         while tasks := tuple(islice(rest, _AT_ONCE)):
-            self._read(tasks, bundled)
-        bundled.save()
+            self._read(tasks)
 
-    def _read(self, tasks: Sequence[Task], bundled: Bundle) -> None:
+    def _read(self, tasks: Sequence[Task]) -> None:
         requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in tasks]
         answers, readers = self._work("reading lessons and pages", requests)
         for task, data, reader in zip(tasks, answers, readers, strict=True):
             outline = self._opened(data, task)
             assert outline is not None
-            if outline.lasting:
-                bundled.add(task.key, data)
             self._outlines[task.source.path] = outline
             self._readers[task.source.path] = reader
 
@@ -163,7 +182,7 @@ class Documents:
         if isinstance(found, Parsed):
             return found
         parsed = parse(source)
-        self._store.keep(kind, key, pack(parsed), local=True)
+        self._store.keep(kind, key, pack(parsed), packed=True)
         return parsed
 
     def task(self, path: str) -> Task:
@@ -199,22 +218,16 @@ class Documents:
             for job, made in zip(missing, answers, strict=True):
                 found[job.key] = made
                 self._store.keep(_FONTS, job.key, made)
+            self._rest()
         return lambda job: found[job.key]
 
     def drawn(self, page: Draw) -> Drawn:
         """A page, its body, and what it is found by, drawn here and now."""
         return self._here().draw(page)
 
-    def _stored(self, task: Task, bundled: Bundle) -> Outline | None:
-        if self._store.fresh:
-            return None
-        data = bundled.get(task.key)
-        if data is None:
-            data = self._store.peek(OUTLINES, task.key)
-            if data is None:
-                return None
-            bundled.add(task.key, data)
-        return self._opened(data, task)
+    def _stored(self, task: Task) -> Outline | None:
+        data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
+        return None if data is None else self._opened(data, task)
 
     def _opened(self, data: bytes, task: Task) -> Outline | None:
         """An outline, put aside where that is wanted; `None` where the bytes are none."""
@@ -245,7 +258,8 @@ class Documents:
                     answers = [reader.answer(request) for _, request in requests]
                 return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
-            self._pool = Pool(reader.answer, min(self._jobs, -(-2 * len(requests) // many)))
+            count = min(self._jobs, -(-2 * len(requests) // many))
+            self._pool = Pool(reader.answer, count, reader.begin_copy)
         with self._stage(name):
             return self._pool.run(requests)
 

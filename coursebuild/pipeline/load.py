@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from coursebuild.checks import check_course
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
@@ -56,6 +55,10 @@ ParseDeclarations: TypeAlias = Callable[[Source], Parsed[Declarations | None]]
 """`parse_declarations`, or what remembers its results."""
 
 
+Check: TypeAlias = Callable[[Course], tuple[Diagnostic, ...]]
+"""`check_course`, or what remembers that it found nothing."""
+
+
 def load(
     root: Path,
     parse: Parse | None = None,
@@ -63,6 +66,7 @@ def load(
     course_map: ParseMap | None = None,
     declarations: ParseDeclarations | None = None,
     aside: Aside | None = None,
+    check: Check | None = None,
 ) -> Loaded:
     """Read and parse everything below `root`; texts are put aside, where it is said where."""
     read = read_course(root, aside)
@@ -74,7 +78,12 @@ def load(
         from coursebuild.syntax.coursemap import parse_course_map
 
         course_map = parse_course_map
-    loader = _Loader(root, read.value, list(read.diagnostics), parse, ahead, course_map, aside)
+    if check is None:
+        from coursebuild.checks.course import check_course
+
+        check = check_course
+    found = list(read.diagnostics)
+    loader = _Loader(root, read.value, found, parse, ahead, course_map, aside, check)
     declared = loader.declared(declarations)
     course = loader.course(declared)
     return Loaded(course, tuple(loader.found))
@@ -92,12 +101,14 @@ class _Loader:
         ahead: Ahead | None,
         course_map: ParseMap,
         aside: Aside | None,
+        check: Check,
     ) -> None:
         self.root = root
         self.parse = parse
         self.ahead = ahead
         self.course_map = course_map
         self.aside = aside
+        self.check = check
         self.files = files
         self.found = found
         self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
@@ -135,7 +146,7 @@ class _Loader:
             files=self._others(course),
             declarations=declared,
         )
-        self.found += check_course(course)
+        self.found += self.check(course)
         self.found += _check_engine(course)
         return course
 

@@ -14,7 +14,6 @@ from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.errors import UsageError as UsageError
 from coursebuild.effects.read import find_root
-from coursebuild.effects.shared import shared_cache
 from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
 from coursebuild.values import dataclass
@@ -84,6 +83,8 @@ def open_store(
         raise UsageError("--cache names no place")
     shared = None
     if where is not None:
+        from coursebuild.effects.shared import shared_cache
+
         try:
             shared = shared_cache(where)
         except EffectError as error:

@@ -9,6 +9,7 @@ together with the source again, which whoever unpacks it has read anyway.
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
 import io
 import pickle
@@ -60,14 +61,22 @@ class Outline:
     """Modules that each script imports, by its path."""
     lasting: bool
     """Whether the same text gives the same again."""
+    face: str = ""
+    """What others than its own page can see of it, as a hash; see `pipeline.faces`."""
+
+
+def _source() -> Source:
+    """The name in packed values of the source that they are of; who unpacks them puts it in."""
+    raise TypeError("a packed value is unpacked with its source")
+
+
+_LEFT_OUT = {**copyreg.dispatch_table, Source: lambda source: (_source, ())}
 
 
 class _Packer(pickle.Pickler):
     """Leaves out the source."""
 
-    def persistent_id(self, value: object) -> int | None:
-        """The source has a name in place of its content."""
-        return 0 if type(value) is Source else None
+    dispatch_table = _LEFT_OUT
 
 
 class _Unpacker(pickle.Unpickler):
@@ -77,9 +86,12 @@ class _Unpacker(pickle.Unpickler):
         super().__init__(io.BytesIO(data))
         self.source = source
 
-    def persistent_load(self, name: object) -> Source:
-        """There is only one."""
-        return self.source
+    def find_class(self, module: str, name: str) -> Any:
+        """What a name means; there is only one source."""
+        if name == _source.__name__ and module == __name__:
+            source = self.source  # not through `self`, which holds all that it has unpacked
+            return lambda: source
+        return super().find_class(module, name)
 
 
 def pack(value: object) -> bytes:
@@ -99,7 +111,7 @@ def unpack(data: bytes, source: Source) -> Any:
 
 def packed(outline: Outline) -> bytes:
     """An outline as bytes."""
-    head = pack((outline.diagnostics, dict(outline.imports), outline.lasting))
+    head = pack((outline.diagnostics, dict(outline.imports), outline.lasting, outline.face))
     return _LENGTH.pack(len(head)) + head + pack(outline.skeleton)
 
 
@@ -112,7 +124,7 @@ def parted(data: bytes, source: Source) -> tuple[Outline, bytes] | None:
         return None
     end = _LENGTH.size + _LENGTH.unpack_from(data)[0]
     head = unpack(data[_LENGTH.size : end], source)
-    if not isinstance(head, tuple) or len(head) != 3:
+    if not isinstance(head, tuple) or len(head) != 4:
         return None
     return Outline(Document(source, (), ()), *head), data[end:]
 

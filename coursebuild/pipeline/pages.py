@@ -4,6 +4,7 @@ Entry point: `Pages`.
 
 1. Every page has a sheet, all that it shows of the course, and a key: a hash of its sheet, of its
    document's text, and of the tool.
+   Where nothing has changed of what sheets are made of, the key is known without (`page_keys`).
 2. The record of a page under its key comes from the record of the site that was put together last,
    or from the store; where it is nowhere, the page is drawn.
 3. From the records alone it is known whether all links lead somewhere, and which characters and
@@ -25,6 +26,8 @@ from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.faces import results_face
+from coursebuild.pipeline.page_keys import PageKeys
 from coursebuild.pipeline.records import (
     bundle,
     part,
@@ -33,7 +36,7 @@ from coursebuild.pipeline.records import (
     unpack_record,
     unpack_value,
 )
-from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, Draw, Later
+from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, SECTIONS, Draw, Later
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.links import has
@@ -48,7 +51,7 @@ from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.exports.page import Beside
-    from coursebuild.render.exports.parts import LessonPart
+    from coursebuild.render.exports.parts import LessonPart, OpenChapter
 
 _SITE = "site"
 """The kind of the entry that holds the records of the last site."""
@@ -89,7 +92,9 @@ class Pages:
         self._aside = documents.aside or Aside(store.folder)
         self._facts = _Facts()
         self._by_path: dict[str, _Wanted] = {}
-        self._pages = self._made([self._wanted(page) for page in page_list(library)])
+        keys = PageKeys(store, self._around())
+        self._pages = self._made([self._wanted(page, keys) for page in page_list(library)])
+        keys.save()
 
     @property
     def facts(self) -> PageFacts:
@@ -155,15 +160,25 @@ class Pages:
         found = unpack_value(self._store.peek(EXPORTS, page.key), Beside)
         return found or self._documents.drawn(self._request(page)).exports.beside
 
-    def part(self, path: str) -> LessonPart:
-        """What a lesson gives to the files of the whole course."""
-        from coursebuild.render.exports.parts import LessonPart
+    def section(self, path: str) -> str:
+        """What a lesson gives to the page of the whole course."""
+        page = self._at(path)
+        found = unpack_value(self._store.peek(SECTIONS, page.key), str)
+        return found if found is not None else self._part(page).section
+
+    def chapter(self, path: str) -> OpenChapter:
+        """What a lesson gives to the e-book."""
+        from coursebuild.render.exports.parts import OpenChapter
 
         page = self._at(path)
-        found = unpack_value(self._store.peek(PARTS, page.key), LessonPart)
-        found = found or self._documents.drawn(self._request(page)).exports.part
-        assert found is not None, "a written lesson has a part"
-        return found
+        found = unpack_value(self._store.peek(PARTS, page.key), OpenChapter)
+        return found or self._part(page).chapter
+
+    def _part(self, page: _Wanted) -> LessonPart:
+        """Both, made anew: what was kept is damaged or gone."""
+        part = self._documents.drawn(self._request(page)).exports.part
+        assert part is not None, "a written lesson has a part"
+        return part
 
     def _at(self, path: str) -> _Wanted:
         if not self._by_path:
@@ -172,10 +187,25 @@ class Pages:
 
     # --- keys
 
-    def _wanted(self, page: PageEntry) -> _Wanted:
-        sheet = page.sheet(self._library)
-        key = page_key(self._library.course, self._documents, sheet)
-        return _Wanted(page, key, sheet.document)
+    def _around(self) -> str | None:
+        """A hash of all that sheets are made of, but for documents; `None` where it has none."""
+        course = self._documents.face(self._library.course)
+        if course is None:
+            return None
+        results = results_face(self._library.results, self._library.reports)
+        return hashlib.sha256(f"{course}{results}".encode()).hexdigest()
+
+    def _wanted(self, page: PageEntry, keys: PageKeys) -> _Wanted:
+        document = page.document(self._library)
+        path = None if document is None else document.source.path
+        task = "" if path is None else self._documents.task(path).key
+        key = keys.get(page.path, task)
+        if key is None:
+            sheet = page.sheet(self._library)
+            assert sheet.document == path
+            key = page_key(self._library.course, self._documents, sheet)
+            keys.add(page.path, task, key)
+        return _Wanted(page, key, path)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
@@ -221,7 +251,7 @@ class Pages:
             assert made is not None
             found[page.key] = made
         if list(last) != list(packed):
-            self._store.keep(_SITE, self._name(), bundle(packed.items()), local=True)
+            self._store.keep(_SITE, self._name(), bundle(packed.items()), packed=True)
         return [found[page.key] for page in pages]
 
     def _known(self, key: str, last: Mapping[str, bytes]) -> bytes:

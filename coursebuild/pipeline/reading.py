@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Self, assert_never
 
 from markupsafe import Markup
 
-from coursebuild.checks import document_formulas, formula_findings
+from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.aside import Aside, AsideError, Kept
 from coursebuild.effects.resources import template_texts
@@ -33,6 +33,7 @@ from coursebuild.effects.tool import engine_digest, tool_digest
 from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
+from coursebuild.pipeline.faces import outline_face
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
 from coursebuild.pipeline.outlines import Outline, Task, pack, packed, unpack
 from coursebuild.pipeline.records import join, pack_record, pack_value
@@ -42,6 +43,7 @@ from coursebuild.pipeline.requests import (
     OUTLINES,
     PAGES,
     PARTS,
+    SECTIONS,
     Answer,
     Ask,
     Cut,
@@ -65,15 +67,15 @@ if TYPE_CHECKING:
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
-ROOM = 4 << 20
+ROOM = 6 << 20
 """Bytes that documents may take which wait to be drawn, about."""
-_COST = 12
+_COST = 9
 """Bytes that a parsed document takes for each character of its text, about, with its MathML."""
 _FORMULAS = 1024
 """Formulas that are remembered."""
-_COLLECT = 64
-"""Texts after which what the parser left behind is looked for: the collector's own measure would
-let a process grow by tens of megabytes first."""
+_COLLECT = 512
+"""Texts after which what is left in cycles is looked for, of each some 2 kB: the collector's own
+measure would let a process grow for much longer."""
 _RENEW = 256
 """Texts after which the engine is made anew, since it keeps a little of every formula."""
 
@@ -90,8 +92,8 @@ _HEAVY = (
     "coursebuild.render.draw",
     "coursebuild.render.highlight",
     "coursebuild.syntax.document",
+    "coursebuild.syntax.lab",
     "coursebuild.syntax.quiz",
-    "jinja2",
 )
 
 
@@ -105,7 +107,7 @@ def prepare_to_read(sample: Task) -> None:
     read = parse_document(sample.source.present(), sample.callouts, lesson=sample.lesson).value
     mark_now("python", "")
     if document_formulas(read):
-        from coursebuild.effects.v8 import preload
+        from coursebuild.effects.v8_start import preload
 
         preload()
 
@@ -147,6 +149,12 @@ class Reader:
             self._engine.close()
             self._engine = None
 
+    def begin_copy(self) -> None:
+        """This process is a copy now, which does what is asked here and nothing else."""
+        from coursebuild.effects.v8_start import for_formulas_only
+
+        for_formulas_only()
+
     def answer(self, request: Request) -> Answer:
         """Do what is asked."""
         match request:
@@ -175,13 +183,14 @@ class Reader:
         found = formula_findings(whole.document, whole.formulas)
         told = misdeclared(whole.document, whole.formulas)
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
+        bones = skeleton(whole.document)
+        bones = replace(bones, lexicon=lexicon(whole.document, whole.formulas))
         return Outline(
-            skeleton=replace(
-                skeleton(whole.document), lexicon=lexicon(whole.document, whole.formulas)
-            ),
+            skeleton=bones,
             diagnostics=(*whole.diagnostics, *found, *told),
             imports={s.path: tuple(sorted(imports(s.code.text))) for s in scripts},
             lasting=not found,
+            face=outline_face(bones),
         )
 
     def _read(self, task: Task) -> bytes:
@@ -189,7 +198,7 @@ class Reader:
         outline = self._outline(whole)
         data = packed(outline)
         if outline.lasting:  # that a formula took too long may not happen again
-            self._store.keep(OUTLINES, task.key, data, local=True)
+            self._store.keep(OUTLINES, task.key, data, packed=True)
         self._wait(task.key, whole)
         self._read_texts += 1
         if self._read_texts % _RENEW == 0:
@@ -256,7 +265,7 @@ class Reader:
             fresh = iter(self._started().typeset(new))
             made = [next(fresh) if found is None else found for found in known]
             if all(isinstance(one, str) for one in made):
-                self._store.keep(_MATHML, key, json.dumps(made).encode(), local=True)
+                self._store.keep(_MATHML, key, json.dumps(made).encode(), packed=True)
         while len(self._formulas) > _FORMULAS:
             del self._formulas[next(iter(self._formulas))]
         found = dict(zip(formulas, made, strict=True))
@@ -283,13 +292,13 @@ class Reader:
         document = None
         if whole is not None:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
-        draft, text = draw_whole(request.sheet, document, tools)
+        draft, text, page = draw_whole(request.sheet, document, tools)
         found, body = record(draft, request.base_url)
         by = searched(request.sheet, document, str(draft.body))
         if by is not None:
             found = replace(found, search=(by.name, by.digest))
         base = request.base_url
-        exports = page_exports(request.sheet, document, tools, base, body, str(text))
+        exports = page_exports(request.sheet, page, tools, base, body, str(text))
         return Drawn(found, body, by, exports)
 
     def _draw(self, request: Draw) -> bytes:
@@ -297,11 +306,12 @@ class Reader:
         packed_record = pack_record(drawn.record)
         data = join(packed_record, drawn.body, drawn.searched)
         made = drawn.exports
-        self._store.keep(EXPORTS, request.key, pack_value(made.beside), local=True)
+        self._store.keep(EXPORTS, request.key, pack_value(made.beside), packed=True)
         if made.part is not None:
-            self._store.keep(PARTS, request.key, pack_value(made.part), local=True)
+            self._store.keep(PARTS, request.key, pack_value(made.part.chapter), packed=True)
+            self._store.keep(SECTIONS, request.key, pack_value(made.part.section), packed=True)
         # At last, since a page that is there is not drawn again.
-        self._store.keep(PAGES, request.key, data, local=True)
+        self._store.keep(PAGES, request.key, data, packed=True)
         return packed_record
 
     def _ask(self, request: Draw) -> bytes:
@@ -314,7 +324,7 @@ class Reader:
         language, base_url = request.language, request.base_url
         made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
         data = pack(made)
-        self._store.keep(ITEMS, request.key, data, local=True)
+        self._store.keep(ITEMS, request.key, data, packed=True)
         return data
 
     def _tools_for(self, language: str) -> Tools:
@@ -334,7 +344,7 @@ def cut_font(job: FontJob) -> bytes:
 
 def drawing_tools(store: Store, language: str) -> Tools:
     """Words and templates, these compiled by an earlier run where there was one."""
-    from coursebuild.render.assets import templates_of
+    from coursebuild.render.templates import templates_of
 
     texts = template_texts()
     templates = templates_of(texts, CompiledTemplates(store))
@@ -355,5 +365,5 @@ class _Marks:
         if found is not None:
             return tuple(map(Markup, json.loads(found)))
         lines = mark_now(language, code)
-        self._store.keep(_CODE, key, json.dumps(lines).encode(), local=True)
+        self._store.keep(_CODE, key, json.dumps(lines).encode(), packed=True)
         return lines

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from coursebuild.render.exports.page import PageExports
 
 OUTLINES, PAGES, EXPORTS, ITEMS = "outlines", "pages", "beside", "items"
-PARTS = "parts"
+PARTS, SECTIONS = "parts", "sections"
 """Kinds of entries in the store. They stay on this machine: reading them may run code."""
 
 

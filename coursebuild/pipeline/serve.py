@@ -12,6 +12,7 @@ The last good page stays while something is wrong; what is wrong is printed and 
 from __future__ import annotations
 
 import functools
+import gc
 import sys
 import threading
 
@@ -22,7 +23,7 @@ from coursebuild.effects.prepared import prepared_cut
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
-from coursebuild.effects.watch import Watcher
+from coursebuild.effects.watch import Watcher, watcher
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options, UsageError
@@ -88,19 +89,20 @@ def serve(options: Options, port: int) -> None:
         server = PreviewServer(port, Site(live), files)
     except OSError as error:
         raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
-    watcher = Watcher(options.root)
+    saves = watcher(options.root)
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH)
     try:
         print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
         _first_reading(live, options, progress)
+        gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
         server.start()
-        watcher.start()
-        _work(live, watcher, options, progress, server.url)
+        saves.start()
+        _work(live, saves, options, progress, server.url)
     except KeyboardInterrupt:
         progress.say("stopped")
     finally:
-        watcher.stop()
+        saves.stop()
         server.stop()
         live.close()
         sys.setswitchinterval(before)
@@ -128,13 +130,11 @@ def _first_reading(live: LiveCourse, options: Options, progress: Progress) -> No
     live.documents = later
 
 
-def _work(
-    live: LiveCourse, watcher: Watcher, options: Options, progress: Progress, url: str
-) -> None:
+def _work(live: LiveCourse, saves: Watcher, options: Options, progress: Progress, url: str) -> None:
     """Follow a course that was read; ends by an exception only."""
     progress.say(f"ready: {url}")
     behind = Behind(live, options, progress)
-    watcher.wait()
+    saves.wait()
 
     def saved(paths: frozenset[str], seconds: float) -> None:
         names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
@@ -142,7 +142,7 @@ def _work(
 
     def run() -> None:
         try:
-            follow(live, watcher, behind.notice, saved)
+            follow(live, saves, behind.notice, saved)
         except BaseException as error:  # told by the main thread
             behind.fail(error)
 

@@ -19,6 +19,8 @@ from coursebuild.source import Excerpt, Source
 
 ROOM = 4 << 20
 """Bytes of packed documents that stay; in memory they take about three times as much."""
+CODE_ROOM = 1 << 20
+"""Characters of the code of scripts that stay; the code of a script is asked for many times."""
 _LAST = 4
 """Further ones that are remembered."""
 
@@ -30,6 +32,7 @@ class Shelf:
         """`room`: see `ROOM`."""
         self.aside = aside
         self._room = ROOM if room is None else room
+        self._code_room = CODE_ROOM
         self._held: dict[int, Document] = {}
         self._last: OrderedDict[int, Document] = OrderedDict()
         self._lock = threading.Lock()
@@ -39,6 +42,11 @@ class Shelf:
         kept = self.aside.put(data)
 
         def keep(code: Excerpt) -> Callable[[], Excerpt]:
+            with self._lock:
+                self._code_room -= len(code.text)
+                stays = self._code_room >= 0
+            if stays:
+                return lambda: code
             put = self.aside.put(pack((code.text, code.pieces)))
             return lambda: Excerpt(source, *unpack(put(), source))
 

@@ -22,7 +22,6 @@ from coursebuild.measured.cases import CaseReport
 from coursebuild.measured.diet import DietReport
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
-from coursebuild.pipeline.reports import command
 from coursebuild.source import Source
 
 _FOLDER = "content/reports/"
@@ -77,6 +76,8 @@ class _Reader:
         self, path: str, model: str, kind: str, decode: Callable[[bytes], _Scene]
     ) -> _Scene | None:
         """The report on a model, if it fits."""
+        from coursebuild.pipeline.reports import command
+
         make = command(kind, (model,), "--record")
         if model not in self._models:
             near = nearest(model, self._models)

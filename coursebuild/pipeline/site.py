@@ -21,6 +21,7 @@ from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import kept_distributions, library_files
+from coursebuild.effects.prepared import prepared_copy
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.effects.store import Store
@@ -33,13 +34,14 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import all_imports
 from coursebuild.pipeline.pages import Pages
 from coursebuild.render import meta, urls, zips
-from coursebuild.render.assets import Assets, templates_of
+from coursebuild.render.assets import Assets
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
 from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.sheet import search_words
 from coursebuild.render.shared import PageFacts, common_characters
+from coursebuild.render.templates import templates_of
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
@@ -150,7 +152,7 @@ class _Site:
         from coursebuild.render.compressed import compressed_files
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return self.store.kept("compressed", key, make)
+            return prepared_copy(key) or self.store.kept("compressed", key, make)
 
         return compressed_files(files, keep)
 
@@ -242,7 +244,7 @@ class _Site:
             imports=self._imports,
             declarations=pages.facts.declarations,
             taken=taken,
-            keep=functools.partial(self.store.kept, "chapters"),
+            keep=functools.partial(self.store.kept, "chapters", packed=True),
         )
         return Exports(self.library, pages, around).files(names)
 
@@ -278,8 +280,8 @@ class _Data:
     def _made(self) -> tuple[Names, tuple[str, ...]]:
         names, self._files = self._make()
         listing = names, tuple(self._files)
-        self._store.keep(_SHARED_DATA, self._key, pickle.dumps(self._files), local=True)
-        self._store.keep(_SHARED, self._key, pickle.dumps(listing), local=True)
+        self._store.keep(_SHARED_DATA, self._key, pickle.dumps(self._files), packed=True)
+        self._store.keep(_SHARED, self._key, pickle.dumps(listing), packed=True)
         return listing
 
     def _load(self, kind: str) -> Any:
@@ -303,7 +305,7 @@ class _Cells:
 
     def put(self, key: str, data: bytes) -> Callable[[], bytes]:
         """Keep it for the next build, and for this one."""
-        self._store.keep(_CELLS, key, data, local=True)
+        self._store.keep(_CELLS, key, data, packed=True)
         return self._aside.put(data)
 
 

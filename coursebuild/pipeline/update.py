@@ -15,13 +15,16 @@ Entry point: `update(options, names, dry_run=…)`.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import time
 from collections.abc import Collection, Mapping, Sequence
 
 from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.effects.errors import EffectError
+from coursebuild.effects.foresight import RunAll
 from coursebuild.effects.locks import project_lock
+from coursebuild.effects.runner import ScriptServer
 from coursebuild.effects.write import write_atomic
 from coursebuild.model import Course, Recording, document_blocks
 from coursebuild.pipeline.judge import judge
@@ -57,8 +60,11 @@ def _update(
     chosen = select(course, names, options.root)
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
-    first = run(scripts, options, progress)
-    again = _again(course, chosen, scripts, first, options, progress)
+    with contextlib.ExitStack() as stack:
+        # What scripts import stays imported from one run to the other.
+        run_all = None if options.executor else stack.enter_context(ScriptServer()).run
+        first = run(scripts, options, progress, run_all=run_all)
+        again = _again(course, chosen, scripts, first, options, progress, run_all)
     edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
@@ -91,6 +97,7 @@ def _again(
     first: Sequence[ScriptRun],
     options: Options,
     progress: Progress,
+    run_all: RunAll | None,
 ) -> tuple[ScriptRun, ...]:
     """The second runs; a remembered first one that is recorded already stands for both."""
     edits, refused = _edits(course, chosen, first, first, frozenset())
@@ -101,7 +108,8 @@ def _again(
         if not one.cached or one.path in wrong
     ]
     memory = Memory(options.root, options.store, fresh=True)
-    ran = {r.path: r for r in run(left, options, progress, "running scripts again", memory)}
+    second = run(left, options, progress, "running scripts again", memory, run_all)
+    ran = {r.path: r for r in second}
     return tuple(ran.get(one.path, one) for one in first)
 
 

@@ -14,10 +14,10 @@ Documents may be skeletons. Formulas are no part of this: see `pipeline.document
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias, assert_never
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, assert_never
 
-from coursebuild.checks import check_compiled, mjcf_texts
+from coursebuild.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.effects.errors import OutsideProjectError
@@ -29,7 +29,6 @@ from coursebuild.pipeline.kept import KeptBindings
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory, longest_first
-from coursebuild.pipeline.shards import Shard
 from coursebuild.report import LabLine, ScriptLine
 from coursebuild.results import (
     CompileResult,
@@ -46,14 +45,12 @@ from coursebuild.scripts.dependencies import Inputs
 from coursebuild.scripts.divergence import is_lost
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
-from coursebuild.scripts.repeat import repeat_findings
 from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
+    from coursebuild.effects.foresight import RunAll
     from coursebuild.effects.runner import RunEvent
-
-RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
-"""Runs scripts, as `runner.run_scripts` does."""
+    from coursebuild.pipeline.shards import Shard
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +71,12 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
+    run_all: RunAll | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs.
+    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`.
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
@@ -95,7 +93,7 @@ def verify(
         chosen = [e for e in chosen if e.path in only]
     models, compiled = compile_models(course, options, progress)
     memory = Memory(options.root, options.store)
-    scripts = functools.partial(run, chosen, options, progress, memory=memory)
+    scripts = functools.partial(run, chosen, options, progress, memory=memory, run_all=run_all)
     labs: tuple[LabResult, ...] = ()
     lab_findings: tuple[Diagnostic, ...] = ()
     if _has_labs(course):
@@ -108,9 +106,12 @@ def verify(
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]
     held = KeptBindings(options.store)
-    found += script_findings(course, chosen, runs, verdicts, held)
+    found += script_findings(course, chosen, runs, verdicts, held, extracted.all)
     held.save()
-    found += repeat_findings(course, chosen, memory.differing)
+    if memory.differing:
+        from coursebuild.scripts.repeat import repeat_findings
+
+        found += repeat_findings(course, chosen, memory.differing)
     found += check_output_lines(course, runs)
     versions = python_version(), engine_version()
     results = Results(runs, verdicts, (), models, *versions, labs)

@@ -1,7 +1,6 @@
 """The tool's own files: templates, interface texts, and the browser's half as it was bundled.
 
-Entry points: `Assets`, a value that whoever reads the disk makes; `template_environment`;
-`hashed_name`.
+Entry points: `Assets`, a value that whoever reads the disk makes; `strings_for`; `hashed_name`.
 
 1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
    by path relative to their folder.
@@ -13,14 +12,21 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
 
 from coursebuild.render.strings import DEFAULT_LANGUAGE, Strings, parse_strings
 from coursebuild.values import dataclass
 
-if TYPE_CHECKING:
-    from jinja2 import BytecodeCache, Environment
+SCRIPTS = {
+    "theme.js": "js/theme.js",
+    "site.js": "js/site.js",
+    "offline.js": "js/offline-page.js",
+    "map.js": "js/map-page.js",
+    "reader.js": "js/reader-page.js",
+    "quiz.js": "js/quiz.js",
+    "search.js": "js/search.js",
+}
+"""What plain scripts of pages are published as, and the bundled modules that they are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,87 +70,6 @@ def page_script(code: bytes) -> bytes:
     names.
     """
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
-
-
-class Compiled(Protocol):
-    """Keeps the code that templates are compiled to."""
-
-    def __hash__(self) -> int:
-        """Engines are made once for each."""
-
-    def load(self, name: str) -> bytes | None:
-        """What was kept under a name."""
-
-    def generated(self, name: str) -> str | None:
-        """The Python that `generated` made ahead of the template of this name."""
-
-    def keep(self, name: str, data: bytes) -> None:
-        """Keep a template's code."""
-
-
-def templates_of(
-    templates: tuple[tuple[str, str], ...], compiled: Compiled | None = None
-) -> Callable[[], Environment]:
-    """Gives the template engine, which is imported when it is first asked for."""
-    return functools.cache(lambda: template_environment(templates, compiled))
-
-
-@functools.lru_cache(maxsize=8)
-def template_environment(
-    templates: tuple[tuple[str, str], ...], compiled: Compiled | None = None
-) -> Environment:
-    """The template engine: it escapes all that is not `Markup`, and refuses undefined names."""
-    from jinja2 import DictLoader, Environment, StrictUndefined
-
-    environment = Environment(
-        loader=DictLoader({path: text for path, text in templates if path.endswith(".html")}),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        bytecode_cache=None if compiled is None else _bytecode_cache(compiled),
-    )
-    return environment
-
-
-def generated(templates: tuple[tuple[str, str], ...]) -> dict[str, str]:
-    """The Python that templates become, by a name for all that it depends on."""
-    from jinja2.bccache import BytecodeCache
-
-    environment, cache = template_environment(templates), BytecodeCache()
-    return {
-        _name(cache.get_cache_key(path), cache.get_source_checksum(text)): environment.compile(
-            text, path, raw=True
-        )
-        for path, text in templates
-        if path.endswith(".html")
-    }
-
-
-def _name(key: str, checksum: str) -> str:
-    import jinja2
-
-    return f"{jinja2.__version__}/{key}/{checksum}"
-
-
-def _bytecode_cache(compiled: Compiled) -> BytecodeCache:
-    from jinja2.bccache import Bucket, BytecodeCache
-
-    class Cache(BytecodeCache):
-        def load_bytecode(self, bucket: Bucket) -> None:
-            name = _name(bucket.key, bucket.checksum)
-            data = compiled.load(name)
-            if data is not None:
-                bucket.bytecode_from_string(data)
-            elif (code := compiled.generated(name)) is not None:
-                bucket.code = compile(code, "<template>", "exec")
-                self.dump_bytecode(bucket)
-
-        def dump_bytecode(self, bucket: Bucket) -> None:
-            compiled.keep(_name(bucket.key, bucket.checksum), bucket.bytecode_to_string())
-
-    return Cache()
 
 
 @functools.lru_cache(maxsize=8)

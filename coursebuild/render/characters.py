@@ -9,9 +9,11 @@ from __future__ import annotations
 import functools
 import re
 
-_ALLOWED = re.compile("[\t\n -~\u00a0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0001fffd]*+")
+from coursebuild.patterns import pattern
+
+_ALLOWED = pattern("[\t\n -~\u00a0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0001fffd]*+")
 """Text in which none is, found out fast; characters past U+1FFFF are left to a closer look."""
-_FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
+_FORBIDDEN = pattern("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
 
 
 @functools.cache

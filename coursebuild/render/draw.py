@@ -24,9 +24,12 @@ def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
     return draw_whole(sheet, document, tools)[0]
 
 
-def draw_whole(sheet: Sheet, document: Document | None, tools: Tools) -> tuple[Draft, Markup]:
-    """The page without its frame, and what it shows of its document."""
+def draw_whole(
+    sheet: Sheet, document: Document | None, tools: Tools
+) -> tuple[Draft, Markup, PageContext | None]:
+    """The page without its frame, what it shows of its document, and the document's context."""
     text = Markup()
+    page: PageContext | None = None
     values = {name: _drawn(value, tools) for name, value in sheet.values.items()}
     description = sheet.description
     if document is not None and sheet.shown is not None:
@@ -45,7 +48,7 @@ def draw_whole(sheet: Sheet, document: Document | None, tools: Tools) -> tuple[D
         og_type=sheet.og_type,
         indexed=sheet.indexed,
     )
-    return draft, text
+    return draft, text, page
 
 
 def _drawn(value: object, tools: Tools) -> object:

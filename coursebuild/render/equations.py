@@ -8,16 +8,16 @@ on where ours left off. A formula with such numbers of its own, or with a `\tag`
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from html import unescape
 
 from coursebuild.model import Document
 from coursebuild.model.equations import display_formulas
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass
 
 _COUNTED = 'class="tml-eqn"'
-_TAG = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
+_TAG = pattern(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,29 +20,32 @@ import re
 from collections.abc import Iterator
 from html import escape, unescape
 
+from coursebuild.patterns import pattern
+
 LONG = 20
 """Characters; a shorter formula stays whole."""
 WIDE = 22
 """Characters; a shorter piece fits the narrowest window."""
 
-_ROW = re.compile(r"<(/?)mrow\b[^>]*>")
-_WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
-_ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
-_TAG = re.compile(r"<[^>]*>")
-_PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
+_ROW = pattern(r"<(/?)mrow\b[^>]*>")
+_WHOLE = pattern(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
+_ANNOTATION = pattern(r"<annotation\b.*?</annotation>", re.DOTALL)
+_TAG = pattern(r"<[^>]*>")
+_PIECE = pattern(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
-_TOUCHING = re.compile(
+_TOUCHING = pattern(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
 _SIGN = "|".join(re.escape(escape(sign)) for sign in sorted(_RELATIONS | _BINARY))
-_FIRST = re.compile(rf"(?<=\s)(<math>(?:<semantics>)?(?:<mrow>)*)<mo>(?=(?:{_SIGN})</mo>)")
-_LAST = re.compile(
-    rf"""<mo( lspace="0em")?>(?=(?:{_SIGN})</mo>(?:</mrow>)*"""
+_FIRST = pattern(rf"<math>(?<=\s<math>)(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
+_LAST = pattern(
+    rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
+_END = pattern(r"</math>(?=\s)")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 
@@ -123,7 +126,7 @@ def contained(html: str, label: str) -> str:
 
 def glue(html: str) -> str:
     """The page with each inline formula set to what stands beside it: see 3 and 4."""
-    html = _LAST.sub(r'<mo\1 rspace="0em">', _FIRST.sub(r'\1<mo lspace="0em">', html))
+    html = _tight(html)
     parts: list[str] = []
     at = 0
     start = html.find("<math>")
@@ -138,6 +141,22 @@ def glue(html: str) -> str:
             parts += (html[at:before], _held(html[before:start], found[1], found[2]))
             at = found.end()
         start = html.find("<math>", found.end())
+    return "".join((*parts, html[at:]))
+
+
+def _tight(html: str) -> str:
+    """The page without the spaces of operators at the ends of formulas, next to a space: see 4."""
+    html = _FIRST.sub(r'\g<0> lspace="0em"', html)
+    parts: list[str] = []
+    at = before = 0
+    for end in _END.finditer(html):
+        # No other than the last operator before it; one before an earlier end is not its own.
+        start = html.rfind("<mo", before, end.start())
+        found = _LAST.match(html, start) if start >= 0 else None
+        before = end.end()
+        if found is not None:
+            parts += (html[at : found.end()], ' rspace="0em"')
+            at = found.end()
     return "".join((*parts, html[at:]))
 
 

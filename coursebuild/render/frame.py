@@ -17,6 +17,7 @@ from collections.abc import Mapping
 
 from markupsafe import Markup, escape
 
+from coursebuild.patterns import pattern
 from coursebuild.render import meta, urls
 from coursebuild.render.characters import visible
 from coursebuild.render.direction import direction
@@ -124,9 +125,14 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
 _HERE = Markup("<!--here-->")
 
 
+_MARKS = pattern("|".join(re.escape(mark) for mark, _ in _PARTS.values()))
+"""No two of them can overlap."""
+
+
 def parts_of(body: str) -> tuple[str, ...]:
     """Which parts with scripts of their own a page's body has: `labs`, `quiz`."""
-    return tuple(part for part, (mark, _) in _PARTS.items() if mark in body)
+    found = set(_MARKS.findall(body))
+    return tuple(part for part, (mark, _) in _PARTS.items() if mark in found)
 
 
 def frame_around(
@@ -208,7 +214,7 @@ def _own_script(draft: Draft, names: Names) -> str:
 
 _ALIKE = ("lesson", "stub", "level", "model")
 """Kinds of pages that no menu has, so that their frames differ in their own values alone."""
-_SLOT = re.compile("\ue000([a-z_]+[0-9]*)\ue001")
+_SLOT = pattern("\ue000([a-z_]+[0-9]*)\ue001")
 
 
 class Frames:

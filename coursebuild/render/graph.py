@@ -11,6 +11,7 @@ is written in the HTML that is read fast (`styles.is_plain`).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
@@ -118,8 +119,15 @@ def _graph(
 
 def drawings(graph: Graphed, words: Strings) -> tuple[Markup, Markup]:
     """The drawing with titles, and the one without; what is where is the same in both."""
-    layout = layered([node.id for node in graph.nodes], graph.edges, 1.0, 0.0, _PASSING)
+    places = {node.id: str(number) for number, node in enumerate(graph.nodes)}
+    layout = _layout(len(places), tuple((places[a], places[b]) for a, b in graph.edges))
     return _drawing(graph, layout, words, _WIDE), _drawing(graph, layout, words, _NARROW)
+
+
+@functools.lru_cache(maxsize=256)
+def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
+    """The layout of a graph whose nodes are called by their numbers: many lessons stand alike."""
+    return layered([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
 
 
 def _drawing(graph: Graphed, layout: Layout, words: Strings, look: _Look) -> Markup:
@@ -134,10 +142,9 @@ def _drawing(graph: Graphed, layout: Layout, words: Strings, look: _Look) -> Mar
         f' aria-label="{escape(words("graph.label"))}">',
         *_edges(layout, look, unit),
     ]
-    by_id = {node.id: node for node in graph.nodes}
-    for placed in layout.nodes:
+    for node, placed in zip(graph.nodes, layout.nodes, strict=True):
         x, top = _x(placed.x, unit, look), _EDGE + placed.layer * look.step
-        parts.append(_node(by_id[placed.id], _Box(x, top, wide, look.height), words, look))
+        parts.append(_node(node, _Box(x, top, wide, look.height), words, look))
     return Markup("".join((*parts, "</svg>")))
 
 

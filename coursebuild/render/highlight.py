@@ -60,8 +60,8 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     css, run = "", ""
     for token, text in _tokens(lexer, visible(code)):
         kind = _class_of(token)
-        first, *others = text.split("\n")
-        if kind == css or (run and not first.strip()):
+        first, *others = text.split("\n") if "\n" in text else (text,)
+        if kind == css or (run and (not first or first.isspace())):
             run += first
         else:
             line.append(_span(css, run))
@@ -99,11 +99,13 @@ def _tokens(lexer: Lexer, code: str) -> Iterator[tuple[_TokenType, str]]:
 
 def _span(css: str, text: str) -> str:
     """A run of tokens of one class; white space around it stays outside the element."""
-    core = text.strip()
-    if not css or not core:
-        return escape(text, quote=False)
-    before, _, after = text.partition(core)
-    return f'{before}<span class="{css}">{escape(core, quote=False)}</span>{after}'
+    html = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    if not css or not (core := html.strip()):
+        return html
+    if core == html:
+        return f'<span class="{css}">{html}</span>'
+    before, _, after = html.partition(core)
+    return f'{before}<span class="{css}">{core}</span>{after}'
 
 
 @functools.cache

@@ -6,9 +6,8 @@ afterwards.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from markupsafe import Markup
 
@@ -31,19 +30,18 @@ from coursebuild.model import (
     document_inlines,
 )
 from coursebuild.model import document_scripts as document_scripts
+from coursebuild.patterns import pattern
 from coursebuild.render.asked import AskedBy
 from coursebuild.render.asked import asked as asked_in
-from coursebuild.render.assets import Assets, strings_for, templates_of
+from coursebuild.render.assets import Assets, strings_for
 from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.lookup.references import CrossReferences, Mentions, mentions
 from coursebuild.render.strings import Strings
+from coursebuild.render.templates import Templates, templates_of
 from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
 from coursebuild.values import dataclass
 from coursebuild.vocabulary import CALLOUTS
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
 
@@ -68,7 +66,7 @@ class Library:
     course: Course
     results: Results
     words: Strings
-    templates: Callable[[], Environment]
+    templates: Templates
     """Gives the template engine."""
     lessons: Mapping[str, Lesson]
     levels: Mapping[str, Level]
@@ -102,7 +100,7 @@ class Library:
         course: Course,
         results: Results,
         assets: Assets,
-        templates: Callable[[], Environment] | None = None,
+        templates: Templates | None = None,
         words: Strings | None = None,
         reports: Reports | None = None,
     ) -> Library:
@@ -141,7 +139,7 @@ class Library:
         formulas: Mapping[Formula, str | MathError],
         verdicts: Mapping[tuple[str, int], Verdict],
         asked_of: Callable[[Document], str] = asked_in,
-        templates: Callable[[], Environment] | None = None,
+        templates: Templates | None = None,
         words: Strings | None = None,
         reports: Reports | None = None,
     ) -> Library:
@@ -236,7 +234,7 @@ def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -
     )
 
 
-_MODEL_NAMED = re.compile(
+_MODEL_NAMED = pattern(
     r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?P<file>[\w./-]+)\.xml\b"""
     r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
 )

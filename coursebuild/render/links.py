@@ -11,7 +11,6 @@ Entry points: `check_links(files, base_url)`, which gives what is broken, sorted
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from html import unescape
 from typing import TypeAlias
@@ -19,6 +18,7 @@ from urllib.parse import unquote, urljoin, urlsplit
 
 from coursebuild.diagnostics import nearest
 from coursebuild.model import linked_lines
+from coursebuild.patterns import pattern
 from coursebuild.render import urls
 from coursebuild.results import OutputFile
 from coursebuild.values import dataclass
@@ -87,12 +87,15 @@ class _Base:
     """The address of its root, with `_ORIGIN` for the host."""
     own: str | None
     """The host, where it is known."""
+    plain: bool
+    """Whether nothing in the root has to be resolved."""
 
     @classmethod
     def of(cls, base_url: str) -> _Base:
         base = urlsplit(base_url)
         own = f"{base.scheme}://{base.netloc}" if base.netloc else None
-        return cls(f"{_ORIGIN}{base.path.rstrip('/')}/", own)
+        folder = f"{base.path.rstrip('/')}/"
+        return cls(f"{_ORIGIN}{folder}", own, _STEPS.fullmatch(folder, 1) is not None)
 
 
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
@@ -156,21 +159,41 @@ def has(ids: Collection[str], anchor: str) -> bool:
     return any(stem == lines[0] and lines[2] <= last for stem, _, last in others)
 
 
+_LINE = pattern("[1-9][0-9]{0,8}")
+
+
 def without_lines(ids: Iterable[str]) -> frozenset[str]:
     """Ids with the last line of each listing for all of its lines."""
     kept: set[str] = set()
     longest: dict[str, int] = {}
     for name in ids:
-        lines = linked_lines(name) if ".L" in name else None
-        if lines is None:
-            kept.add(name)
+        stem, _, line = name.rpartition(".L")
+        if stem and stem.isprintable() and _LINE.fullmatch(line):  # as most are
+            last = int(line)
+        elif ".L" in name and (lines := linked_lines(name)) is not None:
+            stem, _, last = lines
         else:
-            longest[lines[0]] = max(longest.get(lines[0], 0), lines[2])
+            kept.add(name)
+            continue
+        if last > longest.get(stem, 0):
+            longest[stem] = last
     return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
+
+
+_STEP = r"[A-Za-z0-9_~@,+-][A-Za-z0-9_.~@,+-]*+"
+_STEPS = pattern(rf"(?:{_STEP}/)*+(?:{_STEP})?")
+_PLAIN_URL = pattern(rf"((?:\.\./)*+)((?:{_STEP}/)*+{_STEP})(?:#([A-Za-z0-9_.~@,+:-]*+))?")
+"""An address as nearly all are: in it nothing is encoded, and every step leads somewhere."""
 
 
 def _target(path: str, url: str, base: _Base) -> Reference | str | None:
     """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
+    plain = _PLAIN_URL.fullmatch(url)
+    if plain is not None and base.plain and _STEPS.fullmatch(path):
+        up, folders = len(plain[1]) // 3, path.count("/")
+        if up <= folders:
+            folder = "".join(f"{step}/" for step in path.split("/")[: folders - up])
+            return folder + plain[2], plain[3] or ""
     try:
         parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
     except ValueError:
@@ -235,12 +258,10 @@ def _read(html: str) -> _Page:
     return _Page(frozenset(ids), tuple(addresses))
 
 
-_TAGS = re.compile(
-    r"""(?:[^<]++|</|<[a-z][a-z0-9]*+(?:>|(?:\s[\w:-]++(?:="[^"<>]*+")?)*+\s*/?>))*+"""
-)
-_WITH_ATTRIBUTES = re.compile(r"<([a-z][a-z0-9]*)(\s[^<>]+)>")
-_ATTRIBUTE = re.compile(r"""\s([\w:-]+)="([^"<>]*)\"""")
-_RAW_TEXT = re.compile(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
+_TAGS = pattern(r"""(?:[^<]++|</|<[a-z][a-z0-9]*+(?:>|(?:\s[\w:-]++(?:="[^"<>]*+")?)*+\s*/?>))*+""")
+_WITH_ATTRIBUTES = pattern(r"<([a-z][a-z0-9]*)(\s[^<>]+)>")
+_ATTRIBUTE = pattern(r"""\s([\w:-]+)="([^"<>]*)\"""")
+_RAW_TEXT = pattern(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
 
 
 def _quickly_read(html: str, *, plain: bool = False) -> _Page | None:
@@ -250,9 +271,11 @@ def _quickly_read(html: str, *, plain: bool = False) -> _Page | None:
     """
     if not (plain or _TAGS.fullmatch(html)) or _RAW_TEXT.search(html):
         return None
+    if plain:
+        return _plainly_read(html)
     ids: set[str] = set()
     addresses: list[_Address] = []
-    for tag, attributes in _telling(html) if plain else _WITH_ATTRIBUTES.findall(html):
+    for tag, attributes in _WITH_ATTRIBUTES.findall(html):
         wanted = _ADDRESSES.get(tag, ())
         if not wanted and ' id="' not in attributes:
             continue
@@ -266,20 +289,37 @@ def _quickly_read(html: str, *, plain: bool = False) -> _Page | None:
     return _Page(frozenset(ids), tuple(addresses))
 
 
-_TELLING = ("id", "name", *sorted({name for names in _ADDRESSES.values() for name in names}))
+_HOLDERS: dict[str, tuple[str, ...]] = {
+    name: tuple(tag for tag, names in _ADDRESSES.items() if name in names)
+    for name in sorted({name for names in _ADDRESSES.values() for name in names})
+}
+"""Elements by the attributes in which they hold addresses."""
 
 
-def _telling(html: str) -> Iterator[tuple[str, str]]:
-    """The tags of a plain page that may have ids or addresses, each with its attributes."""
-    places: set[tuple[int, int]] = set()
-    for name in _TELLING:
-        wanted = f' {name}="'
-        at = html.find(wanted)
-        while at >= 0:
-            start, end = html.rfind("<", 0, at), html.find(">", at)
-            if start >= 0 and html.find(">", start, at) < 0:  # else it stands in a text
-                places.add((start, end))
-            at = html.find(wanted, at + 1)
-    for start, end in sorted(places):
-        tag, _, attributes = html[start + 1 : end].partition(" ")
-        yield tag, f" {attributes}"
+def _plainly_read(html: str) -> _Page:
+    """The same for a plain page, of which only the attributes that count are looked at."""
+    ids = {value for _, _, value in _values(html, "id")}
+    ids.update(value for _, tag, value in _values(html, "name") if tag == "a")
+    found = [
+        (at, _Address(one, 0))
+        for name, holders in _HOLDERS.items()
+        for at, tag, value in _values(html, name)
+        if tag in holders
+        for one in (_srcset(value) if name == "srcset" else (value,))
+    ]
+    found.sort(key=lambda one: one[0])
+    return _Page(frozenset(ids), tuple(address for _, address in found))
+
+
+def _values(html: str, name: str) -> Iterator[tuple[int, str, str]]:
+    """The values of an attribute in a plain page, with their places and their elements' names."""
+    wanted = f' {name}="'
+    at = html.find(wanted)
+    while at >= 0:
+        start, value = html.rfind("<", 0, at), at + len(wanted)
+        # Else it stands in a text, or in the value of another attribute.
+        if start >= 0 and html.find(">", start, at) < 0 and not html.count('"', start, at) % 2:
+            tag = html[start + 1 : html.find(" ", start, at + 1)]
+            text = html[value : html.find('"', value)]
+            yield value, tag, unescape(text) if "&" in text else text
+        at = html.find(wanted, value)

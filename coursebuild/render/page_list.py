@@ -11,14 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from coursebuild.model import Document
-from coursebuild.render import lesson, pages, reader, urls
+from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
-from coursebuild.render.lookup.glossary import glossary_sheet
-from coursebuild.render.lookup.symbol_index import symbols_sheet
-from coursebuild.render.numerics import numerics_sheet
-from coursebuild.render.offline import offline_sheet
-from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.sheet import Sheet
 from coursebuild.values import dataclass
 
@@ -61,7 +56,12 @@ class PageKind:
     document: Callable[[Library, str], Document | None] = lambda library, id: None
 
 
+# What makes a sheet is imported when there is one to make: after an edit few are made.
+
+
 def _lesson_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render import lesson
+
     entry = library.lessons[id]
     if entry.document is None:
         return lesson.stub_sheet(library, entry)
@@ -69,33 +69,93 @@ def _lesson_sheet(library: Library, id: str) -> Sheet:
 
 
 def _page_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.pages import page_sheet
+
     page = library.pages[id]
     assert page.document is not None, "a page without a document is not in the list"
-    return pages.page_sheet(library, page, page.document)
+    return page_sheet(library, page, page.document)
 
 
 def _model_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.pages import model_sheet
+
     model = next(model for model in library.course.models if model.name == id)
-    return pages.model_sheet(library, model)
+    return model_sheet(library, model)
 
 
-def _only(sheet: Callable[[Library], Sheet]) -> PageKind:
-    return PageKind(lambda library, id: sheet(library))
+def _level_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.pages import level_sheet
+
+    return level_sheet(library, library.levels[id])
 
 
-_HOME = _only(pages.home_sheet)
-_LEVEL = PageKind(lambda library, id: pages.level_sheet(library, library.levels[id]))
+def _home_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.pages import home_sheet
+
+    return home_sheet(library)
+
+
+def _glossary_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.lookup.glossary import glossary_sheet
+
+    return glossary_sheet(library)
+
+
+def _symbols_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.lookup.symbol_index import symbols_sheet
+
+    return symbols_sheet(library)
+
+
+def _numerics_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.numerics import numerics_sheet
+
+    return numerics_sheet(library)
+
+
+def _progress_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.reader import progress_sheet
+
+    return progress_sheet(library)
+
+
+def _review_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.reader import review_sheet
+
+    return review_sheet(library)
+
+
+def _offline_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.offline import offline_sheet
+
+    return offline_sheet(library)
+
+
+def _search_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.search.sheet import search_sheet
+
+    return search_sheet(library)
+
+
+def _not_found_sheet(library: Library, id: str) -> Sheet:
+    from coursebuild.render.pages import not_found_sheet
+
+    return not_found_sheet(library)
+
+
+_HOME = PageKind(_home_sheet)
+_LEVEL = PageKind(_level_sheet)
 _LESSON = PageKind(_lesson_sheet, lambda library, id: library.lessons[id].document)
 _MODEL = PageKind(_model_sheet)
-_GLOSSARY = _only(glossary_sheet)
-_SYMBOLS = _only(symbols_sheet)
-_NUMERICS = _only(numerics_sheet)
+_GLOSSARY = PageKind(_glossary_sheet)
+_SYMBOLS = PageKind(_symbols_sheet)
+_NUMERICS = PageKind(_numerics_sheet)
 _PAGE = PageKind(_page_sheet, lambda library, id: library.pages[id].document)
-_PROGRESS = _only(reader.progress_sheet)
-_REVIEW = _only(reader.review_sheet)
-_OFFLINE = _only(offline_sheet)
-_SEARCH = _only(search_sheet)
-_NOT_FOUND = _only(pages.not_found_sheet)
+_PROGRESS = PageKind(_progress_sheet)
+_REVIEW = PageKind(_review_sheet)
+_OFFLINE = PageKind(_offline_sheet)
+_SEARCH = PageKind(_search_sheet)
+_NOT_FOUND = PageKind(_not_found_sheet)
 
 
 def page_list(library: Library) -> Iterator[PageEntry]:

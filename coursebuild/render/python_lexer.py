@@ -17,6 +17,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 
+from pygments.lexer import RegexLexerMeta
 from pygments.lexers.python import PythonLexer
 from pygments.regexopt import regex_opt
 from pygments.token import Comment, Keyword, Number, String, Text, _TokenType
@@ -34,7 +35,7 @@ def _one_of(words: Iterable[str]) -> str:
 _KEYWORD = _one_of(set(keyword.kwlist) - _BEGIN_MORE)
 _NUMBER = "|".join(f"(?:{rule[0]})" for rule in PythonLexer.tokens["numbers"])
 _NAME = (
-    rf"(?!__|{_one_of({*keyword.kwlist, *_AT_LINE_START})})"
+    rf"(?!__(?!(?:name|file)__\b)|{_one_of({*keyword.kwlist, *_AT_LINE_START})})"
     r"""[A-Za-z_][A-Za-z0-9_]*+(?!["']|[^\x00-\x7f])"""
 )
 _INDENTATION = r"""[ \t]*+(?![rRuUbB]{0,2}["']|(?:case|lazy|match)\b|\s)"""
@@ -50,6 +51,12 @@ _STRIDE = re.compile(
 )
 _INSIDE = re.compile(rf"(?:{_NAME}|\.(?!\d))+")
 """Names in the braces of an f-string."""
+_SIMPLE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*+(?![^\x00-\x7f])")
+"""A name without foreign letters."""
+_FIRST = re.compile(r"[A-Za-z_]|[^\x00-\x7f]")
+"""What a name may begin with."""
+_Match: TypeAlias = Callable[[str, int], re.Match[str] | None]
+"""How Pygments looks for what a rule is about."""
 _KINDS: dict[str | None, _TokenType] = {
     "keyword": Keyword,
     "comment": Comment,
@@ -63,6 +70,19 @@ _BRACES = {"expr-inside-fstring", "expr-inside-fstring-inner"}
 
 class FastPythonLexer(PythonLexer):  # type: ignore[misc]  # its module has no types
     """Gives the same text in tokens of the same colours as `PythonLexer`, but fewer of them."""
+
+    @classmethod
+    def _process_regex(cls, regex: Any, flags: int, state: str) -> _Match:
+        """Compile a rule when it is first tried: most never are, and all take a while."""
+        compiled: _Match | None = None
+
+        def match(text: str, at: int) -> re.Match[str] | None:
+            nonlocal compiled
+            if compiled is None:
+                compiled = RegexLexerMeta._process_regex(cls, regex, flags, state)
+            return compiled(text, at)
+
+        return _simple_first(match) if regex == PythonLexer.uni_name else match
 
     def get_tokens_unprocessed(
         self, text: str, stack: Iterable[str] = ("root",)
@@ -92,13 +112,23 @@ class FastPythonLexer(PythonLexer):  # type: ignore[misc]  # its module has no t
                 _change(states, change)
 
 
+def _simple_first(match: _Match) -> _Match:
+    """Pygments' rule of names; those without foreign letters are found without it."""
+
+    def simple(text: str, at: int) -> re.Match[str] | None:
+        found = _SIMPLE.match(text, at)
+        return found if found is not None or not _FIRST.match(text, at) else match(text, at)
+
+    return simple
+
+
 def _stride(state: str, text: str, at: int) -> re.Match[str] | None:
     if state == "root":
         return _STRIDE.match(text, at)
     return _INSIDE.match(text, at) if state in _BRACES else None
 
 
-_Rule: TypeAlias = tuple[Callable[[str, int], re.Match[str] | None], Any, Any]
+_Rule: TypeAlias = tuple[_Match, Any, Any]
 """How Pygments looks for it; what it makes of it; the states that it enters or leaves then."""
 
 

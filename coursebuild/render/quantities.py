@@ -14,11 +14,12 @@ word or a label (`Figure 2 A`) loses nothing by a space that does not break.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import Literal
 
 from markupsafe import Markup, escape
+
+from coursebuild.patterns import pattern
 
 _PREFIXED = (
     "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
@@ -28,7 +29,8 @@ _UNIT = (
     rf"(?:{_PREFIXED}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
     r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
 )
-_SPACES = "[ \u00a0\u202f]"
+_SPACE = " \u00a0\u202f"
+_SPACES = f"[{_SPACE}]"
 _END = r"(?![^\W_])"
 _UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}(?:{_SPACES}{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}){{0,3}}"
 _NUMBER = (
@@ -36,12 +38,12 @@ _NUMBER = (
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_WITH_UNIT = re.compile(rf"(?<=[0-9]) {_UNITS}")
-_UNIT_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
-_QUANTITY = re.compile(
+_ONE_UNIT = pattern(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
+_AFTER_DIGIT = pattern("(?<=[0-9]) ")
+_QUANTITY = pattern(
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
-_LATIN_BEFORE = re.compile("[A-Za-z]\\s*$")
+_LATIN_BEFORE = pattern("[A-Za-z]\\s*$")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
@@ -60,17 +62,35 @@ def in_order(html: Markup) -> Markup:
 
 def joined(text: str) -> str:
     """The text with no line end between a number and its unit, nor inside the unit."""
-    return _WITH_UNIT.sub(_unbroken, text) if " " in text else text
+    if " " not in text:
+        return text
+    parts: list[str] = []
+    at = 0
+    for space in _AFTER_DIGIT.finditer(text):
+        start = space.start()
+        end = _units_end(text, start + 1) if start >= at else 0
+        if end:
+            parts += (text[at:start], text[start:end].replace(" ", "\u00a0"))
+            at = end
+    return "".join((*parts, text[at:])) if parts else text
 
 
-def _unbroken(found: re.Match[str]) -> str:
-    return found[0].replace(" ", "\u00a0")
+def _units_end(text: str, at: int) -> int:
+    """Where the units end that begin at a place (`_UNITS`); 0 where none does."""
+    found = _ONE_UNIT.match(text, at)
+    if found is None:
+        return 0
+    for _ in range(3):
+        more = _ONE_UNIT.match(text, found.end() + 1)
+        if more is None or text[found.end()] not in _SPACE:
+            break
+        found = more
+    return found.end()
 
 
 def unit_length(text: str) -> int:
     """How many characters at the start of a text are the unit of a number that stands before it."""
-    found = _UNIT_FIRST.match(text)
-    return found.end() if found is not None else 0
+    return _units_end(text, int(text[:1] in _SPACE)) if text else 0
 
 
 def quantities(text: str) -> Iterator[tuple[str, bool]]:

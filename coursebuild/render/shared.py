@@ -16,8 +16,9 @@ from html import unescape
 
 from markupsafe import Markup
 
+from coursebuild.patterns import pattern
 from coursebuild.render import fonts, formulas, styles
-from coursebuild.render.assets import Assets, hashed_name, page_script
+from coursebuild.render.assets import SCRIPTS, Assets, hashed_name, page_script
 from coursebuild.render.frame import Draft, Names
 from coursebuild.render.library import Library
 from coursebuild.results import OutputFile
@@ -42,8 +43,8 @@ def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
     return replace(draft, body=Markup(body)), found
 
 
-_FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
-_SIGN = re.compile(
+_FORMULA = pattern(r"(<math\b.*?</math>)", re.DOTALL)
+_SIGN = pattern(
     r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
     r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
 )
@@ -97,22 +98,25 @@ def shared_files(
         files.append(OutputFile(name, data))
         return name
 
+    def script(name: str) -> str:
+        return publish(name, page_script(assets.file(SCRIPTS[name])))
+
     jobs = needed_fonts(assets, facts)
     fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
     own = styles.style_rules(facts.declarations)
     names = Names(
         style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
-        theme_script=publish("theme.js", page_script(assets.file("js/theme.js"))),
-        script=publish("site.js", page_script(assets.file("js/site.js"))),
+        theme_script=script("theme.js"),
+        script=script("site.js"),
         icon=publish("icon.svg", assets.template("icon.svg").encode()),
         credits=publish("licences.txt", _licences(assets)),
         touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
-        offline_script=publish("offline.js", page_script(assets.file("js/offline-page.js"))),
-        map_script=publish("map.js", page_script(assets.file("js/map-page.js"))),
-        reader_script=publish("reader.js", page_script(assets.file("js/reader-page.js"))),
-        quiz_script=publish("quiz.js", page_script(assets.file("js/quiz.js"))),
-        search_script=publish("search.js", page_script(assets.file("js/search.js"))),
+        offline_script=script("offline.js"),
+        map_script=script("map.js"),
+        reader_script=script("reader.js"),
+        quiz_script=script("quiz.js"),
+        search_script=script("search.js"),
     )
     return tuple(files), names
 

@@ -16,7 +16,9 @@ import re
 from collections.abc import Iterable
 from html import escape, unescape
 
-_PIECE = re.compile(
+from coursebuild.patterns import pattern
+
+_PIECE = pattern(
     r"""<!--.*?-->"""
     r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]|"[^"]*"|'[^']*')*>.*?</(?P=raw)\s*>"""
     r"""|<(?P<tag>[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>""",
@@ -25,13 +27,13 @@ _PIECE = re.compile(
 """A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
 for one."""
 
-_PLAIN = re.compile(
+_PLAIN = pattern(
     r"(?:[^<]++|</"
     r"|<(?!(?:script|style|textarea|title)\b)[a-z][a-z0-9]*+"
     r"""(?: (?!style[ />])[a-z0-9_:-]++(?:="[^"<>]*+")?)*+ ?/?>)*+"""
 )
 """HTML as we and Temml write it: there, what looks like a style in a tag is one."""
-_OTHERS = re.compile(
+_OTHERS = pattern(
     r"""(?:[^<]++|<(?![a-z]|!--)"""
     r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
     r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
@@ -39,7 +41,7 @@ _OTHERS = re.compile(
 )
 """What has no style in it: texts, end tags, most tags. Where it ends, `_PIECE` may begin."""
 
-_ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+_ATTRIBUTE = pattern(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
 def is_plain(html: str) -> bool:

@@ -6,19 +6,16 @@ Entry point: `Tools`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from markupsafe import Markup
 
 from coursebuild.render.direction import direction
 from coursebuild.render.quantities import text_html
 from coursebuild.render.strings import Strings
+from coursebuild.render.templates import Templates
 from coursebuild.results import Formula, MathError
 from coursebuild.values import dataclass, field
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
 
 _SLOT = "\ue000"
 """Stands for a value; no template has it."""
@@ -39,8 +36,7 @@ class Tools:
     """The interface's words in the course's language, the templates, and formulas as MathML."""
 
     words: Strings
-    templates: Callable[[], Environment]
-    """Gives the template engine."""
+    templates: Templates
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
     mark: Mark = mark_now
     """How code is marked: whoever calls may keep what was marked before."""
@@ -52,12 +48,8 @@ class Tools:
 
         It sees `t`, the interface's words, and `authored`, see `text`.
         """
-        text = (
-            self.templates()
-            .get_template(template)
-            .render(t=self.words, authored=self.text, **values)
-        )
-        return Markup(text.rstrip("\n"))
+        seen = {"t": self.words, "authored": self.text, **values}
+        return Markup(self.templates.render(template, seen).rstrip("\n"))
 
     def text(self, text: str) -> Markup:
         """Text of an author that is not Markdown, with its quantities kept together."""

@@ -16,6 +16,7 @@ import posixpath
 from urllib.parse import quote, urlsplit
 
 from coursebuild.model import Course, Lesson, Level, Page
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass
 
 HOME = "index.html"
@@ -111,9 +112,13 @@ def base_path(course: Course) -> str:
     return f"/{path}/" if path else "/"
 
 
+_UNRESERVED = pattern("[A-Za-z0-9/~._+@,-]*+")
+"""What stays as it is in an address."""
+
+
 def encode(path: str) -> str:
     """A site path as part of an address; colons are encoded, since one may read as a scheme."""
-    return quote(path, safe="/~-._+@,")
+    return path if _UNRESERVED.fullmatch(path) else quote(path, safe="/~-._+@,")
 
 
 @dataclass(frozen=True, slots=True)

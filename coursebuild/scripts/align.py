@@ -11,11 +11,11 @@ elided instead.
 from __future__ import annotations
 
 import enum
-import re
 from collections import Counter
 from collections.abc import Sequence
 
 from coursebuild.model import Comparison
+from coursebuild.patterns import pattern
 from coursebuild.scripts.ellipsis import blocks_match
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.pairing import MATCH, Keys, pair
@@ -23,7 +23,7 @@ from coursebuild.scripts.traced import Side
 from coursebuild.values import dataclass
 
 _ALIKE = 6
-_WORD = re.compile(r"[^\W\d]+")
+_WORD = pattern(r"[^\W\d]+")
 
 
 class StepKind(enum.Enum):

@@ -18,16 +18,16 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
-from coursebuild.scripts.nearest import meant
-from coursebuild.scripts.printed import PrintedLine, lines_of_run, printed_lines
-from coursebuild.scripts.shown import Shown, text_places
 from coursebuild.source import Span
 from coursebuild.values import dataclass
+
+if TYPE_CHECKING:
+    from coursebuild.scripts.printed import PrintedLine
 
 _FAILED = (
     Outcome.FAILED,
@@ -101,6 +101,8 @@ class Printed:
         if key not in self._lines:
             if len(self._lines) >= _REMEMBERED:
                 self._lines.clear()
+            from coursebuild.scripts.printed import printed_lines
+
             self._lines[key] = printed_lines(verdict.recording)
         return self._lines[key]
 
@@ -159,6 +161,8 @@ def _leans_on(binding: NumberBinding, printed: Printed) -> str:
 
 
 def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
+    from coursebuild.scripts.printed import lines_of_run
+
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     run = printed.run(path) if path is not None else None
@@ -205,11 +209,15 @@ def _unrecorded(binding: NumberBinding, path: str, run: ScriptRun | None) -> Dia
         )
     if run.outcome is not Outcome.OK:
         return None
+    from coursebuild.scripts.printed import lines_of_run
+
     lines = lines_of_run(run.stdout)
     return None if _holds(binding, lines) else _mismatch(binding, path, lines)
 
 
 def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
+    from coursebuild.scripts.shown import Shown, text_places  # of bindings that nobody remembers
+
     shown = Shown.of(binding.text)
     if not shown.numbers:
         return bool(shown.before) and any(True for _ in text_places(shown.before, lines))
@@ -233,6 +241,9 @@ def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
 
 
 def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -> Diagnostic:
+    from coursebuild.scripts.nearest import meant
+    from coursebuild.scripts.shown import Shown
+
     shown = Shown.of(binding.text)
     if not shown.numbers:
         return diagnose(
@@ -291,6 +302,8 @@ def _changed(
 
 
 def _leans_at(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
+    from coursebuild.scripts.shown import Shown, text_places
+
     shown = Shown.of(binding.text)
     if not shown.numbers:
         for line, start, end in text_places(shown.before, lines) if shown.before else ():

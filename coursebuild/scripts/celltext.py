@@ -7,7 +7,6 @@ itself.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 
 from coursebuild.model import (
@@ -29,11 +28,12 @@ from coursebuild.model import (
     Term,
     Text,
 )
+from coursebuild.patterns import pattern
 from coursebuild.scripts.traced import Piece, Traced, filtered
 from coursebuild.source import Span
 
-_RUN = re.compile(r"\s{2,}|[^\S ]")
-_ENDS = re.compile(r"\A\s+|\s+\Z")
+_RUN = pattern(r"\s{2,}|[^\S ]")
+_ENDS = pattern(r"\A\s+|\s+\Z")
 
 
 def plain(text: str) -> str:

@@ -11,9 +11,9 @@ Entry points: `differences` (inside one line), `number_kind`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from coursebuild.patterns import pattern
 from coursebuild.results import Change, DriftKind
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.numbers import (
@@ -28,7 +28,7 @@ from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.source import Span
 from coursebuild.values import dataclass
 
-_PART = re.compile(r"\s+|\w+|[^\w\s]")
+_PART = pattern(r"\s+|\w+|[^\w\s]")
 _SPACE, _NUMBER = 1, 4
 
 

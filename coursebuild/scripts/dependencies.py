@@ -17,6 +17,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import assert_never
 
+from coursebuild.patterns import pattern
 from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.values import dataclass
 
@@ -28,7 +29,7 @@ FOLDER = "folder"
 SPECIAL = "special"
 """States of files that are none; other states are hashes, or say why nothing can be read."""
 
-_MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
+_MISSING_MODULE = pattern(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
 """Another name, once what is kept of such runs means something else: then they run again."""
 _SHOWN = 6

@@ -14,9 +14,10 @@ from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import Held, Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
 from coursebuild.scripts.divergence import divergence
-from coursebuild.scripts.drift import drift_diagnostic
 from coursebuild.scripts.extract import Extraction, extract, owners
-from coursebuild.scripts.failures import failure, silence
+
+_ENDED_WELL = (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN)
+"""Or was not to be made: nothing is to be said of such a run itself."""
 
 
 def script_findings(
@@ -25,19 +26,24 @@ def script_findings(
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
     held: Held | None = None,
+    everything: Sequence[Extraction] | None = None,
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
-    `extractions` are those that were run, maybe not all of the course.
+    `extractions` are those that were run, maybe not all of the course; `everything` is what
+    `extract` gives for it, where that is known.
     """
     by_path = {run.path: run for run in runs}
-    everything = extract(course).value
+    everything = extract(course).value if everything is None else everything
     found: list[Diagnostic] = []
     for extraction in extractions:
         run = by_path.get(extraction.path)
-        failed = failure(extraction, run, everything) if run is not None else None
-        if failed is not None:
-            found.append(failed)
+        if run is not None and run.outcome not in _ENDED_WELL:
+            from coursebuild.scripts.failures import failure
+
+            failed = failure(extraction, run, everything)
+            if failed is not None:
+                found.append(failed)
         if run is not None:
             found += divergence(extraction, run, everything)
     printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
@@ -46,8 +52,12 @@ def script_findings(
         recording = verdict.recording
         run = by_path.get(recording.script or "")
         if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
+            from coursebuild.scripts.failures import silence
+
             found.append(silence(recording, run.path))
         elif verdict.status == "drift":
+            from coursebuild.scripts.drift import drift_diagnostic
+
             leaning = leaning_on(verdict, course.documents, printed)
             found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
     for document in course.documents:

@@ -16,10 +16,10 @@ Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 1
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from decimal import Context, Decimal
 
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass, replace
 
 _SIGN = "[+\\-\u2212]"
@@ -41,13 +41,13 @@ _LOOKS_LIKE_A_NUMBER = "|".join(
     )
 )
 _SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
-_TOKEN = re.compile(
+_TOKEN = pattern(
     rf"(?P<imaginary>(?<=[0-9.]){_SIGN}{_MAGNITUDE}(?=[jJ](?!\w)))"
     rf"|(?<![\w.^])(?<!\^[+\-])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
-_NOTATION = re.compile(
+_NOTATION = pattern(
     rf"(?P<sign>{_SIGN})?(?P<whole>[0-9]*)(?:\.(?P<decimals>[0-9]*))?"
     rf"(?:(?P<mark>[eE])(?P<power_sign>{_SIGN})?(?P<power>[0-9]+))?"
 )
@@ -57,7 +57,7 @@ _EXACT = Context(prec=40_000)
 _QUOTIENT = Context(prec=34)
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
-_POWER = re.compile(
+_POWER = pattern(
     rf"\s*[×·]\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
 )
 

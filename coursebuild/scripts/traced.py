@@ -18,9 +18,10 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from coursebuild.model import Filter
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass
 
-_LINE_END = re.compile(r"\r\n?|\n")
+_LINE_END = pattern(r"\r\n?|\n")
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,17 +14,18 @@ from collections.abc import Callable
 
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import Label, Meaning
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
 from coursebuild.values import dataclass
 
 Report = Callable[[Diagnostic], None]
 
-_TERM = re.compile(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
-_SYMBOL = re.compile(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
-_LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
-_PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_ID = re.compile(r"\{#(eq:[\w-]+)\}")
-_SPACES = re.compile(r"\s+")
+_TERM = pattern(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
+_SYMBOL = pattern(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
+_LABEL = pattern(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
+_PAIR = pattern(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
+_ID = pattern(r"\{#(eq:[\w-]+)\}")
+_SPACES = pattern(r"\s+")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` where the glossary is to say it otherwise'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'

@@ -1,6 +1,7 @@
 """The block parser: markdown-it's rules, chosen by the first character of a line.
 
-Entry point: `Blocks`. Its rules are markdown-it's own, with those for footnotes and formulas.
+Entry point: `Blocks`. Its rules are markdown-it's own, with those for footnotes and formulas; that
+for tables is ours (`tables`).
 Besides:
 
 1. A line is only shown to the rules that can begin with its first character, and a paragraph only
@@ -29,7 +30,6 @@ from markdown_it.rules_block import (
     list_block,
     paragraph,
     reference,
-    table,
 )
 from markdown_it.utils import EnvType
 from mdit_py_plugins.footnote.index import footnote_def
@@ -37,6 +37,7 @@ from mdit_py_plugins.footnote.index import footnote_def
 from coursebuild.source import Excerpt
 from coursebuild.syntax.math import math_block
 from coursebuild.syntax.spans import BlockState, Placed, Row
+from coursebuild.syntax.tables import table
 from coursebuild.values import dataclass, field
 
 MAX_NESTING = 60
@@ -80,8 +81,8 @@ def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) 
     if not silent:
         for i in (before, -1):
             plain = state.tokens[i]
-            placed = Placed(plain.type, plain.tag, plain.nesting, map=plain.map, level=plain.level)
-            placed.content = str(plain.meta.get("label", ""))
+            placed = Placed(plain.type, plain.tag, plain.nesting, level=plain.level)
+            placed.map, placed.content = plain.map, str(plain.meta.get("label", ""))
             state.tokens[i] = placed
     return True
 
@@ -228,7 +229,7 @@ def _place(state: BlockState, before: int, begin: int) -> None:
         last -= 1
     opened.start, opened.end = begin, state.eMarks[last]
     if opened.type in ("fence", "code_block", "html_block", "paragraph_open"):
-        opened.rows = state.rows
+        opened.rows, opened.lines = state.rows, state.count
     elif opened.type == "heading_open":
         opened.rows = _atx_row(state, begin) if opened.markup[0] == "#" else state.rows
     elif opened.type == "table_open":

@@ -7,15 +7,15 @@ Entry points: `read_head` (what the first line says), `resolve` (the kind that i
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection
 
 from coursebuild.diagnostics import Parsed, diagnose, did_you_mean
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import trimmed
 from coursebuild.values import dataclass
 
-_HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
+_HEAD = pattern(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
 """What a callout of an unknown kind is read as, so that all in it is still checked."""
 

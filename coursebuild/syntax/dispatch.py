@@ -90,9 +90,6 @@ def _bench(fence: Fence, session: Session) -> Block:
 
 
 def _interactive(fence: Fence, session: Session, texts: TextParser) -> Block:
-    from coursebuild.syntax.lab import parse_lab
-    from coursebuild.syntax.quiz import parse_quiz
-
     info = parse_info(fence.info)
     session.diagnostics += info.diagnostics
     words = list(info.value.words)
@@ -105,9 +102,13 @@ def _interactive(fence: Fence, session: Session, texts: TextParser) -> Block:
         session.report(diagnose("fence-info", fence.head, message))
         return fence.code()
     if fence.kind == "lab":
+        from coursebuild.syntax.lab import parse_lab
+
         lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
         session.diagnostics += lab.diagnostics
         return lab.value or fence.code()
+    from coursebuild.syntax.quiz import parse_quiz
+
     quiz = parse_quiz(fence.span, fence.body, texts)
     session.diagnostics += quiz.diagnostics
     return quiz.value or fence.code()

@@ -11,22 +11,21 @@ Entry point: `parse_document`. It never raises, whatever the text:
 
 from __future__ import annotations
 
-import re
-
 from coursebuild.diagnostics import Parsed, diagnose, sort_diagnostics
 from coursebuild.model import Document
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax.places import misplaced
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import whole
 from coursebuild.syntax.tree import TextReader
 
-_YAML = re.compile(
+_YAML = pattern(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
     r"[\w-]+[ \t]*:(?:[ \t].*)?\n"  # the first field
     r"(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
 )
-_TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
+_TOML = pattern(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
 
 def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
@@ -40,6 +39,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     reader = TextReader(base, session, session.definitions, nested=False)
     blocks = reader.read()
     document = Document(source, blocks, session.notes.finish())
+    session.end()
     session.diagnostics += misplaced(document)
     return Parsed(document, sort_diagnostics(session.diagnostics))
 

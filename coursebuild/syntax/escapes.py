@@ -16,8 +16,10 @@ import unicodedata
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 
-_LETTERS = re.compile(r"[A-Za-z]+")
-_DOLLARS = re.compile(r"(?<!\\)\$+")
+from coursebuild.patterns import pattern
+
+_LETTERS = pattern(r"[A-Za-z]+")
+_DOLLARS = pattern(r"(?<!\\)\$+")
 
 _COMMANDS = frozenset(
     re.findall(

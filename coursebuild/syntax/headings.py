@@ -12,14 +12,15 @@ from unicodedata import normalize
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Image, Inline, plain_text, walk_inlines
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.values import dataclass, field
 
-_CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
-_ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
-_CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
-_NO_SLUG = re.compile(r"[^\w\s-]")
-_SPACES = re.compile(r"\s")
+_CANDIDATE = pattern(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
+_ID = pattern(r"#[\w:.-]*[\w:-]|#\w")
+_CLASS = pattern(r"\.[A-Za-z_][\w-]*")
+_NO_SLUG = pattern(r"[^\w\s-]")
+_SPACES = pattern(r"\s")
 _HELP = (
     "write `{#id}`, `{.class}` or `{#id .class}`, "
     "of letters, digits, `-` and `_`, and in an id also `:` and `.`"

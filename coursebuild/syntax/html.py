@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.model import HtmlFlow, Inline, Math, RawInline
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.math import find_formula
 from coursebuild.syntax.mention import Item, plain, with_mentions
@@ -33,12 +34,10 @@ _RAW_TEXT = frozenset("script style textarea title".split())
 _LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
-_TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
-_LINK = re.compile(
-    r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
-)
-_PIECE = re.compile(r"\\\$|\$|<")
-_ENTITY = re.compile(r"&[^\s&;]{1,32};")
+_TAG = pattern(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
+_LINK = pattern(r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE)
+_PIECE = pattern(r"\\\$|\$|<")
+_ENTITY = pattern(r"&[^\s&;]{1,32};")
 
 
 class Tag(NamedTuple):

@@ -13,15 +13,16 @@ import re
 from collections.abc import Sequence
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import joined
 from coursebuild.values import dataclass
 
-_WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
-_SPACES = re.compile(r"\s*")
-_NEXT_SPACE = re.compile(r"\s|$")
-_ESCAPE = re.compile(r"""\\(["\\])""")
+_WORD = pattern(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
+_SPACED = pattern(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_SPACES = pattern(r"\s*")
+_NEXT_SPACE = pattern(r"\s|$")
+_ESCAPE = pattern(r"""\\(["\\])""")
 
 
 @dataclass(frozen=True, slots=True)

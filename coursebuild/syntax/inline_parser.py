@@ -7,7 +7,6 @@ are text.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 
 from markdown_it import MarkdownIt
@@ -29,6 +28,7 @@ from markdown_it.rules_inline import (
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
+from coursebuild.patterns import pattern
 from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.math import math_inline
 from coursebuild.syntax.spans import InlineState, Placed
@@ -56,8 +56,8 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
-_BRACE = re.compile(r"\{\s*([A-Za-z]{2,20})")
-_BINDING = re.compile(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
+_BRACE = pattern(r"\{\s*([A-Za-z]{2,20})")
+_BINDING = pattern(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
 
 
 def _like_out(key: str) -> bool:
@@ -86,7 +86,7 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
+_FOOTNOTE = pattern(r"\[\^([^\s\[\]]+)\]")
 
 
 def _footnote_reference(state: StateInline, silent: bool) -> bool:
@@ -139,7 +139,7 @@ def _link(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
-_STOP = re.compile(r"[\n\\`*_~\[\]<&$]|!\[")
+_STOP = pattern(r"[\n\\`*_~\[\]<&$]|!\[")
 
 
 def may_be_marked(text: str) -> bool:

@@ -33,8 +33,10 @@ from coursebuild.model import (
     Strikethrough,
     Strong,
     Term,
+    Text,
     plain_text,
 )
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
 from coursebuild.syntax.block_parser import Definitions
@@ -56,8 +58,8 @@ _UNREAD = (
     "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
     "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
 )
-_BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
-_DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+_BRACES = pattern(r"\{[^}\s]{0,60}\}?")
+_DEFINED = pattern(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
 @dataclass(slots=True)
@@ -91,9 +93,11 @@ class InlineReader:
         text = content.text
         if may_be_marked(text):
             return _Pass(self, content, mentions).read()
-        run = [Item(text, 0, len(text))] if text else []
-        make = with_mentions if mentions and may_mention(text) else plain
-        return tuple(make(run, Placer(content)))
+        if not text:
+            return ()
+        if mentions and may_mention(text):
+            return tuple(with_mentions([Item(text, 0, len(text))], Placer(content)))
+        return (Text(content.span(), text),)
 
 
 class _Pass:
@@ -138,10 +142,18 @@ class _Pass:
     # -- texts
 
     def _flush(self) -> None:
-        if self.run:
-            make = plain if self.links else with_mentions
-            self.stack[-1].nodes += make(self.run, self.placer)
-            self.run = []
+        run = self.run
+        if not run:
+            return
+        self.run = []
+        nodes = self.stack[-1].nodes
+        if not self.links:
+            nodes += with_mentions(run, self.placer)
+        elif len(run) == 1 and run[0].text != "\n":
+            text, start, end, _ = run[0]
+            nodes.append(Text(self.placer.span(start, end), text))
+        else:
+            nodes += plain(run, self.placer)
 
     def _unread_math(self) -> None:
         dollar = unread_formula(self.texts)

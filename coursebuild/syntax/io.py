@@ -6,10 +6,9 @@ the lines after it continue it. All three must be there, once, in this order.
 
 from __future__ import annotations
 
-import re
-
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
 from coursebuild.model import Inline, Io
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import parse_info, read_keys
@@ -17,8 +16,8 @@ from coursebuild.syntax.spans import joined, trimmed
 from coursebuild.syntax.texts import TextParser
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
-_LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")
-_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)\s*:")
+_LABEL = pattern(r"\s*(INPUT|PROCESS|OUTPUT):")
+_LIKE_LABEL = pattern(r"\s*([A-Za-z]+)\s*:")
 
 
 class _Parts:

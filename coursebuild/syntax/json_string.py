@@ -9,15 +9,14 @@ nobody can say where it was meant to end.
 
 from __future__ import annotations
 
-import re
-
 from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
 from coursebuild.syntax.escapes import tex_escapes, tex_word
 from coursebuild.syntax.nodes import StringNode
 
-_PLAIN = re.compile(r'[^"\\\x00-\x1f\ud800-\udfff]*')
-_HEX = re.compile(r"[0-9A-Fa-f]{4}")
+_PLAIN = pattern(r'[^"\\\x00-\x1f\ud800-\udfff]*')
+_HEX = pattern(r"[0-9A-Fa-f]{4}")
 _ESCAPES = {'"': '"', "\\": "\\", "/": "/", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
 
 

@@ -16,6 +16,7 @@ import re
 from typing import NoReturn
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.escapes import odd_character
 from coursebuild.syntax.json_string import read_string
@@ -37,12 +38,12 @@ MAX_DEPTH = 64
 """How deep objects and arrays may nest: far more than a person writes, far less than the
 interpreter's stack."""
 
-_SPACE = re.compile(r"[ \t\n\r]*")
-_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?(?![\w.+-])")
-_NUMBER_LIKE = re.compile(r"[-+.\w]+")
-_WORD = re.compile(r"[^\W\d][\w$]*")
-_KEY = re.compile(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
-_COMMENT = re.compile(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_SPACE = pattern(r"[ \t\n\r]*")
+_NUMBER = pattern(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?(?![\w.+-])")
+_NUMBER_LIKE = pattern(r"[-+.\w]+")
+_WORD = pattern(r"[^\W\d][\w$]*")
+_KEY = pattern(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
+_COMMENT = pattern(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _CURLY = "“”„‟‘’‚‛«»"
 _WORDS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _WORDS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")

@@ -12,20 +12,20 @@ before that means that it was never closed.
 
 from __future__ import annotations
 
-import re
 from typing import NamedTuple
 
 from markdown_it.rules_block import StateBlock
 from markdown_it.rules_inline import StateInline
 
+from coursebuild.patterns import pattern
 from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.spans import BlockState, InlineState, Placed
 
-_STOP = re.compile(r"\\[\s\S]|`+|\$+")
-_BLOCK_STOP = re.compile(r"\\[\s\S]|\$+")
-_BACKTICKS = re.compile(r"`+")
-_DOLLARS = re.compile(r"\$+")
-_LABEL = re.compile(r"\{#[^{}$]*\}?")
+_STOP = pattern(r"\\[\s\S]|`+|\$+")
+_BLOCK_STOP = pattern(r"\\[\s\S]|\$+")
+_BACKTICKS = pattern(r"`+")
+_DOLLARS = pattern(r"\$+")
+_LABEL = pattern(r"\{#[^{}$]*\}?")
 _SPACE = " \t\n"
 _DIGITS = "0123456789"
 

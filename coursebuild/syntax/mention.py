@@ -18,11 +18,12 @@ from itertools import accumulate
 from typing import NamedTuple
 
 from coursebuild.model import Inline, LessonTarget, LevelTarget, Link, SoftBreak, Text
+from coursebuild.patterns import pattern
 from coursebuild.syntax.spans import Placer
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*"
-_FIRST = re.compile(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
+_FIRST = pattern(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
 _BETWEEN = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
 _NEXT = {
     "Lessons": re.compile(rf"{_BETWEEN}({_LESSON})(?!\w)"),

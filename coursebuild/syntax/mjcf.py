@@ -6,14 +6,13 @@ names nested elements), `error="…"` (the message it must fail with).
 
 from __future__ import annotations
 
-import re
-
 from coursebuild.diagnostics import Parsed, diagnose
 from coursebuild.model import CodeBlock, Mjcf
+from coursebuild.patterns import pattern
 from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import parse_info, read_keys
 
-_ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
+_ELEMENTS = pattern(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
 def parse_mjcf(fence: Fence) -> Parsed[Mjcf | CodeBlock]:

@@ -29,8 +29,6 @@ from coursebuild.model import (
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.decode import Decoding, decode
 from coursebuild.syntax.json_text import parse_json
-from coursebuild.syntax.lab import sim_lab
-from coursebuild.syntax.lab_checks import check_lab
 from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.syntax.prose import Prose
 from coursebuild.syntax.question_keys import Keys
@@ -142,6 +140,8 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
+        from coursebuild.syntax.lab_checks import check_lab
+
         yield from check_lab(sim, decoding.structs)
 
 
@@ -192,6 +192,8 @@ def _question(
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
+                from coursebuild.syntax.lab import sim_lab
+
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             options = _choices(node, fields.options, prose)
             predict = isinstance(fields, Predict)

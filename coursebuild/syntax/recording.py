@@ -12,17 +12,18 @@ from decimal import Decimal
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Comparison, Inline, Mode, Recording, Table, plain_text
+from coursebuild.patterns import pattern
 from coursebuild.source import Span
 from coursebuild.syntax.fence import OURS, Fence
 from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
 from coursebuild.syntax.session import Session
 
-_CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
-_NEAR_CAPTION = re.compile(
+_CAPTION = pattern(r"\s*Output\b.*:\s*", re.DOTALL)
+_NEAR_CAPTION = pattern(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
 )
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_NUMBER = pattern(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
 _GROUPS = {

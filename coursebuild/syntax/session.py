@@ -46,6 +46,11 @@ class Session:
         """Take note of a mistake."""
         self.diagnostics.append(diagnostic)
 
+    def end(self) -> None:
+        """Let go of what refers back to this, so that no memory waits for the collector."""
+        self.notes.written.clear()
+        del self.notes, self.anchors
+
     def apart(self, read: Callable[[], T]) -> Parsed[T]:
         """What `read` gives, with the diagnostics that it raised, for the caller to pass on."""
         before, self.diagnostics = self.diagnostics, []

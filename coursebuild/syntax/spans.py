@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -38,29 +38,94 @@ class Row(NamedTuple):
     """Leading spaces of `text` that stand for a part of the tab before `at`."""
 
 
-@dataclass(slots=True)
 class Placed(Token):
-    """A token that knows its place: in the parsed text, or for inline tokens in the content."""
+    """A token that knows its place: in the parsed text, or for inline tokens in the content.
 
-    start: int = -1
-    end: int = -1
-    rows: list[Row] = field(default_factory=list)
-    """The rows that a block's content was made of."""
+    There are many, and few have attributes: these are made when they are asked for.
+    """
+
+    __slots__ = ("end", "lines", "rows", "start")
+
+    def __init__(
+        self,
+        kind: str,
+        tag: str,
+        nesting: Literal[-1, 0, 1],
+        *,
+        level: int = 0,
+        content: str = "",
+        block: bool = False,
+        start: int = -1,
+        end: int = -1,
+    ) -> None:
+        self.type = kind
+        self.tag = tag
+        self.nesting = nesting
+        self.map = None
+        self.level = level
+        self.children = None
+        self.content = content
+        self.markup = self.info = ""
+        self.block = block
+        self.hidden = False
+        self.start = start
+        self.end = end
+        self.rows: Sequence[Row] = ()
+        """What a block's content was made of."""
+        self.lines = 0
+        """How many lines these are."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> dict[str, Any]:
+            """Attributes that nobody has set: their slots are empty."""
+            if name not in ("attrs", "meta"):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            made: dict[str, Any] = {}
+            setattr(self, name, made)
+            return made
 
 
 class BlockState(StateBlock):
     """The state of the block rules; notes the rows that the last rule cut out."""
 
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
-        super().__init__(src, md, env, [])
-        self.rows: list[Row] = []
+        """The same as markdown-it's own, which looks at each line by itself."""
+        self.src, self.md, self.env = src, md, env
+        self.tokens: list[Token] = []
+        lines = src.split("\n")
+        if not lines[-1].strip(" \t"):  # which is no line where no line end follows
+            lines.pop()
+        sizes = [len(line) for line in lines]
+        shifts = [len(line) - len(line.lstrip(" \t")) for line in lines]
+        starts = list(accumulate([size + 1 for size in sizes], initial=0))
+        starts[-1] = len(src)
+        self.bMarks = starts
+        self.eMarks = [start + size for start, size in zip(starts, sizes, strict=False)]
+        self.eMarks.append(len(src))
+        self.tShift = [*shifts, 0]
+        self.sCount = [*shifts, 0]
+        if "\t" in src:
+            for number, shift in enumerate(shifts):
+                if shift:
+                    self.sCount[number] = len(lines[number][:shift].expandtabs(4))
+        self.bsCount = [0] * len(starts)
+        self.lineMax = len(lines)
+        self.blkIndent = self.line = self.level = 0
+        self.ddIndent = self.listIndent = -1
+        self.tight = False
+        self.parentType = "root"
+        self.result = ""
+        self._code_enabled = True
+        self.rows: Sequence[Row] = ()
+        self.count = 0
+        """How many lines the rows are."""
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
         """Add a token; that of an item of a list, which has no rule of its own, gets its place."""
-        token = Placed(ttype, tag, nesting, block=True)
         if nesting < 0:
             self.level -= 1
-        token.level = self.level
+        token = Placed(ttype, tag, nesting, level=self.level, block=True)
         if nesting > 0:
             self.level += 1
         if ttype == "list_item_open":
@@ -70,10 +135,20 @@ class BlockState(StateBlock):
 
     def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:  # noqa: N802
         """The lines from `begin` to `end` without `indent` columns of their indentation."""
-        self.rows = [
-            self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
-        ]
-        return "".join(row.text for row in self.rows)
+        self.count = max(end - begin, 0)
+        self.rows = self._rows(begin, end, indent, keepLastLF)
+        return "".join([row.text for row in self.rows])
+
+    def _rows(self, begin: int, end: int, indent: int, line_end: bool) -> Sequence[Row]:
+        if indent <= 0 and begin < end:
+            # What stands together in the text is one row.
+            starts, ends = self.bMarks, self.eMarks
+            if end - begin == 1 or starts[begin + 1 : end] == [
+                at + 1 for at in ends[begin : end - 1]
+            ]:
+                first = starts[begin]
+                return (Row(self.src[first : ends[end - 1] + line_end], first),)
+        return [self._row(line, indent, line_end or line + 1 < end) for line in range(begin, end)]
 
     def _row(self, line: int, indent: int, line_end: bool) -> Row:
         src, first = self.src, self.bMarks[line]
@@ -111,8 +186,16 @@ class InlineState(StateInline):
     def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
         content = self.pending
-        token = Placed("text", "", 0, content=content, level=self.pendingLevel)
-        token.start, token.end = self.mark, self.mark + len(content)
+        start = self.mark
+        token = Placed(
+            "text",
+            "",
+            0,
+            content=content,
+            level=self.pendingLevel,
+            start=start,
+            end=start + len(content),
+        )
         self.tokens.append(token)
         self.pending = ""
         return token
@@ -121,13 +204,11 @@ class InlineState(StateInline):
         """Add a token that begins here; the tokenizer sets its end when the rule is through."""
         if self.pending:
             self.pushPending()
-        token = Placed(ttype, tag, nesting)
-        token.start = self.pos
         meta = None
         if nesting < 0:
             self.level -= 1
             self.delimiters = self._prev_delimiters.pop()
-        token.level = self.level
+        token = Placed(ttype, tag, nesting, level=self.level, start=self.pos)
         if nesting > 0:
             self.level += 1
             self._prev_delimiters.append(self.delimiters)

@@ -1,24 +1,113 @@
-r"""Tables: rows and cells, each with its place.
+r"""Tables: the rule that finds them, their rows and cells, each with its place.
 
-Entry points: `read_table`, `split_row`.
+Entry points: `table`, the block rule; `read_table`; `split_row`.
 
-markdown-it's table rule keeps no positions in a row, so a row is split here again by its rules: at
-each `|` that no backslash stands before, while `\|` is a `|` in the cell.
+The rule takes what markdown-it's own takes, and makes a token for each row; that one makes three
+for each cell, without places. A row is split where it is read: at each `|` that no backslash stands
+before, while `\|` is a `|` in the cell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal, cast
+from itertools import accumulate
+from typing import Literal
 
 from markdown_it.common.utils import MD_TRIM_CHARS
+from markdown_it.rules_block import StateBlock
+from markdown_it.rules_block.table import MAX_AUTOCOMPLETED_CELLS
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.model import Cell, Inline, Table
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
 
 Align = Literal["left", "right", "center"]
+
+_DELIMITERS = pattern(r"(?:[|:][|: \t-]|-[|:-])[|: \t-]*")
+_COLUMN = pattern(r"(:?)-+(:?)")
+_PIPE = pattern(r"(?<!\\)\|")
+_ALIGN: dict[tuple[str, str], Align | None] = {
+    ("", ""): None,
+    (":", ""): "left",
+    ("", ":"): "right",
+    (":", ":"): "center",
+}
+
+
+def table(state: StateBlock, start_line: int, end_line: int, silent: bool) -> bool:
+    """The block rule: `table_open`, whose `meta` has the columns, a `tr_open` a row, `table_close`.
+
+    markdown-it's own, which follows https://github.github.com/gfm/#tables-extension-.
+    """
+    below = start_line + 1
+    if below >= end_line or state.sCount[below] < state.blkIndent or state.is_code_block(below):
+        return False
+    align = _columns(_line(state, below))
+    if align is None or state.is_code_block(start_line):
+        return False
+    head = _line(state, start_line).strip(MD_TRIM_CHARS)
+    if "|" not in head or not align or _count(head) != len(align):
+        return False
+    if silent:
+        return True
+    before, state.parentType = state.parentType, "table"
+    opened = state.push("table_open", "table", 1)
+    opened.meta["align"] = align
+    _add_row(state, start_line)
+    line = _add_rows(state, start_line + 2, end_line, len(align))
+    opened.map = [start_line, line]
+    state.push("table_close", "table", -1)
+    state.parentType, state.line = before, line
+    return True
+
+
+def _line(state: StateBlock, line: int) -> str:
+    return state.src[state.bMarks[line] + state.tShift[line] : state.eMarks[line]]
+
+
+def _columns(line: str) -> tuple[Align | None, ...] | None:
+    """What a delimiter row says of each column; `None` where the line is none."""
+    if _DELIMITERS.fullmatch(line) is None:
+        return None
+    parts = [part.strip(MD_TRIM_CHARS) for part in line.split("|")]
+    parts = [part for i, part in enumerate(parts) if part or 0 < i < len(parts) - 1]
+    found = [_COLUMN.fullmatch(part) for part in parts]
+    align = tuple(_ALIGN[one[1], one[2]] for one in found if one is not None)
+    return align if len(align) == len(found) else None
+
+
+def _count(row: str) -> int:
+    """How many cells a row has, without the pipes at its ends."""
+    cells = _PIPE.split(row)
+    if cells and not cells[0]:
+        cells.pop(0)
+    if cells and not cells[-1]:
+        cells.pop()
+    return len(cells)
+
+
+def _add_rows(state: StateBlock, line: int, end: int, columns: int) -> int:
+    """Add the rows from a line on; gives the line after them."""
+    rules = state.md.block.ruler.getRules("blockquote")
+    completed = 0
+    while line < end and state.sCount[line] >= state.blkIndent:
+        if any(rule(state, line, end, True) for rule in rules):
+            break
+        row = _line(state, line).strip(MD_TRIM_CHARS)
+        if not row or state.is_code_block(line):
+            break
+        completed += columns - _count(row)
+        if completed > MAX_AUTOCOMPLETED_CELLS:
+            break
+        _add_row(state, line)
+        line += 1
+    return line
+
+
+def _add_row(state: StateBlock, line: int) -> None:
+    state.push("tr_open", "tr", 0).map = [line, line + 1]
 
 
 def read_table(
@@ -30,26 +119,21 @@ def read_table(
 ) -> tuple[Table, int]:
     """The table whose opening token has the index `at`, and the index after its closing one."""
     opened = tokens[at]
+    align: tuple[Align | None, ...] = opened.meta["align"]
     rows: list[tuple[Cell, ...]] = []
-    align: list[Align | None] = []
-    row = opened
-    while (token := tokens[at]).type != "table_close":
+    at += 1
+    while (row := tokens[at]).type == "tr_open":
         at += 1
-        if token.type == "th_open":
-            style = str(token.attrs.get("style", ""))
-            align.append(cast(Align, style.removeprefix("text-align:")) if style else None)
-        elif token.type == "tr_open":
-            row = token
-        elif token.type == "tr_close":
-            cells = split_row(base, row.start, row.end)
-            if any(cell.text for cell in cells[len(align) :]):
-                report(_too_many(cells, len(align)))
-            cells = cells[: len(align)]
+        cells = split_row(base, row.start, row.end)
+        if any(cell.text for cell in cells[len(align) :]):
+            report(_too_many(cells, len(align)))
+        cells = cells[: len(align)]
+        if len(cells) < len(align):
             empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
             cells += [empty] * (len(align) - len(cells))
-            rows.append(tuple(Cell(cell.span(), cell, inlines(cell)) for cell in cells))
+        rows.append(tuple([Cell(cell.span(), cell, inlines(cell)) for cell in cells]))
     span = base.span(opened.start, opened.end)
-    return Table(span, tuple(align), rows[0], tuple(rows[1:])), at + 1
+    return Table(span, align, rows[0], tuple(rows[1:])), at + 1
 
 
 def _too_many(cells: Sequence[Excerpt], wanted: int) -> Diagnostic:
@@ -64,6 +148,8 @@ def split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
     line = base.text[start:end]
     at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
     text = line.strip(MD_TRIM_CHARS)
+    if len(base.pieces) == 1 and "\\|" not in text:
+        return _split_plain(base, at, text)
     cells: list[list[Row]] = []
     rows: list[Row] = []
     begin = 0
@@ -83,3 +169,19 @@ def split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
     if found and not found[-1].text:
         found.pop()
     return [trimmed(cell) for cell in found]
+
+
+def _split_plain(base: Excerpt, at: int, text: str) -> list[Excerpt]:
+    """The same for a row without escapes in a text that is in one piece."""
+    shift = at + base.pieces[0][1] - base.pieces[0][0]
+    parts = text.split("|")
+    starts = list(accumulate([len(part) + 1 for part in parts], initial=shift))
+    first, last = not parts[0], len(parts)
+    if last > first and not parts[-1]:
+        last -= 1
+    found: list[Excerpt] = []
+    for part, start in zip(parts[first:last], starts[first:], strict=False):
+        cell = part.lstrip(MD_TRIM_CHARS)
+        place = start + len(part) - len(cell)
+        found.append(Excerpt(base.source, cell.rstrip(MD_TRIM_CHARS), ((0, place),)))
+    return found

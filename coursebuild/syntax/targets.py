@@ -18,12 +18,13 @@ from coursebuild.model import (
     TermTarget,
     UrlTarget,
 )
+from coursebuild.patterns import pattern
 from coursebuild.source import Span
 from coursebuild.syntax.headings import term_id
 
-_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
+_SCHEME = pattern(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
-_PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
+_PICTURE = pattern(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
 _OURS = ("lesson", "model", "page", "term")
 
 

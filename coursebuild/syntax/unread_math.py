@@ -7,12 +7,13 @@ and commands of TeX in the text, where a reader would see them.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-_TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
+from coursebuild.patterns import pattern
+
+_TEX = pattern(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 """A command, an index or an exponent."""
-_MEANT = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
+_MEANT = pattern(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 """A dollar sign that no sum of money follows."""
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from typing import assert_never
 
+from coursebuild.patterns import pattern
 from coursebuild.syntax.nodes import (
     ArrayNode,
     BoolNode,
@@ -22,7 +23,7 @@ from coursebuild.syntax.nodes import (
 )
 from coursebuild.values import dataclass
 
-_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+_NUMBER = pattern(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)

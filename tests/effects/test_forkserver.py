@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -228,12 +229,29 @@ class TestServer:
         job = self.script(root, "import mujoco, time\nprint(mujoco.mj_version() > 0)")
         other = self.script(root, "import numpy\nprint(numpy.pi > 3)", "examples/y.py")
         with ScriptServer() as server:
-            server.expect(root, [job.path])
-            server.expect(root, [other.path, "examples/none.py"])
+            server.expect(["mujoco"])
+            server.expect(["numpy"])
             runs = server.run(root, [other, job], parallel=2)
-            server.expect(root, [job.path])
+            server.expect(["mujoco", "not_installed"])
             runs += server.run(root, [other], parallel=2)
         assert [run.stdout for run in runs] == ["True\n"] * 3
+
+    def test_it_ends_though_a_copy_of_the_tool_goes_on(self, root: Path) -> None:
+        job = self.script(root, "print(1)")
+        with ScriptServer() as server:
+            server.expect(())
+            copy = os.fork()
+            if not copy:
+                time.sleep(60)
+                os._exit(0)
+            try:
+                assert server.run(root, [job], parallel=1)[0].stdout == "1\n"
+                began = time.monotonic()
+                server.close()
+                assert time.monotonic() - began < 5
+            finally:
+                os.kill(copy, signal.SIGKILL)
+                os.waitpid(copy, 0)
 
     def test_order(self, root: Path) -> None:
         jobs = [self.script(root, f"print({i})", f"examples/{i}.py") for i in range(4)]

@@ -54,6 +54,18 @@ def test_a_request_goes_to_the_copy_that_it_names_and_finds_what_that_remembers(
     assert seen == []
 
 
+def test_each_copy_begins_before_its_first_request() -> None:
+    begun: list[int] = []
+
+    def seen(number: int) -> list[int]:
+        return list(begun)
+
+    with Pool(seen, 2, lambda: begun.append(os.getpid())) as pool:
+        answers, _ = pool.run([(None, n) for n in range(6)])
+    assert all(len(answer) == 1 and answer[0] != HERE for answer in answers)
+    assert begun == []
+
+
 def test_large_answers_and_requests() -> None:
     with Pool(lambda text: text * 3, 2) as pool:
         answers, _ = pool.run([(None, "x" * n * 100_000) for n in range(1, 20)])

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.cli import main
+from coursebuild.effects.pack_files import Pack, open_pack
 
 ROOT = Path(__file__).parents[2]
 SLUGS = ("one", "two", "three", "four", "five", "six")
@@ -104,6 +105,19 @@ class Folder:
             if (self.root / top).is_dir()
             for path in (self.root / top).iterdir()
         )
+
+    def spoil(self) -> int:
+        """Damage the end of every packed entry of the store; gives how many there are."""
+        count = 0
+        for path in (self.root / ".coursebuild" / "packs").iterdir():
+            pack = Pack(str(path), 0.0)
+            open_pack(pack)
+            with path.open("r+b") as file:
+                for _, start, size in pack:
+                    file.seek(start + size - 7)
+                    file.write(b"garbage")
+                    count += 1
+        return count
 
     # --- commands
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import shutil
 import tracemalloc
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from coursekit import Folder, block
 
 from coursebuild.pipeline import documents
 from coursebuild.pipeline.build import build, prepare
-from coursebuild.pipeline.bundles import WORTHWHILE
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.results import KeptFile, OutputFile
@@ -98,24 +96,18 @@ def test_pages_are_drawn_in_copies_of_what_was_read_here(
         folder = Folder(tmp_path / f"jobs{jobs}")
         write_course(folder, documents._MANY - 1, 300)
         folder.borrow(stores)
-        for store in ("outlines", "pages", "site"):
-            shutil.rmtree(folder.root / ".coursebuild" / store, ignore_errors=True)
         assert build(options(folder, jobs), Path("public")).ok
         sites.append(folder.tree("public"))
     assert sites[0] == sites[1]
 
 
-def test_outlines_come_from_one_file_and_from_many(tmp_path: Path, stores: Path) -> None:
-    """Whether they are in the bundle, beside it, in neither, or damaged: the site is the same."""
+def test_a_course_whose_store_is_whole_or_damaged(tmp_path: Path, stores: Path) -> None:
+    """Nothing is read again where it is whole; where it is damaged, the site is the same."""
     folder = Folder(tmp_path / "course")
-    write_course(folder, WORTHWHILE + 8, 300)
+    write_course(folder, 40, 300)
     folder.borrow(stores)
-    for store in ("outlines", "bundles"):
-        (folder.root / ".coursebuild" / store).unlink(missing_ok=True)
-    kept = folder.root / ".coursebuild"
     assert build(options(folder), Path("public")).ok
     clean = folder.tree("public")
-    (bundled,) = (kept / "bundles").iterdir()
 
     def again() -> dict[str, bytes]:
         with prepare(options(folder), Progress(quiet=True)) as prepared:
@@ -125,14 +117,16 @@ def test_outlines_come_from_one_file_and_from_many(tmp_path: Path, stores: Path)
             }
         return {path: data for path, data in clean.items() if made.get(path) != data}
 
-    marker = {".coursebuild-site", "files.json"}
-    shutil.rmtree(kept / "outlines")
-    assert again().keys() == marker  # only what publishing adds
-    assert not (kept / "outlines").exists(), "nothing was read again"
-    bundled.write_bytes(bundled.read_bytes()[:-7])
+    def packs() -> set[Path]:
+        return set((folder.root / ".coursebuild" / "packs").iterdir())
+
+    marker = {".coursebuild-site", "files.json"}  # what publishing adds
+    before = packs()
     assert again().keys() == marker
-    assert len(list((kept / "outlines").iterdir())) == WORTHWHILE + 8
-    (bundled,) = (kept / "bundles").iterdir()
-    shutil.rmtree(kept / "bundles")
+    assert packs() == before, "nothing was made"
+    assert folder.spoil() > 3 * 40
     assert again().keys() == marker
-    assert [entry.name for entry in (kept / "bundles").iterdir()] == [bundled.name]
+    assert packs() > before
+    before = packs()
+    assert again().keys() == marker
+    assert packs() == before, "what was made again is found"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -82,10 +83,8 @@ def test_every_page_is_listed_in_the_order_of_the_course(folder: Folder) -> None
 
 def test_a_store_that_cannot_be_written_is_no_matter(folder: Folder) -> None:
     before = index(folder)
-    store = folder.root / ".coursebuild" / "search"
-    for path in sorted(store.iterdir()):
-        path.unlink()
-    store.rmdir()
+    store = folder.root / ".coursebuild" / "packs"
+    shutil.rmtree(store)
     store.write_text("in the way")
     lesson = "content/lessons/1.7-l7.md"
     folder.write(lesson, folder.text(lesson) + "\n")

@@ -11,7 +11,8 @@ from coursekit import ROOT, block
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.checks import check_course, mjcf_texts
+from coursebuild.checks.compiled import mjcf_texts
+from coursebuild.checks.course import check_course
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.model import Course, Document, document_blocks
 from coursebuild.model.skeleton import skeleton

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
@@ -11,7 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.render.direction import direction
-from coursebuild.render.quantities import joined, quantities, text_html, unit_length
+from coursebuild.render.quantities import (
+    _SPACES,
+    _UNITS,
+    joined,
+    quantities,
+    text_html,
+    unit_length,
+)
 
 Make = Callable[..., Any]
 
@@ -122,3 +130,55 @@ def test_formulas_and_bound_numbers_hold_their_units(make: Make) -> None:
     html = make(text, course=MAP.format("fa")).html()
     assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in html
     assert html.count("<bdi") == 1
+
+
+MORE = (
+    *(
+        " ",
+        "\u00a0",
+        "\u202f",
+        "1",
+        "2.5",
+        "m",
+        "s",
+        "kg",
+        "/",
+        "·",
+        "*",
+        "^",
+        "^-2",
+        "²",
+        "⁻¹",
+        "h",
+    ),
+    *(
+        "px",
+        "min",
+        "mi",
+        "n",
+        "x",
+        "_",
+        "%",
+        "°",
+        "°C",
+        "B",
+        "MiB",
+        "rad",
+        "and",
+        "\n",
+        ".",
+        "é",
+        "e",
+    ),
+)
+WITH_UNIT = re.compile(rf"(?<=[0-9]) {_UNITS}")
+UNIT_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
+
+
+@given(st.lists(st.sampled_from(MORE), max_size=16).map("".join))
+def test_units_are_found_one_by_one_as_all_together(text: str) -> None:
+    """By two expressions that are right and take long to compile."""
+    unbroken = WITH_UNIT.sub(lambda found: found[0].replace(" ", "\u00a0"), text)
+    assert joined(text) == unbroken
+    found = UNIT_FIRST.match(text)
+    assert unit_length(text) == (found.end() if found is not None else 0)

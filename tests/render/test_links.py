@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coursebuild.patterns import pattern
 from coursebuild.render import BrokenLink, check_links
-from coursebuild.render.links import _quickly_read, _read, all_lead_somewhere, page_references
+from coursebuild.render.links import (
+    _Base,
+    _quickly_read,
+    _read,
+    _target,
+    all_lead_somewhere,
+    page_references,
+)
 from coursebuild.render.styles import is_plain
 from coursebuild.results import OutputFile
 
@@ -161,3 +171,28 @@ def test_a_plain_page_is_read_as_any_other(parts: list[str]) -> None:
 
 def test_such_pages_are_plain() -> None:
     assert all(is_plain(tag) for tag in PLAIN_TAGS if not tag.endswith('" />'))
+
+
+STEPS = st.sampled_from(
+    [
+        *("a", "b.html", "..", ".", "", "~x", "a,b", "x+y", "é", "a b", "%41", "a:b", "-", "a@b"),
+        *("1.2-x.html", "#", "#eq:1", "#a%20", "?q", "//h", ";p", "http:", "\n"),
+    ]
+)
+BASES = (
+    *("", "https://h.org", "https://h.org/", "https://h.org/c/d/", "https://h.org/c//d", "/x/y"),
+    *("https://h.org/c/../d", "h", "https://h.org/é/", "https://h.org/a;b", "https://h.org/a.b/.c"),
+)
+
+
+@given(
+    st.lists(STEPS, min_size=1, max_size=4).map("/".join),
+    st.tuples(st.lists(STEPS, max_size=5).map("/".join), STEPS).map("".join)
+    | st.text("a./#?:b-", max_size=9),
+    st.sampled_from(BASES),
+)
+def test_plain_addresses_lead_where_all_others_would(path: str, url: str, base_url: str) -> None:
+    base = _Base.of(base_url)
+    with patch("coursebuild.render.links._PLAIN_URL", pattern("(?!)")):
+        slow = _target(path, url, base)
+    assert _target(path, url, base) == slow

@@ -134,3 +134,21 @@ def test_the_picture_of_a_code_is_the_code(text: str) -> None:
 
 def test_an_address_that_no_code_holds_gets_none() -> None:
     assert qr_svg("x" * 5000, "label") == ""
+
+
+NAMES = st.lists(
+    st.sampled_from(
+        ("a", ".L", "L", "1", "0", "12", "-L", "\n", ".", "é", "\u2028", "9" * 10, "²")
+    ),
+    max_size=7,
+).map("".join)
+
+
+@given(st.lists(NAMES, max_size=6))
+def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
+    known = {name: linked_lines(name) for name in ids}
+    last: dict[str, int] = {}
+    for lines in filter(None, known.values()):
+        last[lines[0]] = max(last.get(lines[0], 0), lines[2])
+    others = {name for name, lines in known.items() if lines is None}
+    assert without_lines(ids) == others | {f"{stem}.L{line}" for stem, line in last.items()}

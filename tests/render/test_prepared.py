@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import brotli
 import pytest
 from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
 
 from coursebuild.effects.prepared import (
     FOLDER,
+    prepared_copy,
     prepared_cut,
     prepared_source,
-    prepared_template,
 )
-from coursebuild.effects.resources import assets_dir, template_texts
+from coursebuild.effects.resources import assets_dir
 from coursebuild.render import Assets
-from coursebuild.render.assets import template_environment
+from coursebuild.render.assets import SCRIPTS, page_script
+from coursebuild.render.compressed import compressed_files
 from coursebuild.render.fonts import (
     BASE,
     MATH,
@@ -34,6 +38,7 @@ from coursebuild.render.fonts import (
     ready_font,
 )
 from coursebuild.render.fonts import subset_font as cut
+from coursebuild.results import OutputFile
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,7 +50,37 @@ def test_they_are_up_to_date() -> None:
     listing = json.loads((folder / "fonts.json").read_bytes())
     assert listing["made_from"] == making["made_from"](assets_dir())
     files = {*listing["cuts"].values(), *(found["file"] for found in listing["smaller"].values())}
-    assert {path.name for path in folder.iterdir()} == {*files, "fonts.json", "templates.json"}
+    files |= set(json.loads((folder / "copies.json").read_bytes()).values())
+    lists = {"fonts.json", "templates.json", "copies.json"}
+    assert {path.name for path in folder.iterdir()} == files | lists
+
+
+def test_copies_are_up_to_date() -> None:
+    """If not, run `python site/bundle.py`."""
+    made = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["prepared"](assets_dir())
+    folder = assets_dir() / FOLDER
+    assert made == {name: (folder / name).read_bytes() for name in made}
+
+
+def test_a_copy_is_that_of_the_script_as_it_is_published(assets: Any) -> None:
+    """All that pages of every course refer to and that shrinks, but for the style sheet."""
+    asked: dict[str, bytes | None] = {}
+
+    def keep(key: str, make: Callable[[], bytes]) -> bytes:
+        asked[key] = prepared_copy(key)
+        return asked[key] or make()
+
+    names = [name for name in SCRIPTS if name != "theme.js"]  # which is too small
+    scripts = [OutputFile(f"assets/{n}", page_script(assets.file(SCRIPTS[n]))) for n in names]
+    copies = compressed_files(scripts, keep)
+    assert None not in asked.values()
+    assert len(copies) == 2 * len(names)
+    whole = {file.path: file.data for file in scripts}
+    for copy in copies:
+        path, _, suffix = copy.path.rpartition(".")
+        undo = brotli.decompress if suffix == "br" else gzip.decompress
+        assert undo(copy.data) == whole[path]
+    assert prepared_copy("0" * 64) is None
 
 
 def test_making_them_again_gives_the_same(assets: Any) -> None:
@@ -142,48 +177,7 @@ def test_what_the_list_notes_of_the_fonts_is_what_they_say(assets: Any) -> None:
         assert (face.measure is not None) == (face.subset == "latin")
 
 
-class Kept:
-    """What compiling templates asks for, without a store."""
-
-    def __init__(self) -> None:
-        self.codes: dict[str, bytes] = {}
-
-    def load(self, name: str) -> bytes | None:
-        return self.codes.get(name)
-
-    def generated(self, name: str) -> str | None:
-        return prepared_template(name)
-
-    def keep(self, name: str, data: bytes) -> None:
-        self.codes[name] = data
-
-
 def test_templates_are_up_to_date() -> None:
     """If not, run `python site/bundle.py`."""
     made = runpy.run_path(str(ROOT / "site" / "prepare_templates.py"))["prepared"]()
     assert (assets_dir() / FOLDER / "templates.json").read_bytes() == made
-
-
-def test_jinja_compiles_no_template_that_came_with_the_tool(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    kept, texts = Kept(), template_texts()
-    names = [path for path, _ in texts if path.endswith(".html")]
-
-    def compiled(*_: object) -> None:
-        raise AssertionError("it was compiled")
-
-    for _ in range(2):  # the second time from what was kept
-        environment = template_environment.__wrapped__(texts, kept)
-        monkeypatch.setattr(environment, "compile", compiled)
-        for name in names:
-            environment.get_template(name)
-        assert len(kept.codes) == len(names)
-
-
-def test_a_template_that_was_changed_is_compiled() -> None:
-    kept = Kept()
-    texts = (("notfound.html", "now {{ what }}"),)
-    environment = template_environment.__wrapped__(texts, kept)
-    assert environment.get_template("notfound.html").render(what="else") == "now else"
-    assert len(kept.codes) == 1

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coursebuild.render.search import words
 from coursebuild.render.search.index import _hash
 from coursebuild.render.search.tex import plain_formula
 from coursebuild.render.search.words import counted, is_fuzzy, shelf_of, terms_of
@@ -35,6 +36,20 @@ def test_any_text_has_terms_that_lines_can_hold(text: str) -> None:
     for term in terms:
         assert term and not {" ", "\n", "\0"} & {*term}
         assert shelf_of(term)
+
+
+WORDS = (
+    *("a", "s", "'s", "’s", "é", "λ", "\n", ".", "_", "1", "1e-5", "2.5E+3x", "E", "e+", " ", "×"),
+    *("…", "–", "ﬁ", "ſ", "\x1c", "½", "a\u0301", "\u0301", "İ", "中文", "x.y", "__a__", "1.2.3"),
+)
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=20).map("".join))
+def test_text_without_foreign_letters_is_read_in_no_other_way(text: str) -> None:
+    terms = terms_of(text)
+    assert counted(text) == {term: terms.count(term) for term in terms}
+    if text.isascii():
+        assert words._ASCII_TOKEN.findall(text) == words._TOKEN.findall(text)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from types import FrameType
 
@@ -222,3 +223,16 @@ def test_nested_brackets_grow_in_proportion() -> None:
     for left, right in (("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")):
         once = calls(left * 600 + "x" + right * 600)
         assert calls(left * 1200 + "x" + right * 1200) < 2.6 * once + 2000
+
+
+def test_reading_leaves_nothing_for_the_collector() -> None:
+    text = "## A {#a}\n\nSee[^1] [a].\n\n[^1]: A note with `code`.\n\n[a]: #a\n"
+    for _ in range(40):  # after which all is made that is made once
+        parse_document(Source("a.md", text), frozenset(), lesson=True)
+    gc.collect()
+    gc.disable()
+    try:
+        parse_document(Source("a.md", text), frozenset(), lesson=True)
+        assert gc.collect() == 0
+    finally:
+        gc.enable()

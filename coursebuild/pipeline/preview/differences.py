@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from coursebuild.checks import Places, anchors, defined_terms
+from coursebuild.checks.links import Places, anchors, defined_terms
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.model import Course, Document, Lesson, Page, Quiz, Script, document_blocks
 from coursebuild.render import urls

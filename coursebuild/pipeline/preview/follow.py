@@ -3,27 +3,30 @@
 Entry point: `follow(live, watcher, notice, said)`, which a thread of its own runs.
 
 1. What one save of an editor comes to (an empty file that is written next, a new file that takes
-   the place of the old one) counts once: when nothing more happened for ten milliseconds. While
+   the place of the old one) counts once: when nothing more happened for some milliseconds. While
    that is awaited the page is made already, so that it costs no time.
 2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
-3. A document that is gone or empty may be so only for a moment.
+3. A document that is gone or empty may be so only for a moment, and who has a file open may write
+   more of it.
 """
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from coursebuild.effects.watch import Watcher
 from coursebuild.pipeline.preview.live import MOST, LiveCourse, Plan
 from coursebuild.render.library import owners
 
 QUIET = 0.008
-"""Seconds without an event after which a save is complete; the watcher waits two more."""
+"""Seconds without an event after which a save is complete."""
 QUIET_MANY = 0.060
 """The same where many files change."""
 QUIET_GONE = 0.100
-"""The same where a document is not there, or empty."""
+"""The same where a document is not there or empty, or is still being written."""
 LONGEST = 0.250
 """Seconds after which what there is counts, whatever still happens; with many files, four times."""
 
@@ -63,19 +66,44 @@ def _take(
     """Take what a burst of events comes to; whether it came to anything."""
     while True:
         heard = time.monotonic()
-        plan = live.plan(paths)
         many = len(paths) > MOST
         last = began + LONGEST * (4 if many else 1)
-        quiet = QUIET_MANY if many else QUIET if plan is not None and _whole(plan) else QUIET_GONE
-        left = min(heard + quiet, last) - time.monotonic()
-        more = watcher.get(max(left, 0.0))
-        if not more:
-            break
+        with live.changed, _without_collecting():
+            plan = live.plan(paths)
+            soon = plan is not None and _whole(plan) and not watcher.writing
+            # So few milliseconds are waited for with the lock held: who asks for the page meanwhile
+            # gets the new one.
+            more = _more(watcher, heard + QUIET, last) if soon else frozenset()
+            if plan is not None and soon and not more:
+                live.commit(plan)
+                return bool(plan.found)
+        if not soon:
+            more = _more(watcher, heard + (QUIET_MANY if many else QUIET_GONE), last)
+            if not more:
+                break
         paths |= more
     if plan is not None and live.commit(plan):
         return bool(plan.found)
     notice()
     return live.reread() or plan is None
+
+
+def _more(watcher: Watcher, until: float, last: float) -> frozenset[str]:
+    """What else happens until then; nothing where it has taken too long already."""
+    now = time.monotonic()
+    return watcher.get(max(min(until, last) - now, 0.0)) if now < last else frozenset()
+
+
+@contextlib.contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Leave looking for garbage to whoever has time for it: that takes up to some milliseconds."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
 
 
 def _whole(plan: Plan) -> bool:

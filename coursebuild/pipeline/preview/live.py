@@ -20,7 +20,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
-from coursebuild.checks import Places, check_document, places
+from coursebuild.checks.course import check_document
+from coursebuild.checks.links import Places, places
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.read import read_sources
 from coursebuild.measured.shown import Reports

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from coursebuild.checks import document_formulas, formula_findings
+from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.effects.versions import engine_version, python_version

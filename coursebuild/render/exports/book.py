@@ -16,9 +16,9 @@ from markupsafe import Markup
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.draft import Draft
+from coursebuild.render.exports.addresses import filled, quoted
 from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
 from coursebuild.render.exports.parts import anchor
-from coursebuild.render.exports.rewrite import filled, quoted
 from coursebuild.render.library import Library
 from coursebuild.values import dataclass
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from coursebuild.render.exports.rewrite import escape
+from coursebuild.render.exports.addresses import escape
 
 _WIDTH, _HEIGHT = 1200, 1600
 _EDGE = 120

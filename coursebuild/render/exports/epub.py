@@ -25,11 +25,11 @@ from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.direction import direction
+from coursebuild.render.exports.addresses import filled, quoted, xml_id
 from coursebuild.render.exports.archive import File
 from coursebuild.render.exports.cover import cover
 from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
-from coursebuild.render.exports.parts import LessonPart
-from coursebuild.render.exports.rewrite import filled, quoted, xml_id
+from coursebuild.render.exports.parts import OpenChapter
 from coursebuild.render.library import Library
 from coursebuild.render.styles import style_rules
 from coursebuild.values import dataclass
@@ -134,9 +134,9 @@ class Epub:
 
     # --- pages
 
-    def chapter(self, lesson: Lesson, part: LessonPart) -> bytes:
+    def chapter(self, lesson: Lesson, part: OpenChapter) -> bytes:
         """A chapter with its links put in."""
-        text = filled(part.chapter, self._address)
+        text = filled(part.text, self._address)
         return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
 
     def _page(self, title: str, body: Markup | str, kind: str = "") -> bytes:

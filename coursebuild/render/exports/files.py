@@ -27,7 +27,7 @@ from coursebuild.render.exports.llms import PATH as LLMS
 from coursebuild.render.exports.llms import llms
 from coursebuild.render.exports.notebook_file import finished
 from coursebuild.render.exports.page import Beside, PageExports, page_exports
-from coursebuild.render.exports.parts import LessonPart
+from coursebuild.render.exports.parts import LessonPart, OpenChapter
 from coursebuild.render.exports.twin import twin_of
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
@@ -41,6 +41,8 @@ Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]
 Keep: TypeAlias = Callable[[str, Callable[[], bytes]], bytes]
 """Gives what was made under a key before, or makes it."""
 _HEAD = struct.Struct("<LLL")
+_ROOM = 4 << 20
+"""Bytes of compressed chapters that wait to be written, at most."""
 
 
 class Source(Protocol):
@@ -59,8 +61,12 @@ class Source(Protocol):
         """What a page gives to the files beside it."""
         ...
 
-    def part(self, path: str) -> LessonPart:
-        """What a lesson gives to the files of the whole course."""
+    def section(self, path: str) -> str:
+        """What a lesson gives to the page of the whole course."""
+        ...
+
+    def chapter(self, path: str) -> OpenChapter:
+        """What a lesson gives to the e-book."""
         ...
 
 
@@ -144,9 +150,6 @@ class Exports:
 
     # --- the whole course on pages
 
-    def _part(self, lesson: Lesson) -> LessonPart:
-        return self._source.part(urls.lesson_path(lesson))
-
     def _books(self, names: Names) -> Iterator[KeptFile]:
         frames = Frames(self._library, names)
         places = ""
@@ -160,8 +163,11 @@ class Exports:
             yield KeptFile(book.path, key, functools.partial(_joined, pieces), pieces)
 
     def _book(self, book: Book, before: str, after: str) -> Iterator[bytes]:
+        def section(lesson: Lesson) -> str:
+            return self._source.section(urls.lesson_path(lesson))
+
         yield before.encode("utf-8", "replace")
-        for text in book.texts(self._library, lambda lesson: self._part(lesson).section):
+        for text in book.texts(self._library, section):
             yield visible(text).encode()
         yield after.encode("utf-8", "replace")
 
@@ -188,17 +194,19 @@ class Exports:
         epub = Epub(self._library, around.style, around.declarations)
         links = _key(epub.places, self._library.course.language)
         chapters = {epub.file_of(lesson): lesson for lesson in self._lessons}
+        waiting: dict[str, bytes] = {}
+        room = _ROOM
 
         def compressed(lesson: Lesson) -> bytes:
             """A chapter and what is to be known of it: of a long course, one is made anew."""
 
             def make() -> bytes:
-                part = self._part(lesson)
+                part = self._source.chapter(urls.lesson_path(lesson))
                 facts = Chapter(part.pictures, part.mathml, part.svg)
                 return _joined_chapter(facts, deflate(epub.chapter(lesson, part)))
 
             key = _key(self._page_key(lesson), lesson.title, links)
-            return around.keep(key, make)
+            return waiting.pop(lesson.id, None) or around.keep(key, make)
 
         def pack(file: File) -> Deflated:
             lesson = chapters.get(file.path)
@@ -207,7 +215,12 @@ class Exports:
             return _chapter_part(compressed(lesson))[1]
 
         def facts(lesson: Lesson) -> Chapter:
-            return _chapter_part(compressed(lesson))[0]
+            nonlocal room
+            data = compressed(lesson)
+            room -= len(data)
+            if room >= 0:  # each is asked for once more
+                waiting[lesson.id] = data
+            return _chapter_part(data)[0]
 
         return packed(epub.files(facts, around.picture), pack)
 
@@ -272,8 +285,15 @@ class OnDemand:
             return self._exports(path).beside
         return Beside(twin_of(path, self._body(path)), None)
 
-    def part(self, path: str) -> LessonPart:
-        """What a lesson gives to the files of the whole course, made now."""
+    def section(self, path: str) -> str:
+        """What a lesson gives to the page of the whole course, made now."""
+        return self._part(path).section
+
+    def chapter(self, path: str) -> OpenChapter:
+        """What a lesson gives to the e-book, made now."""
+        return self._part(path).chapter
+
+    def _part(self, path: str) -> LessonPart:
         part = self._exports(path).part
         assert part is not None, "a written lesson has a part"
         return part
@@ -285,6 +305,6 @@ class OnDemand:
         found = entry.document(self._library)
         assert found is not None, "a page without a document gives nothing but its twin"
         sheet, document = entry.sheet(self._library), self._whole(found)
-        _, text = draw_whole(sheet, document, tools)
+        _, text, page = draw_whole(sheet, document, tools)
         base = self._library.course.base_url
-        return page_exports(sheet, document, tools, base, body, str(text))
+        return page_exports(sheet, page, tools, base, body, str(text))

@@ -58,6 +58,7 @@ from coursebuild.model import (
     ThematicBreak,
     plain_text,
 )
+from coursebuild.patterns import pattern
 from coursebuild.render.exports.marks import (
     ALWAYS,
     code_span,
@@ -135,7 +136,7 @@ class _Writer:
         parts: list[tuple[Block, str]] = []
         for block in blocks:
             before = parts[-1][0] if parts else None
-            text = self.block(block, after=before)
+            text = self.block(block, before)
             if text:
                 parts.append((block, text))
         written = ""
@@ -186,7 +187,7 @@ class _Writer:
 
     def _heading(self, heading: Heading) -> str:
         text = " ".join(self.inlines(heading.children, line=True).split("\n")).strip()
-        text = re.sub(r"(^|\s)(#+)$", r"\1\\\2", text)
+        text = _LAST_MARKS.sub(r"\1\\\2", text)
         return f"{'#' * heading.level} {text}".rstrip()
 
     def _list(self, block: ListBlock, *, other: bool) -> str:
@@ -223,13 +224,13 @@ class _Writer:
     # --- inlines
 
     def inlines(self, inlines: Iterable[Inline], *, line: bool = False, cell: bool = False) -> str:
-        text = "".join(self._inline(one, line=line, cell=cell) for one in inlines)
+        text = self._joined(inlines, line=line, cell=cell)
         return text if line else guarded(text)
 
-    def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
-        def inner(inlines: tuple[Inline, ...]) -> str:
-            return "".join(self._inline(one, line=line, cell=cell) for one in inlines)
+    def _joined(self, inlines: Iterable[Inline], *, line: bool, cell: bool) -> str:
+        return "".join([self._inline(one, line=line, cell=cell) for one in inlines])
 
+    def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
         match inline:
             case Text():
                 return _text(inline, cell=cell)
@@ -240,8 +241,9 @@ class _Writer:
                     return " "
                 return "\\\n" if inline.span.text.startswith("\\") else "  \n"
             case CodeSpan():
-                ticks = re.match("`*", inline.span.text)
-                return _piped(code_span(inline.text, ticks[0] if ticks else ""), cell=cell)
+                source = inline.span.text
+                ticks = source[: len(source) - len(source.lstrip("`"))]
+                return _piped(code_span(inline.text, ticks), cell=cell)
             case NumberBinding():
                 return escaped(number_text(inline))
             case Math():
@@ -249,16 +251,17 @@ class _Writer:
                 return _formula(inline, tag, cell=cell)
             case Emphasis():
                 mark = _delimiter(inline.span.text, "*")
-                return f"{mark}{inner(inline.children)}{mark}"
+                return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
             case Strong():
                 mark = _delimiter(inline.span.text, "*") * 2
-                return f"{mark}{inner(inline.children)}{mark}"
+                return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
             case Term():
-                return f"*{inner(inline.children)}*"
+                return f"*{self._joined(inline.children, line=line, cell=cell)}*"
             case Strikethrough():
-                return f"~~{inner(inline.children)}~~"
+                return f"~~{self._joined(inline.children, line=line, cell=cell)}~~"
             case Link():
-                return self._link(inline, inner(inline.children), cell=cell)
+                text = self._joined(inline.children, line=line, cell=cell)
+                return self._link(inline, text, cell=cell)
             case Image():
                 url = self.context.url(inline.url)
                 return _piped(picture(inline.alt, url, inline.title), cell=cell)
@@ -282,9 +285,15 @@ class _Writer:
         return link(text, href.replace("|", "%7C") if cell else href, node.title)
 
 
+_PIPE = pattern(r"(?<!\\)\|")
+_COMMENT = pattern(r"(?<!\\)%")
+_LAST_MARKS = pattern(r"(^|\s)(#+)$")
+_MINUS = pattern(r"(?<!\w)-(?=\d)")
+
+
 def number_text(node: NumberBinding) -> str:
     """A number that a script printed, with a real minus sign."""
-    return re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
+    return _MINUS.sub("\u2212", node.text)
 
 
 def _is_tight(block: Block) -> bool:
@@ -300,12 +309,13 @@ def _text(node: Text, *, cell: bool) -> str:
         if text[-1:].isspace() and not source[-1:].isspace():
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
-    text = ALWAYS.sub(lambda match: f"\\{match[0]}", node.text)
-    return _piped(text, cell=cell)
+    if "$" in source or "`" in source:
+        source = ALWAYS.sub(lambda match: f"\\{match[0]}", source)
+    return _piped(source, cell=cell)
 
 
 def _piped(text: str, *, cell: bool) -> str:
-    return re.sub(r"(?<!\\)\|", r"\\|", text) if cell else text
+    return _PIPE.sub(r"\\|", text) if cell and "|" in text else text
 
 
 def _delimiter(source: str, usual: str) -> str:
@@ -316,7 +326,7 @@ def _formula(node: Math, tag: str, *, cell: bool) -> str:
     tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
     if cell:  # a pipe would end the cell, and an escaped one is another sign
         tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
-    if re.search(r"(?<!\\)%", tex):  # a line's end ends a comment
+    if "%" in tex and _COMMENT.search(tex):  # a line's end ends a comment
         tex = _no_empty_lines(tex)
     elif "\n" in tex:
         tex = " ".join(part.strip() for part in tex.split("\n"))

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from coursebuild.patterns import pattern
+
 
 def hang(mark: str, text: str, indent: int | None = None) -> str:
     """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
@@ -25,16 +27,19 @@ def quoted(text: str) -> str:
 
 def fence(language: str, text: str) -> str:
     """Code between fences that are longer than any in it."""
-    runs = re.findall(r"^[ ]*(`{3,})", text, re.MULTILINE)
+    runs = _FENCES.findall(text) if "```" in text else ()
     ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
     body = text if text.endswith("\n") or not text else f"{text}\n"
     return f"{ticks}{language}\n{body}{ticks}"
 
 
+_FENCES = pattern(r"^[ ]*(`{3,})", re.MULTILINE)
+
+
 def code_span(text: str, ticks: str = "") -> str:
     """Text as inline code, between these ticks or as few as do."""
     text = text.replace("\n", " ")
-    runs = set(map(len, _TICKS(text)))
+    runs = set(map(len, _TICKS.findall(text))) if "`" in text else ()
     ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
     blank = text.strip(" ") == ""
     edges = text[:1] == "`" or text[-1:] == "`" or (text[:1] == text[-1:] == " ")
@@ -42,9 +47,9 @@ def code_span(text: str, ticks: str = "") -> str:
     return f"{ticks}{pad}{text}{pad}{ticks}"
 
 
-_TICKS = re.compile("`+").findall
-_MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
-ALWAYS = re.compile(r"[$`]")
+_TICKS = pattern("`+")
+_MARKS = pattern(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
+ALWAYS = pattern(r"[$`]")
 """What is escaped wherever it is text: another reader may see more in it than ours did."""
 
 
@@ -73,8 +78,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[st
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
+_APART = pattern(r"[\s<>()\\]")
+"""What an address may have in angle brackets only."""
+
+
 def _destination(url: str) -> str:
-    if url and not re.search(r"[\s<>()\\]", url):
+    if url and not _APART.search(url):
         return url
     safe = url.replace("\\", "%5C").replace("<", "%3C").replace(">", "%3E")
     return f"<{''.join('%20' if c.isspace() else c for c in safe)}>"
@@ -88,7 +97,7 @@ def _title(title: str) -> str:
     return f' "{text}"'
 
 
-_BEGINS = re.compile(
+_BEGINS = pattern(
     r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
     r"|[|:\s-]*-[|:\s-]*$)"
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
@@ -99,7 +108,10 @@ _BEGINS = re.compile(
 
 def guarded(text: str) -> str:
     """The lines of a paragraph, so that none of them begins another block."""
-    return "\n".join(_guarded_line(line) for line in text.split("\n"))
+    # A letter begins no block.
+    return "\n".join(
+        [line if line[:1].isalpha() else _guarded_line(line) for line in text.split("\n")]
+    )
 
 
 def _guarded_line(line: str) -> str:

@@ -1,6 +1,6 @@
 """A lesson as a Jupyter notebook that runs.
 
-Entry points: `notebook(sheet, document, tools, base_url)`, all that the lesson itself gives, and
+Entry points: `notebook(sheet, page, base_url)`, all that the lesson itself gives, and
 `finished(notebook, …)`, the file, with what its scripts need around them.
 
 1. Markdown cells are cut at headings and at scripts. Links are made whole with the course's
@@ -23,7 +23,6 @@ from urllib.parse import urljoin, urlsplit
 
 from coursebuild.model import (
     Block,
-    Document,
     Heading,
     Script,
     Table,
@@ -37,7 +36,6 @@ from coursebuild.render.exports.marks import escaped, hang, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.exports.twin import head
 from coursebuild.render.sheet import Sheet
-from coursebuild.render.tools import Tools
 from coursebuild.results import Outcome
 from coursebuild.values import dataclass
 
@@ -73,14 +71,13 @@ class Notebook:
     """Texts of the first cells, by key, as Markdown."""
 
 
-def notebook(sheet: Sheet, document: Document, tools: Tools, base_url: str) -> Notebook:
+def notebook(sheet: Sheet, page: PageContext, base_url: str) -> Notebook:
     """The cells of a lesson."""
-    assert sheet.shown is not None, "the page of a document shows it"
-    page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
+    document, words = page.document, page.tools.words
     here = _whole(base_url, sheet.path, page.place.href(sheet.path))
     locate = functools.partial(_whole, base_url, sheet.path)
     context = Plain(page, locate, here, notebook=True)
-    parts = head(sheet, tools.words, locate)
+    parts = head(sheet, words, locate)
     if base_url:
         parts.append(link(context.words("exports.on_site"), here))
     cells = list(_cells(context, document.blocks))
@@ -91,8 +88,8 @@ def notebook(sheet: Sheet, document: Document, tools: Tools, base_url: str) -> N
         for note in document.footnotes:
             cells += _nested(context, "footnotes", note.blocks)
     keys = ("before", "install", "setup", "setup_none", "left_out")
-    texts = tuple((key, escaped(tools.words(f"exports.{key}", zip=SLOT))) for key in keys)
-    return Notebook("\n\n".join(parts), tuple(cells), sheet.shown.python, texts)
+    texts = tuple((key, escaped(words(f"exports.{key}", zip=SLOT))) for key in keys)
+    return Notebook("\n\n".join(parts), tuple(cells), page.shown.python, texts)
 
 
 def _whole(base_url: str, path: str, href: str) -> str:

@@ -12,6 +12,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import TypeAlias
 
+import msgspec
+
+from coursebuild.patterns import pattern
 from coursebuild.render import zips
 from coursebuild.render.exports.marks import code_span
 from coursebuild.render.exports.notebook import SLOT, Notebook
@@ -49,13 +52,25 @@ def finished(
         "nbformat": 4,
         "nbformat_minor": 5,
     }
-    text = json.dumps(document, ensure_ascii=False, indent=1, sort_keys=True)
-    return f"{text}\n".encode("utf-8", "replace")
+    return written(document)
+
+
+def written(value: Json) -> bytes:
+    """JSON as Jupyter writes it: keys in order, each value in a line of its own."""
+    try:
+        data = msgspec.json.encode(value, order="deterministic")
+    except UnicodeEncodeError:  # half of a pair of surrogates
+        text = json.dumps(value, ensure_ascii=False, indent=1, sort_keys=True)
+        return f"{text}\n".encode("utf-8", "replace")
+    return msgspec.json.format(data, indent=1) + b"\n"
+
+
+_OTHERS = pattern(r"[^a-zA-Z0-9]+")
 
 
 def _slug(name: str) -> str:
     """A part of a cell's id, which may have few characters."""
-    plain = re.sub(r"[^a-zA-Z0-9]+", "-", name.removeprefix("examples/").removesuffix(".py"))
+    plain = _OTHERS.sub("-", name.removeprefix("examples/").removesuffix(".py"))
     if name.isascii() and 0 < len(plain) <= 40:
         return plain.strip("-") or "x"
     return hashlib.sha256(name.encode("utf-8", "replace")).hexdigest()[:12]
@@ -81,7 +96,7 @@ def _code(name: str, text: str, output: str | None = None, *, hidden: bool = Fal
 
 def _lines(text: str, end: str = "") -> list[Json]:
     lines = text.rstrip("\n").split("\n")
-    return [*(f"{line}\n" for line in lines[:-1]), f"{lines[-1]}{end}"]
+    return [*[f"{line}\n" for line in lines[:-1]], f"{lines[-1]}{end}"]
 
 
 def _setup(

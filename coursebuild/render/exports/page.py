@@ -1,16 +1,15 @@
 """What a drawn page gives to the files beside it, and to those of the whole course.
 
-Entry point: `page_exports(sheet, document, tools, base_url, body)`. It depends on what the page
-depends on, and on nothing else.
+Entry point: `page_exports`. It depends on what the page depends on, and on nothing else.
 """
 
 from __future__ import annotations
 
 from markupsafe import Markup
 
-from coursebuild.model import Document
 from coursebuild.render import formulas, styles, urls
 from coursebuild.render.characters import visible
+from coursebuild.render.context import PageContext
 from coursebuild.render.exports.notebook import Notebook, notebook
 from coursebuild.render.exports.parts import LessonPart, lesson_part
 from coursebuild.render.exports.twin import twin
@@ -39,12 +38,15 @@ class PageExports:
 
 
 def page_exports(
-    sheet: Sheet, document: Document | None, tools: Tools, base_url: str, body: str, article: str
+    sheet: Sheet, page: PageContext | None, tools: Tools, base_url: str, body: str, article: str
 ) -> PageExports:
-    """All of it; `body` is the page's HTML as published, `article` its document's as drawn."""
-    text = twin(sheet, document, tools, body) if urls.twin_path(sheet.path) is not None else ""
-    if sheet.kind != "lesson" or document is None:
+    """All of it; `page` is the context of the page's document, if it has one.
+
+    `body` is the page's HTML as published, `article` its document's as drawn.
+    """
+    text = twin(sheet, page, body) if urls.twin_path(sheet.path) is not None else ""
+    if sheet.kind != "lesson" or page is None:
         return PageExports(Beside(text, None), None)
     settled, _ = styles.hoist(formulas.glue(article))
     part = lesson_part(sheet, tools, Markup(visible(settled)))
-    return PageExports(Beside(text, notebook(sheet, document, tools, base_url)), part)
+    return PageExports(Beside(text, notebook(sheet, page, base_url)), part)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
+from coursebuild.render.exports.cut import Cut
 from coursebuild.render.exports.rewrite import Rewriter, Rules
 from coursebuild.render.exports.tags import Start
 from coursebuild.render.lesson import LessonHead
@@ -26,17 +27,24 @@ _DOWN = 2
 
 
 @dataclass(frozen=True, slots=True)
+class OpenChapter:
+    """A lesson as a chapter of the e-book, with its links left open."""
+
+    text: str
+    """XHTML."""
+    pictures: tuple[str, ...]
+    """Site paths of its pictures."""
+    mathml: bool
+    svg: bool
+
+
+@dataclass(frozen=True, slots=True)
 class LessonPart:
-    """A lesson, with its links left open."""
+    """A lesson, with its links left open. The two are kept apart: no file is made of both."""
 
     section: str
     """HTML."""
-    chapter: str
-    """XHTML."""
-    pictures: tuple[str, ...]
-    """Site paths of the pictures of the chapter."""
-    mathml: bool
-    svg: bool
+    chapter: OpenChapter
 
 
 def anchor(lesson: str, id: str = _TOP) -> str:
@@ -56,14 +64,10 @@ def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:
     prefix = anchor(head.id, "")
     page = Rules(sheet.path, prefix, down=_DOWN, opened=_is_no_answer, part=head.id)
     book = Rules(sheet.path, xml=True, pictures=SHOWN, without=_ON_PAPER)
-    section, chapter = Rewriter(page), Rewriter(book)
-    return LessonPart(
-        section.text(html),
-        chapter.text(html),
-        tuple(chapter.pictures),
-        "math" in chapter.elements,
-        "svg" in chapter.elements,
-    )
+    cut, rewriter = Cut(html), Rewriter(book)
+    section, text = Rewriter(page).of(cut), rewriter.of(cut)
+    mathml, svg = (f"<{name}" in text for name in ("math", "svg"))
+    return LessonPart(section, OpenChapter(text, tuple(rewriter.pictures), mathml, svg))
 
 
 def _is_no_answer(start: Start) -> bool:

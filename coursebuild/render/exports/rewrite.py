@@ -2,41 +2,46 @@
 
 Entry point: `Rewriter(rules).text(html)`.
 
-1. Tags are read one by one (`tags`); attributes that only serve the page's scripts are dropped.
+1. What is the same everywhere is copied in long runs (`cut`). Other tags are read once each
+   (`tags`); attributes that only serve the page's scripts are dropped.
 2. Ids and what refers to them get a prefix, headings go down.
 3. Addresses of the site become slots, since where they lead in the whole depends on the other
-   lessons: `filled` puts the addresses in when the whole is put together.
+   lessons: `addresses.filled` puts them in when the whole is put together.
 4. Written as XML, every element is closed, and what has no end has none.
 """
 
 from __future__ import annotations
 
-import posixpath
-import re
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterator
 from typing import TypeAlias
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
-from coursebuild.render.exports.tags import VOID, End, Start, pieces
-from coursebuild.values import dataclass
+from coursebuild.patterns import pattern
+from coursebuild.render.exports.addresses import OPEN, SHUT, escape, quoted, site_path, xml_id
+from coursebuild.render.exports.cut import MATHML, Cut, moved
+from coursebuild.render.exports.tags import VOID, End, Piece, Start
+from coursebuild.values import dataclass, replace
 
-_OPEN, _SHUT = "\ue000", "\ue001"
-"""Around a slot; pages have no such characters."""
-_SLOT = re.compile(f" {_OPEN}([^{_SHUT}]*){_SHUT}")
 _DROPPED = frozenset("button form template script style dialog iframe object embed".split())
 _REFERRING = frozenset(
     "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
     " aria-flowto aria-labelledby aria-owns for headers list".split()
 )
 """Attributes that hold ids."""
-_IN_SVG = re.compile(r"url\(#([^)]+)\)")
+_OTHER, _OF_SCRIPTS, _OF_PAGES, _ID, _IDS, _ADDRESS = range(6)
+"""What attributes are for; those of pages are not for XML."""
+_SIMPLE = pattern('[^&<>"\\x00-\\x1f\ud800-\udfff\ufffe\uffff]*+')
+"""A value that is the same everywhere."""
+_IN_SVG = pattern(r"url\(#([^)]+)\)")
 _NAMESPACES = {
     "svg": "http://www.w3.org/2000/svg",
-    "math": "http://www.w3.org/1998/Math/MathML",
+    "math": MATHML,
 }
 _XLINK = "http://www.w3.org/1999/xlink"
-_XML_NAME = re.compile(r"(?:(?:xml|xlink):)?[A-Za-z_][A-Za-z0-9_.-]*")
-_FORBIDDEN = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_XML_NAME = pattern(r"(?:(?:xml|xlink):)?[A-Za-z_][A-Za-z0-9_.-]*")
+_FORBIDDEN = pattern("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""What XML has not; said so since to compile a set takes as long as there are characters in it."""
 _ENDS_P = frozenset(
     "address article aside blockquote details div dl fieldset figcaption figure footer form h1 h2"
     " h3 h4 h5 h6 header hgroup hr main nav ol p pre section table ul".split()
@@ -52,6 +57,18 @@ _ENDS = {
     "tfoot": ("td", "th", "tr", "thead", "tbody"),
 }
 """The open elements that a start tag closes, where their ends were left out."""
+
+
+_Written: TypeAlias = tuple[int, str, str, tuple[str, ...]]
+"""What becomes of a mark: its kind, the name of its element, what is written, and the elements that
+it ends where their ends were left out."""
+_START, _END, _BETWEEN, _LEFT_OUT = range(4)
+"""Kinds: what opens and closes an element, what does neither, what opens one that is left out."""
+_NOTHING: _Written = (_BETWEEN, "", "", ())
+_SHORT = 120
+"""Characters of a mark that is remembered for other pages."""
+_MANY = 1000
+"""How many are remembered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,27 +99,84 @@ class Rewriter:
         self.rules = rules
         self.pictures: dict[str, None] = {}
         """Site paths of the pictures that are shown, in order."""
-        self.elements: set[str] = set()
-        """Names of all elements."""
-        self._known: dict[Start, str] = {}
+        self._everywhere = _everywhere(replace(rules, path="", prefix="", part=""))
+        self._known = self._everywhere.copy()
+        self._here = False
+        """Whether what was written just now is so on this page only."""
         self._out: list[str] = []
         self._open: list[str] = []
-        self._left_out: list[str] = []
-        """Open elements in one that is left out, and that one."""
 
     def text(self, html: str) -> str:
         """The whole."""
-        for piece in pieces(html):
-            if isinstance(piece, str):
-                if not self._left_out:
-                    self._out.append(self._characters(piece))
-            elif isinstance(piece, Start):
-                self._start(piece)
-            else:
-                self._end(piece)
-        while self._open:
+        return self.of(Cut(html))
+
+    def of(self, cut: Cut) -> str:
+        """The same of what was cut, for another rewriter too perhaps."""
+        rest = iter(cut.parts)
+        known, out, open_ = self._known, self._out, self._open
+        xml = self.rules.xml
+        prefix = self._value(self._id("")) if self.rules.prefix else ""
+        for run, mark, _ in rest:
+            if run:
+                out.append(moved(run, prefix, xml=xml))
+            found = known.get(mark)
+            if found is None:
+                found = known[mark] = self._learnt(mark, cut)
+            kind, name, written, ends = found
+            if kind == _END:
+                if open_ and open_[-1] == name:
+                    open_.pop()
+                    out.append(written)
+                else:
+                    self._end(name)
+                continue
+            if kind == _LEFT_OUT:
+                _skip(name, rest, cut)
+                continue
+            if ends and open_ and open_[-1] in ends:
+                for ended in ends:
+                    if open_ and open_[-1] == ended:
+                        self._shut()
+            out.append(written)
+            if kind == _START:
+                open_.append(name)
+        while open_:
             self._shut()
-        return "".join(self._out)
+        return "".join(out)
+
+    def _end(self, name: str) -> None:
+        if name in self._open:
+            while self._open[-1] != name:
+                self._shut()
+            self._shut()
+
+    def _shut(self) -> None:
+        self._out.append(f"</{self._lower(self._open.pop())}>")
+
+    # --- tags
+
+    def _learnt(self, mark: str, cut: Cut) -> _Written:
+        self._here = len(mark) > _SHORT
+        written = self._written(cut.read(mark))
+        if not self._here and len(self._everywhere) < _MANY:
+            self._everywhere[mark] = written
+        return written
+
+    def _written(self, found: tuple[Piece, ...]) -> _Written:
+        """What becomes of a mark; of one outside of what is left out."""
+        if not found:
+            return _NOTHING
+        first, *rest = found
+        if isinstance(first, str):
+            self._here = True
+            return _BETWEEN, "", self._characters(first), ()
+        if isinstance(first, End):
+            return _END, first.name, f"</{self._lower(first.name)}>", ()
+        kind, name, written, ends = self._start(first)
+        if rest and kind == _START:  # it has no tags in it
+            inside = "".join(self._characters(piece) for piece in rest if isinstance(piece, str))
+            return _BETWEEN, name, f"{written}{inside}</{name}>", ends
+        return (_BETWEEN, name, "", ()) if rest else (kind, name, written, ends)
 
     def _characters(self, text: str) -> str:
         if not self.rules.xml:
@@ -113,49 +187,23 @@ class Rewriter:
             text = escape(unescape(text))
         return _FORBIDDEN.sub("\ufffd", text)
 
-    # --- tags
-
-    def _start(self, start: Start) -> None:
+    def _start(self, start: Start) -> _Written:
         name = start.name
-        if self._left_out or self._is_left_out(start):
-            if name not in VOID and not start.closed:
-                self._left_out.append(name)
-            return
+        alone = name in VOID or start.closed
+        if self._is_left_out(start):
+            return _NOTHING if alone else (_LEFT_OUT, name, "", ())
         if self.rules.xml and not _XML_NAME.fullmatch(name):
-            return
-        for ended in _ENDS.get(name, ("p",) if name in _ENDS_P else ()):
-            if self._open and self._open[-1] == ended:
-                self._shut()
+            return _NOTHING
+        ends = _ENDS.get(name, ("p",) if name in _ENDS_P else ())
         if name == "img" and not self._shows(start):
-            return
-        self.elements.add(name)
-        written = self._known.get(start)
-        if written is None:
-            written = self._tag(start)
-            self._known[start] = written
-        self._out.append(written)
-        if name not in VOID and not start.closed:
-            self._open.append(name)
+            return _BETWEEN, name, self._characters(escape(start.get("alt") or "")), ()
+        return _BETWEEN if alone else _START, name, self._tag(start), ends
 
     def _is_left_out(self, start: Start) -> bool:
         if start.name in _DROPPED:
             return True
         without = self.rules.without
         return bool(without and not without.isdisjoint((start.get("class") or "").split()))
-
-    def _end(self, end: End) -> None:
-        if self._left_out:
-            if end.name in self._left_out:
-                while self._left_out.pop() != end.name:
-                    pass
-            return
-        if end.name in self._open:
-            while self._open[-1] != end.name:
-                self._shut()
-            self._shut()
-
-    def _shut(self) -> None:
-        self._out.append(f"</{self._lower(self._open.pop())}>")
 
     def _lower(self, name: str) -> str:
         """The name of an element, a heading's lower by some levels."""
@@ -164,52 +212,53 @@ class Rewriter:
         return name
 
     def _tag(self, start: Start) -> str:
-        rules = self.rules
-        parts = [self._lower(start.name)]
-        for name, value in start.attributes:
-            parts.append(self._attribute(start, name, value))
-        if rules.xml and start.name in _NAMESPACES and start.get("xmlns") is None:
-            parts.append(f' xmlns="{_NAMESPACES[start.name]}"')
-        if start.name == "details" and start.get("open") is None and rules.opened(start):
-            parts.append(' open=""')
-        closed = rules.xml if start.name in VOID else start.closed
-        end = "/>" if closed else ">"
-        return f"<{''.join(parts)}{end}"
+        rules, name = self.rules, start.name
+        text = f"<{self._lower(name)}"
+        for key, value in start.attributes:
+            text += self._attribute(name, key, value)
+        if rules.xml and name in _NAMESPACES and start.get("xmlns") is None:
+            text += f' xmlns="{_NAMESPACES[name]}"'
+        if name == "details" and start.get("open") is None and rules.opened(start):
+            text += ' open=""'
+        closed = rules.xml if name in VOID else start.closed
+        return f"{text}/>" if closed else f"{text}>"
 
-    def _attribute(self, start: Start, name: str, value: str | None) -> str:
-        rules = self.rules
-        lower = name.lower()
-        if lower.startswith(("on", "data-")) or lower in ("style", "download", "loading", "srcset"):
-            return ""
-        if rules.xml and (lower in ("tabindex", "sizes") or not _XML_NAME.fullmatch(name)):
+    def _attribute(self, element: str, name: str, value: str | None) -> str:
+        rules, use = self.rules, _use(name)
+        if use == _OF_SCRIPTS or (use == _OF_PAGES and rules.xml):
             return ""
         if value is None:
             return f' {name}=""' if rules.xml else f" {name}"
-        if name == "id" or (name == "name" and start.name == "a"):
+        if use == _ID or (name == "name" and element == "a"):
             value = self._id(value)
-        elif name in _REFERRING:
+        elif use == _IDS:
             value = " ".join(map(self._id, value.split()))
-        elif name == "aria-label" and start.name == "section" and rules.part:
-            value = f"{value}, {rules.part}"
-        elif name in ("href", "xlink:href", "src"):
+        elif name == "aria-label" and element == "section":
+            self._here = True
+            value = f"{value}, {rules.part}" if rules.part else value
+        elif use == _ADDRESS:
             # A picture inside a drawing is no part of the book.
-            return "" if rules.xml and start.name == "image" else self._address(name, value)
+            return "" if rules.xml and element == "image" else self._address(name, value)
         elif "url(#" in value:
             value = _IN_SVG.sub(lambda match: f"url(#{self._id(match[1])})", value)
         return f' {name}="{self._value(value)}"'
 
     def _id(self, id: str) -> str:
-        id = f"{self.rules.prefix}{id}"
+        self._here = True
+        id = self.rules.prefix + id
         # In XML an id is a name.
         return xml_id(id) if self.rules.xml else id
 
     def _value(self, value: str) -> str:
+        if _SIMPLE.fullmatch(value):
+            return value
         value = escape(value).replace('"', "&quot;")
         return _FORBIDDEN.sub("\ufffd", value) if self.rules.xml else value
 
     # --- addresses
 
     def _address(self, name: str, url: str) -> str:
+        self._here = True
         space = f' xmlns:xlink="{_XLINK}"' if name == "xlink:href" and self.rules.xml else ""
         if url.startswith("#"):
             anchor = self._id(unquote(url[1:])) if len(url) > 1 else ""
@@ -217,65 +266,50 @@ class Rewriter:
         path, anchor = site_path(self.rules.path, url)
         if path is None:
             return f'{space} {name}="{self._value(url)}"'
-        return f"{space} {_OPEN}{name} {path}#{anchor}{_SHUT}"
+        return f"{space} {OPEN}{name} {path}#{anchor}{SHUT}"
 
     def _shows(self, image: Start) -> bool:
         """Whether a picture can be shown; if not, what it shows is said in its place."""
+        self._here = True
         endings = self.rules.pictures
         path, _ = site_path(self.rules.path, image.get("src") or "")
         if path is not None and (not endings or path.lower().rpartition(".")[2] in endings):
             self.pictures[path] = None
             return True
-        if not endings:
-            return True
-        self._out.append(self._characters(escape(image.get("alt") or "")))
-        return False
+        return not endings
 
 
-def site_path(page: str, url: str) -> tuple[str | None, str]:
-    """The site path and the anchor of an address on a page; `None` where it leads elsewhere."""
-    parts = urlsplit(url)
-    if parts.scheme or parts.netloc or not parts.path:
-        return None, ""
-    folder = posixpath.dirname(page)
-    path = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
-    if parts.path.endswith("/"):
-        path = posixpath.join(path, "index.html")
-    return (None, "") if path.startswith(("../", "/")) else (path, unquote(parts.fragment))
+@functools.lru_cache(maxsize=8)
+def _everywhere(rules: Rules) -> dict[str, _Written]:
+    """What is the same on all pages: most tags have no address and no id."""
+    return {}
 
 
-Address: TypeAlias = Callable[[str, str, bool], str]
-"""Gives the address of a site path and an anchor; empty for none. The last says whether it is of a
-picture that is shown, and no link."""
+def _skip(name: str, rest: Iterator[tuple[str, str, str]], cut: Cut) -> None:
+    """Go behind the end of an element that has begun."""
+    open_ = [name]
+    for _, mark, _ in rest:
+        for piece in cut.read(mark):
+            if isinstance(piece, Start):
+                if piece.name not in VOID and not piece.closed:
+                    open_.append(piece.name)
+            elif isinstance(piece, End) and piece.name in open_:
+                while open_.pop() != piece.name:
+                    pass
+        if not open_:
+            return
 
 
-def filled(text: str, address: Address) -> str:
-    """A rewritten text with its addresses put in."""
-
-    def put(match: re.Match[str]) -> str:
-        name, _, rest = match[1].partition(" ")
-        path, _, anchor = rest.partition("#")
-        found = address(path, anchor, name == "src")
-        return f' {name}="{escape(found).replace(chr(34), "&quot;")}"' if found else ""
-
-    return _SLOT.sub(put, text)
-
-
-def escape(text: str) -> str:
-    """Text as XML."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def quoted(anchor: str) -> str:
-    """An anchor as part of an address."""
-    from urllib.parse import quote
-
-    return quote(anchor, safe="-._~:")
-
-
-def xml_id(id: str) -> str:
-    """An id as a name of XML: characters that no name has are written as their numbers."""
-    if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", id):
-        return id
-    name = "".join(c if re.match(r"[A-Za-z0-9_.-]", c) else f"_{ord(c):x}_" for c in id)
-    return name if re.match("[A-Za-z_]", name) else f"_{name}"
+@functools.lru_cache(maxsize=512)
+def _use(name: str) -> int:
+    """What an attribute is for."""
+    lower = name.lower()
+    if lower.startswith(("on", "data-")) or lower in ("style", "download", "loading", "srcset"):
+        return _OF_SCRIPTS
+    if lower in ("tabindex", "sizes") or not _XML_NAME.fullmatch(name):
+        return _OF_PAGES
+    if name == "id":
+        return _ID
+    if name in _REFERRING:
+        return _IDS
+    return _ADDRESS if name in ("href", "xlink:href", "src") else _OTHER

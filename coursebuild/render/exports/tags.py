@@ -1,9 +1,10 @@
 """HTML as a row of tags and texts, read as a browser's tokenizer reads it.
 
-Entry point: `pieces(html)`; `VOID`, the elements without an end.
+Entry points: `pieces(html)`; `read(mark)`, what one of its marks is; `VOID`, the elements without
+an end.
 
-Nothing is known here of what may stand in what. Tags are read once each: a page has few different
-ones and has them often.
+Nothing is known here of what may stand in what. Short tags are read once each: a page has few
+different ones and has them often.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from html import unescape
 from typing import TypeAlias
 
+from coursebuild.patterns import pattern
 from coursebuild.values import dataclass
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
@@ -32,7 +34,10 @@ class Start:
 
     def get(self, name: str) -> str | None:
         """The value of an attribute; `None` where there is none."""
-        return next((value or "" for key, value in self.attributes if key == name), None)
+        for key, value in self.attributes:
+            if key == name:
+                return value or ""
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +50,32 @@ class End:
 Piece: TypeAlias = Start | End | str
 """A string is text, as written: with its character references."""
 
-_MARK = re.compile(
+_INSIDE = r"""(?:[^"'>]++|"[^"]*"|'[^']*')*+"""
+"""Of a tag, behind its name."""
+_NAMED = r"(?P<raw>(?ai:script|style|textarea|title|xmp|iframe|noembed|noframes)(?=[\s/>]))"
+"""An element in which there are no tags."""
+_ENDED = r"</(?ai:(?P=raw))(?=[\s/>])[^>]*>"
+MARK = (
     r"<!--(?:>|->|.*?(?:-->|--!>|\Z))"
-    r"|<(?P<raw>script|style|textarea|title|xmp|iframe|noembed|noframes)\b"
-    r"""(?P<rest>(?:[^"'>]|"[^"]*"|'[^']*')*)>(?P<inside>.*?)</(?P=raw)[^>]*>"""
-    r"""|<(?P<tag>/?[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>"""
-    r"|<[!?/][^>]*>",
-    re.DOTALL | re.IGNORECASE,
+    rf"|<{_NAMED}{_INSIDE}>.*?{_ENDED}"
+    rf"|</?[a-zA-Z]{_INSIDE}>"
+    r"|<[!?/][^>]*>"
 )
-_NAME = re.compile(r"/?([a-zA-Z][^\s/>]*)")
-_ATTRIBUTE = re.compile(r"""([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+"""What is no text: a comment, an element without tags in it, a tag, a declaration. A dot is any
+character."""
+_MARK = pattern(MARK, re.DOTALL)
+_PARTS = pattern(
+    rf"<{_NAMED}(?P<rest>{_INSIDE})>(?P<inside>.*?){_ENDED}|<(?P<tag>/?[a-zA-Z]{_INSIDE})>",
+    re.DOTALL,
+)
+_NAME = pattern(r"/?([a-zA-Z][^\s/>]*)")
+_ATTRIBUTE = pattern(r"""([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 _SHORT = 24
-"""Characters of a tag that is remembered."""
+"""Characters of a mark that is remembered."""
 _DROPPED = frozenset("script style xmp iframe noembed noframes".split())
+_CAMEL = frozenset(
+    "clipPath foreignObject linearGradient radialGradient textPath animateTransform".split()
+)
 
 
 def pieces(html: str) -> Iterator[Piece]:
@@ -67,37 +85,43 @@ def pieces(html: str) -> Iterator[Piece]:
         if match.start() > at:
             yield html[at : match.start()]
         at = match.end()
-        if match["tag"]:
-            text = match["tag"]
-            # A tag with an address or an id comes once: it would only fill the cache.
-            yield (_tag if len(text) < _SHORT else _read)(text)
-        elif match["raw"] and match["raw"].lower() not in _DROPPED:
-            yield _read(f"{match['raw']}{match['rest']}")
-            yield match["inside"]
-            yield End(match["raw"].lower())
+        yield from read(match[0])
     if at < len(html):
         yield html[at:]
 
 
-@functools.lru_cache(maxsize=512)
+def read(mark: str) -> tuple[Piece, ...]:
+    """What a mark is; nothing where it is left out. Another text is itself."""
+    # A tag with an address or an id comes once: it would only fill the cache.
+    return (_short if len(mark) < _SHORT else _read)(mark)
+
+
+def _read(mark: str) -> tuple[Piece, ...]:
+    match = _PARTS.fullmatch(mark)
+    if match is None:
+        return () if _MARK.fullmatch(mark) else (mark,)
+    if match["tag"]:
+        return (_tag(match["tag"]),)
+    name = match["raw"].lower()
+    if name in _DROPPED:
+        return ()
+    # A slash closes no such element.
+    start = _tag(f"{match['raw']}{match['rest'].rstrip().rstrip('/')}")
+    return start, match["inside"], End(name)
+
+
+_short = functools.lru_cache(maxsize=512)(_read)
+
+
 def _tag(text: str) -> Start | End:
-    return _read(text)
-
-
-def _read(text: str) -> Start | End:
     match = _NAME.match(text)
     assert match is not None, "the pattern of tags begins with a name"
     name = match[1] if match[1] in _CAMEL else match[1].lower()
     if text.startswith("/"):
         return End(name)
-    rest = text[match.end() :]
     found: dict[str, str | None] = {}
-    for key, value in _ATTRIBUTE.findall(rest):
-        plain = value[1:-1] if value[:1] in ('"', "'") else value
-        found.setdefault(key, unescape(plain) if value else None)
-    return Start(name, tuple(found.items()), rest.rstrip().endswith("/"))
-
-
-_CAMEL = frozenset(
-    "clipPath foreignObject linearGradient radialGradient textPath animateTransform".split()
-)
+    for key, value in _ATTRIBUTE.findall(text, match.end()):
+        if key not in found:
+            plain = value[1:-1] if value[:1] in ('"', "'") else value
+            found[key] = unescape(plain) if value else None
+    return Start(name, tuple(found.items()), text.rstrip().endswith("/"))

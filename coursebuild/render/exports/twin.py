@@ -1,6 +1,6 @@
 """A page as plain Markdown: for people, feeds and language models.
 
-Entry points: `twin(sheet, document, tools, body)`, the text; `twin_href`, an address in it.
+Entry points: `twin(sheet, page, body)`, the text; `twin_href`, an address in it.
 
 A lesson or page of the course is written from its document. Every other page (the map, levels,
 models, measured figures) is written from its HTML, so that it says what the page says.
@@ -13,7 +13,6 @@ from collections.abc import Callable
 from typing import TypeAlias
 from urllib.parse import unquote, urlsplit
 
-from coursebuild.model import Document
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.exports.fromhtml import markdown_of
@@ -23,7 +22,6 @@ from coursebuild.render.exports.plain import Plain
 from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
-from coursebuild.render.tools import Tools
 
 Locate: TypeAlias = Callable[[str], str]
 
@@ -40,18 +38,17 @@ def twin_href(place: urls.Place, href: str) -> str:
     return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
 
 
-def twin(sheet: Sheet, document: Document | None, tools: Tools, body: str) -> str:
+def twin(sheet: Sheet, page: PageContext | None, body: str) -> str:
     """The text of a page; `body` is its HTML, as published."""
-    if document is None or sheet.shown is None:
+    if page is None:
         return twin_of(sheet.path, body)
-    place = urls.Place(sheet.path)
-    page = PageContext.made(tools, sheet.shown, place, document)
+    place, words, document = page.place, page.tools.words, page.document
     context = Plain(page, lambda href: twin_href(place, href), place.href(place.path))
     parts = (
-        *head(sheet, tools.words, context.locate),
+        *head(sheet, words, context.locate),
         write_blocks(document.blocks, context),
         write_footnotes(document.footnotes, context),
-        *_foot(sheet, tools.words, context.locate),
+        *_foot(sheet, words, context.locate),
     )
     return "\n\n".join(filter(None, parts)) + "\n"
 

@@ -35,7 +35,7 @@ _MARKED = ("mover", "munder")
 _SCRIPTS = ("msub", "msup", "msubsup")
 _LEAVES = frozenset(("mo", "mn", "mspace", "mtext", "annotation"))
 _SYMBOLS = frozenset(("mi", *_MARKED, *_SCRIPTS))
-_WRAPPERS = ("mrow", "mpadded", "mstyle", "semantics", "math", "mphantom")
+_WRAPPERS = frozenset(("mrow", "mpadded", "mstyle", "semantics", "math", "mphantom"))
 
 
 @functools.lru_cache(maxsize=1024)
@@ -115,8 +115,11 @@ def _symbol(element: Element, *, declared: bool = False) -> str | None:
 
 
 def _letter(element: Element, *, declared: bool) -> str | None:
-    text = element.text or ""
-    upright = element.get("mathvariant") == "normal"
+    return _letter_of(element.text or "", element.get("mathvariant") == "normal", declared)
+
+
+@functools.lru_cache(maxsize=1024)
+def _letter_of(text: str, upright: bool, declared: bool) -> str | None:
     if not any(map(str.isalpha, text)) or (text in _NO_SYMBOLS and not declared):
         return None
     if not declared and _is_latin(text) and (upright or (text.isascii() and len(text) > 1)):

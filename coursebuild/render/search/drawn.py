@@ -5,7 +5,6 @@ Entry point: `drawn_sections(body)`.
 
 from __future__ import annotations
 
-import re
 from html.parser import HTMLParser
 
 from coursebuild.render.search.values import Piece, Section
@@ -17,7 +16,6 @@ _LINES = frozenset(
     "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
 )
 _VOID = frozenset("area base br col embed hr img input link meta source track wbr".split())
-_BLANKS = re.compile(r"\s+")
 
 
 def drawn_sections(body: str) -> tuple[Section, ...]:
@@ -79,7 +77,7 @@ class _Reader(HTMLParser):
         return tuple(self._done)
 
     def _said(self) -> str:
-        text = _BLANKS.sub(" ", "".join(self._text)).strip()
+        text = " ".join("".join(self._text).split())
         self._text.clear()
         return text
 

@@ -105,30 +105,27 @@ DIGEST = 8
 
 def cells(plan: Plan, pages: Iterable[bytes]) -> Cells:
     """Sort the terms of a bucket's pages, given in the order of the course, into slices."""
-    found: list[dict[str, list[str]]] = [{} for _ in range(plan.terms + plan.words)]
-    pages_of: dict[str, list[str]] = {}
+    found: list[dict[str, str]] = [{} for _ in range(plan.terms + plan.words)]
+    pages_of: dict[str, str] = {}
     for number, data in enumerate(pages):
-        prefix = f"{number:x}"
+        prefix = f" {number:x}"
         for line in data.decode().split("\n") if data else ():
             term = line[1:]
-            known = pages_of.get(term)
-            if known is None:
-                known = pages_of[term] = []
-            known.append(prefix + line[0])
+            pages_of[term] = pages_of.get(term, "") + prefix + line[0]
     for term, having in pages_of.items():
         first, *others = plan.shards(term)
         found[first][term] = having
         for shard in others:
-            found[shard][term] = []
+            found[shard][term] = " "
     slices = [_slice(terms) for terms in found]
     groups = tuple(b"\0".join(slices[n] for n in group) for group in plan.groups)
     digests = b"".join(hashlib.blake2b(part, digest_size=DIGEST).digest() for part in slices)
     return Cells(groups, digests)
 
 
-def _slice(terms: dict[str, list[str]]) -> bytes:
+def _slice(terms: dict[str, str]) -> bytes:
     """Lines of a term and the pages that have it: their hexadecimal number here, and the weight."""
-    return "\n".join(f"{term} {' '.join(terms[term])}" for term in sorted(terms)).encode()
+    return "\n".join([term + terms[term] for term in sorted(terms)]).encode()
 
 
 def slices(group: bytes) -> list[bytes]:
@@ -148,12 +145,29 @@ def shard(parts: Iterable[tuple[bytes, Sequence[int]]]) -> str:
     """
     found: dict[str, list[int]] = {}
     for part, numbers in parts:
+        read = _Read(numbers)
         for line in part.decode().split("\n") if part else ():
             term, _, pages = line.partition(" ")
-            held = found.setdefault(term, [])
-            for page in pages.split():
-                held.append(numbers[int(page[:-1], 16)] << 4 | int(page[-1], 16))
+            here = [read[page] for page in pages.split()]
+            held = found.get(term)
+            if held is None:
+                found[term] = here
+            else:
+                held += here
     return "\n".join(_line(term, found[term]) for term in sorted(found))
+
+
+class _Read(dict[str, int]):
+    """The pages of a slice as numbers in the course, times 16 and with the weight."""
+
+    def __init__(self, numbers: Sequence[int]) -> None:
+        super().__init__()
+        self._numbers = numbers
+
+    def __missing__(self, page: str) -> int:
+        """As `_slice` writes it."""
+        self[page] = found = self._numbers[int(page[:-1], 16)] << 4 | int(page[-1], 16)
+        return found
 
 
 def _line(term: str, pages: list[int]) -> str:

@@ -25,6 +25,9 @@ TITLE, HEADING, TEXT, CODE = 3, 2, 1, 0
 """Where a term stands, by weight."""
 _FIELDS = {"text": TEXT, "formula": TEXT, "code": CODE, "output": CODE}
 _SHORT = {"text": "t", "formula": "f", "code": "c", "output": "o"}
+_DIGITS = "0123456789abcdef"
+_OFTEN = {1: 0, **dict.fromkeys((2, 3), 1), **dict.fromkeys(range(4, 10), 2)}
+"""By how often a term occurs, up to nine times; see `terms`."""
 _FUNCTION = "coursebuildSearch.take"
 """What a file of the index calls: browsers load scripts from a disk, but no other data."""
 
@@ -96,9 +99,10 @@ def terms(text: PageText) -> bytes:
     times: dict[str, int] = {}
     for field, said in sorted(_said(text).items()):
         for term, count in counted("\n".join(said)).items():
-            fields[term] = field
+            fields[term] = field << 2
             times[term] = times.get(term, 0) + count
-    lines = (f"{fields[t] << 2 | _often(times[t]):x}{t}" for t in sorted(fields))
+    often = _OFTEN.get
+    lines = [_DIGITS[fields[term] | often(times[term], 3)] + term for term in sorted(times)]
     return "\n".join(lines).encode("utf-8", "replace")
 
 
@@ -111,7 +115,3 @@ def _said(text: PageText) -> dict[int, list[str]]:
         for piece in section.pieces:
             found[_FIELDS[piece.kind]].append(piece.text)
     return found
-
-
-def _often(count: int) -> int:
-    return 0 if count == 1 else 1 if count <= 3 else 2 if count <= 9 else 3

@@ -54,11 +54,11 @@ from coursebuild.model import (
     ThematicBreak,
 )
 from coursebuild.model.inlines import CodeSpan
+from coursebuild.patterns import pattern
 from coursebuild.render.search.tex import plain_formula
 from coursebuild.render.search.values import Kind, Piece, Section
 
-_TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
-_BLANKS = re.compile(r"\s+")
+_TAG = pattern(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
 
 def document_sections(
@@ -226,4 +226,4 @@ class _Reader:
 
 
 def _line(text: str) -> str:
-    return _BLANKS.sub(" ", text).strip()
+    return " ".join(text.split())

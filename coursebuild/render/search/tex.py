@@ -8,12 +8,15 @@ where the TeX ends. That a formula parses is checked elsewhere.
 
 from __future__ import annotations
 
+import functools
 import re
 import unicodedata
+from typing import TypeAlias
 
+from coursebuild.patterns import pattern
 from coursebuild.render.search.words import GREEK
 
-_PIECE = re.compile(r"\\([A-Za-z]+)\*?|\\(.)|%[^\n]*|([{}^_&~'])|([^\\{}^_&~'%]+)", re.DOTALL)
+_PIECE = pattern(r"\\([A-Za-z]+)\*?|\\(.)|%[^\n]*|([{}^_&~'])|([^\\{}^_&~'%]+)", re.DOTALL)
 
 _SIGNS = {
     **{"partial": "∂", "nabla": "∇", "int": "∫", "iint": "∬", "oint": "∮", "sum": "∑"},
@@ -41,12 +44,11 @@ _SKIPPED = frozenset("begin end label tag color hspace vspace phantom hphantom v
 """Commands whose argument is no part of the formula."""
 _VARIANTS = {"varepsilon": "ε", "vartheta": "ϑ", "varphi": "φ", "varrho": "ϱ", "varpi": "ϖ"}
 _VARIANTS["varsigma"] = "ς"
-_MATHEMATICAL = "\U0001d400-\U0001d7ff"
-_BLANKS = re.compile(r"\s+")
-_TIGHT = re.compile(r"\s*([_^])\s*")
-_OPERATOR = re.compile(r"([Δδ∂∇])\s+(?=[^\W\d])")
-"""A difference or derivative and what it is of: one word, as `Δt`."""
-_INNER = re.compile(r"([(\[|⟨])\s+|\s+([)\]⟩,;])")
+_MATHEMATICAL = pattern("[\U0001d400-\U0001d7ff]")
+_TIGHT = pattern(r"(?<=[_^]) | (?=[_^])")
+_OPERATOR = pattern(r"(?<=[Δδ∂∇]) (?=[^\W\d])")
+"""Between a difference or derivative and what it is of: they are one word, as `Δt`."""
+_INNER = pattern(r"(?<=[(\[|⟨]) | (?=[)\]⟩,;])")
 
 
 def _letters() -> dict[str, str]:
@@ -60,20 +62,28 @@ def _letters() -> dict[str, str]:
 _LETTERS = _letters()
 
 
+@functools.lru_cache(maxsize=1024)
 def plain_formula(tex: str) -> tuple[str, tuple[str, ...]]:
     """The formula as text, and the names of its commands, each once, in order."""
     reader = _Reader(tex)
-    text = _INNER.sub(r"\1\2", _TIGHT.sub(r"\1", _BLANKS.sub(" ", reader.until_end()))).strip()
-    text = _OPERATOR.sub(r"\1", text)
-    text = re.sub(f"[{_MATHEMATICAL}]", lambda m: unicodedata.normalize("NFKC", m[0]), text)
+    text = " ".join(reader.until_end().split())
+    if " " in text:
+        text = _INNER.sub("", _TIGHT.sub("", text))
+    if not text.isascii():
+        text = _OPERATOR.sub("", text)
+        text = _MATHEMATICAL.sub(lambda m: unicodedata.normalize("NFKC", m[0]), text)
     return text, tuple(dict.fromkeys(reader.names))
+
+
+_Piece: TypeAlias = tuple[str, str, str, str]
+"""The name of a command, another character after a backslash, a mark, or a run of others."""
 
 
 class _Reader:
     """Reads pieces from left to right."""
 
     def __init__(self, tex: str) -> None:
-        self._pieces = [m for m in _PIECE.finditer(tex) if not m[0].startswith("%")]
+        self._pieces: list[_Piece] = [p for p in _PIECE.findall(tex) if any(p)]  # no comments
         self._at = 0
         self._depth = 0
         self.names: list[str] = []
@@ -88,56 +98,55 @@ class _Reader:
 
     def _group(self) -> str:
         """Up to the brace that closes, which is left."""
+        pieces, end = self._pieces, len(self._pieces)
         parts: list[str] = []
-        while self._at < len(self._pieces) and self._pieces[self._at][0] != "}":
-            parts.append(self._item())
+        while self._at < end and (piece := pieces[self._at])[2] != "}":
+            self._at += 1
+            parts.append(piece[3] or self._said(piece))
         return "".join(parts)
 
-    def _item(self) -> str:
-        piece = self._pieces[self._at]
-        self._at += 1
-        if piece[1] is not None:
-            return self._command(piece[1])
-        if piece[2] is not None:
-            return " " if piece[2].isspace() or piece[2] in ",;:!\\" else piece[2]
-        match piece[3]:
+    def _said(self, piece: _Piece) -> str:
+        """What a piece says that was just taken, with what belongs to it."""
+        name, escaped, mark, run = piece
+        if name:
+            return self._command(name)
+        if escaped:
+            return " " if escaped.isspace() or escaped in ",;:!\\" else escaped
+        match mark:
             case "{":
                 return self._closed()
-            case "^" | "_" as mark:
+            case "^" | "_":
                 return mark + _bracketed(self._argument())
-            case "&":
-                return " "
-            case "~":
+            case "&" | "~":
                 return " "
             case "'":
                 return "′"
             case _:
-                return piece[4] or ""
+                return run
 
     def _closed(self) -> str:
         self._depth += 1
         # Beyond any depth that a formula has, the rest is read flat: TeX may be made to be deep.
         inner = self._group() if self._depth < 64 else ""
         self._depth -= 1
-        if self._at < len(self._pieces) and self._pieces[self._at][0] == "}":
+        if self._at < len(self._pieces) and self._pieces[self._at][2] == "}":
             self._at += 1
         return inner
 
     def _argument(self) -> str:
         """The next group or item; of a run of letters the first."""
-        while self._at < len(self._pieces) and not self._pieces[self._at][0].strip():
+        while self._at < len(self._pieces) and self._pieces[self._at][3].isspace():
             self._at += 1
-        if self._at >= len(self._pieces) or self._pieces[self._at][0] == "}":
+        if self._at >= len(self._pieces) or self._pieces[self._at][2] == "}":
             return ""
         piece = self._pieces[self._at]
-        if piece[4] is None:
-            return self._item().strip()
         self._at += 1
-        text = piece[4].lstrip()
-        rest = _PIECE.match(text, 1)
-        if rest is not None:  # what follows the first character stays
+        if not piece[3]:
+            return self._said(piece).strip()
+        text = piece[3].lstrip()
+        if len(text) > 1:  # what follows the first character stays
             self._at -= 1
-            self._pieces[self._at] = rest
+            self._pieces[self._at] = ("", "", "", text[1:])
         return text[:1]
 
     def _command(self, name: str) -> str:

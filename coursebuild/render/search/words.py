@@ -20,6 +20,8 @@ import unicodedata
 from collections import Counter
 from collections.abc import Iterator
 
+from coursebuild.patterns import pattern
+
 LONGEST = 48
 """Characters; longer runs are data, which nobody types."""
 _LONGEST_NUMBER = 12
@@ -63,19 +65,30 @@ _ROWS = (
     "\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff\U00020000-\U0003ffff"
 )
 """Scripts without spaces between words: Thai, Lao, Burmese, Khmer, Kana, Han."""
-_ROW = re.compile(f"[{_ROWS}]")
-_TOKEN = re.compile(
+_FIRST_ROW = "\u0e00"
+"""The first of their characters. To compile a set takes as long as there are characters in it, so
+these are used only for text that may have one."""
+_ROW = pattern(f"[{_ROWS}]")
+_TOKEN = pattern(
     r"[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!\w)|\w+(?:\.\w+)*|[" + "".join(_SYMBOLS) + "]"
 )
-_RUN = re.compile(f"([{_ROWS}]+)|([\u0370-\u03ff]+)|[^{_ROWS}\u0370-\u03ff]+")
-_NUMBER = re.compile(r"[0-9][0-9.eE+-]*\Z")
-_SEAM = re.compile(
+_ASCII = "[A-Za-z0-9_]"
+_ASCII_TOKEN = pattern(
+    rf"[A-Za-z_]{_ASCII}*+(?:\.{_ASCII}++)*+|[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!{_ASCII})"
+    rf"|[0-9]{_ASCII}*+(?:\.{_ASCII}++)*+"
+)
+"""The same in text without other characters, found faster."""
+_RUN = pattern(f"([{_ROWS}]+)|([\u0370-\u03ff]+)|[^{_ROWS}\u0370-\u03ff]+")
+_WESTERN_RUN = pattern("((?!))?([\u0370-\u03ff]+)|[^\u0370-\u03ff]+")
+"""The same for text without such scripts."""
+_NUMBER = pattern(r"[0-9][0-9.eE+-]*\Z")
+_SEAM = pattern(
     r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])"
     r"|_+"
 )
-_FOREIGN = re.compile(r"[^\x00-\x7f]+")
-_GENITIVE = re.compile("['’]s\\b")
-_SIMPLE = re.compile(r"[a-z]+\Z")
+_FOREIGN = pattern(r"[^\x00-\x7f]+")
+_GENITIVE = pattern("['’]s\\b")
+_SIMPLE = pattern(r"[a-z]+\Z")
 
 
 def terms_of(text: str) -> list[str]:
@@ -83,12 +96,17 @@ def terms_of(text: str) -> list[str]:
     return [term for token in _tokens(text) for term in _expanded(token)]
 
 
-def counted(text: str) -> Counter[str]:
+def counted(text: str) -> dict[str, int]:
     """How often each term occurs."""
-    found: Counter[str] = Counter()
-    for token, times in Counter(_tokens(text)).items():
+    found: dict[str, int] = {}
+    lines = [text] if text.isascii() else text.split("\n")  # which no token reaches over
+    foreign = [line for line in lines if not line.isascii()]
+    tokens = Counter(_tokens("\n".join(filter(str.isascii, lines))))
+    if foreign:
+        tokens.update(_tokens("\n".join(foreign)))
+    for token, times in tokens.items():
         for term in _expanded(token):
-            found[term] += times
+            found[term] = found.get(term, 0) + times
     return found
 
 
@@ -114,15 +132,15 @@ def is_fuzzy(term: str) -> bool:
 
 def _is_row(character: str) -> bool:
     """Whether it belongs to a script without spaces."""
-    return _ROW.match(character) is not None
+    return character >= _FIRST_ROW and _ROW.match(character) is not None
 
 
 def _tokens(text: str) -> list[str]:
     if not text.isascii():
         text = _FOREIGN.sub(_compatible, text)
-    if "s" in text:
+    if "'s" in text or "’s" in text:
         text = _GENITIVE.sub("", text)
-    return _TOKEN.findall(text)
+    return (_ASCII_TOKEN if text.isascii() else _TOKEN).findall(text)
 
 
 def _compatible(run: re.Match[str]) -> str:
@@ -168,7 +186,7 @@ def _latin(token: str) -> Iterator[str]:
 
 def _mixed(token: str) -> Iterator[str]:
     """A word with letters of other scripts."""
-    runs = list(_RUN.finditer(token))
+    runs = list((_RUN if max(token) >= _FIRST_ROW else _WESTERN_RUN).finditer(token))
     said: list[str] = []
     for run in runs:
         text = unicodedata.normalize("NFC", run[0].lower())

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from coursebuild.model import Callout, Document, PlainCode, Target
 from coursebuild.render.exports.markdown import write_blocks, write_footnotes, write_inlines
 from coursebuild.render.exports.marks import (
+    _guarded_line,
     code_span,
     escaped,
     fence,
@@ -153,3 +154,9 @@ def test_hostile_titles_stay_text() -> None:
 def test_code_spans_hold_any_code(text: str, span: str) -> None:
     assert code_span(text) == span
     assert f"<code>{text}</code>" in plain_html(read(f"{span}\n"))
+
+
+@given(st.characters(categories=["L"]), st.text())
+def test_a_letter_begins_no_block(letter: str, text: str) -> None:
+    line = " ".join(f"{letter}{text}".split("\n"))
+    assert guarded(line) == _guarded_line(line)

@@ -9,7 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.render.exports.rewrite import Rewriter, Rules, filled, site_path, xml_id
+from coursebuild.render.exports.addresses import filled, site_path, xml_id
+from coursebuild.render.exports.cut import Cut
+from coursebuild.render.exports.rewrite import Rewriter, Rules
+from coursebuild.render.exports.tags import VOID, End, Start, pieces
 
 PAGE = "lessons/1.1-one.html"
 BOOK = Rules(PAGE, xml=True, pictures=frozenset({"png"}))
@@ -34,10 +37,112 @@ PIECES = st.sampled_from(
 )
 
 
+PAGES = st.lists(PIECES, max_size=20).map("".join)
+OURS = st.sampled_from(
+    """a b|&lt;|&amp;|&#x27;|>|<span class="k">for</span>|<span class="k">|</span>
+<span class="x">a &gt; b</span>|<span class="qr">c</span>|<span class="held">(</span>|\r|\0|\ud800
+<code>a &lt; b</code>|<code>|</code>|<em>a</em>|<strong>&amp;</strong>|<\u017foo>
+<span id="c.L1">a <span class="k">b</span> &lt;</span>|<span id="1">a</span>|<span id="é">
+<math><mi>x</mi></math>|<math display="block" class="tml-display s0123abc"><mn>1</mn></math>
+<math><mrow><mo fence="true" form="prefix">(</mo><mspace width="1em"/></mrow>&lt;</math>
+<math>|</math>|<mi>|</mi>|<mrow>|</mrow>|<math><mi></math>|<math></mi></math>|<mspace/>
+<math><mi form="a" form="b">x</mi></math>|<math><mi style="a">x</mi></math>|<math>&nbsp;</math>
+<math><mi class="qr">x</mi></math>|<math><mi id="a">x</mi></math>|<textarea><p></textarea>
+<!-- <math><mi> -->|<![CDATA[ > <math> ]]>|<TITLE>a<b</Title>|<title/>|<svg><title>b</title></svg>
+<P TITLE='>'>|</P>|<p title=a>|<IMG SRC=a.png>|<h2 ID=x>|</h2>|<p|<p title='|<svg class=qr>|</svg>
+<section aria-label=a>|</section>|<a href='1.2-two.html#c'>|</a>|<details class=answer>|</details>
+<button>|</button>|\n""".replace("\n", "|").split("|")
+)
+ALL = st.lists(st.one_of(OURS, PIECES), max_size=20).map("".join)
+
+
 @settings(max_examples=200, deadline=None)
-@given(st.lists(PIECES, max_size=20).map("".join))
+@given(st.one_of(PAGES, ALL))
 def test_whatever_is_written_becomes_well_formed(html: str) -> None:
-    ElementTree.fromstring(f"<body>{xml(html)}</body>")
+    ElementTree.fromstring(f"<body>{xml(html)}</body>".encode("utf-8", "replace"))
+
+
+class Slowly(Rewriter):
+    """Looks at every tag, and remembers nothing: what a rewriter is to write."""
+
+    def text(self, html: str) -> str:
+        """The whole."""
+        left_out: list[str] = []
+        for piece in pieces(html):
+            known = self._written((piece,))
+            if left_out:
+                if isinstance(piece, Start) and piece.name not in VOID and not piece.closed:
+                    left_out.append(piece.name)
+                elif isinstance(piece, End) and piece.name in left_out:
+                    while left_out.pop() != piece.name:
+                        pass
+            elif isinstance(piece, str):
+                self._out.append(known[2])
+            elif isinstance(piece, End):
+                self._end(piece.name)
+            elif self._is_left_out(piece):
+                left_out += [] if piece.name in VOID or piece.closed else [piece.name]
+            else:
+                self._begin(piece, known)
+        while self._open:
+            self._shut()
+        return "".join(self._out)
+
+    def _begin(self, start: Start, known: tuple[int, str, str, tuple[str, ...]]) -> None:
+        for ended in known[3]:
+            if self._open and self._open[-1] == ended:
+                self._shut()
+        self._out.append(known[2])
+        written = re.match("<[a-z]", known[2], re.IGNORECASE)
+        if written and start.name not in VOID and not start.closed:
+            self._open.append(start.name)
+
+
+RULES = (
+    BOOK,
+    Rules(PAGE, xml=True, pictures=frozenset({"png"}), without=frozenset({"qr"})),
+    Rules(
+        PAGE, prefix="_1.1--", down=2, part="1.1", opened=lambda start: start.get("class") is None
+    ),
+    Rules(PAGE, prefix="1é ", xml=True),
+    Rules(PAGE),
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.sampled_from(RULES), ALL)
+def test_runs_are_what_their_tags_become(rules: Rules, html: str) -> None:
+    slowly, fast = Slowly(rules), Rewriter(rules)
+    assert fast.text(html) == slowly.text(html)
+
+
+@settings(deadline=None)
+@given(ALL)
+def test_a_cut_text_is_whole(html: str) -> None:
+    assert "".join(run + mark for run, mark, _ in Cut(html).parts) == html
+
+
+@pytest.mark.parametrize(
+    "html",
+    [
+        '<span class="k">for</span> a &lt; b',
+        '<span id="code.L1"><span class="f">a</span> <span class="n">1</span></span>',
+        "<math><mrow><mi>x</mi><mo>=</mo><mn>1</mn></mrow></math>",
+        '<math display="block" class="tml-display"><mspace width="1em"></mspace></math>',
+    ],
+)
+def test_what_is_the_same_everywhere_goes_in_one_run(html: str) -> None:
+    assert [part for part in Cut(html).parts if any(part)] == [(html, "", "")]
+
+
+def test_formulas_that_do_not_fit_are_read_tag_by_tag() -> None:
+    html = "<math><mi>x</math><math><mn>1</mn></math>"
+    assert xml(html).count("</mi>") == 1
+    ElementTree.fromstring(f"<p>{xml(html)}</p>")
+
+
+def test_what_looks_like_a_tag_is_text() -> None:
+    assert xml("<div><\u017foo> <\u212a></div>") == "<div>&lt;\u017foo&gt; &lt;\u212a&gt;</div>"
 
 
 @pytest.mark.parametrize(
@@ -105,6 +210,7 @@ def test_a_link_that_leads_nowhere_is_text() -> None:
         ("mailto:a@b.example", (None, "")),
         ("//x.example/a", (None, "")),
         ("?q", (None, "")),
+        ("http://[x", (None, "")),
     ],
 )
 def test_site_paths(url: str, expected: tuple[str | None, str]) -> None:

@@ -1,0 +1,61 @@
+"""A whole course checked: links, mentions, quizzes, labs and terms, against each other.
+
+Entry points: `check_course`; `check_document`, the same for one document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from coursebuild.checks.benches import bench_findings
+from coursebuild.checks.labs import lab_findings
+from coursebuild.checks.links import (
+    Places,
+    defined_terms,
+    document_links,
+    places,
+    remembered_anchors,
+)
+from coursebuild.checks.quizzes import quiz_findings
+from coursebuild.checks.terms import term_findings
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.model import Course, Document, Script, document_blocks
+from coursebuild.source import Span
+
+
+def check_course(course: Course) -> tuple[Diagnostic, ...]:
+    """Links, mentions, quizzes, labs and terms, checked against each other."""
+    scripts: dict[str, bool] = {}
+    terms: dict[str, Span] = {}
+    for document in course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, Script):
+                scripts[block.path] = block.norun
+        for id, span in defined_terms(document).items():
+            terms.setdefault(id, span)
+    known = places(course, scripts, terms)
+    anchors_of = remembered_anchors()
+    quizzes: dict[str, Span] = {}
+    found: list[Diagnostic] = []
+    for document in course.documents:
+        blocks = tuple(document_blocks(document))
+        found += document_links(course, document, known, anchors_of)
+        found += quiz_findings(blocks, scripts, quizzes)
+        found += lab_findings(blocks, course)
+        found += bench_findings(blocks, course)
+        found += term_findings(blocks, known.terms)
+    return tuple(found)
+
+
+def check_document(
+    course: Course, document: Document, known: Places, scripts: Mapping[str, bool]
+) -> tuple[Diagnostic, ...]:
+    """What `check_course` finds in one document, given what the rest of the course offers.
+
+    `scripts` are those of the course by path, and whether they are not run. Only that another
+    document has a quiz of the same id goes unseen.
+    """
+    blocks = tuple(document_blocks(document))
+    links = document_links(course, document, known)
+    own = (*bench_findings(blocks, course), *term_findings(blocks, known.terms))
+    return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)

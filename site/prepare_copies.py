@@ -1,0 +1,53 @@
+"""Compresses what pages of every course refer to: see `coursebuild/effects/prepared.py`.
+
+    python site/prepare_copies.py FOLDER
+
+`site/bundle.py` calls it with the bundle that it makes. The engine of the labs is not among it: its
+copies would be a third of the package.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from coursebuild.effects.resources import template_texts
+from coursebuild.render.assets import SCRIPTS, page_script
+from coursebuild.render.compressed import compressed_files
+from coursebuild.results import OutputFile
+
+LABS = ("js/lab.js", "js/lab-worker.js")
+
+
+def prepared(bundle: Path) -> dict[str, bytes]:
+    """The files, by name, and the list of them by the keys of what they are copies of."""
+    whole = {name: page_script((bundle / file).read_bytes()) for name, file in SCRIPTS.items()}
+    whole |= {file.removeprefix("js/"): (bundle / file).read_bytes() for file in LABS}
+    whole["icon.svg"] = dict(template_texts())["icon.svg"].encode()
+    files: dict[str, bytes] = {}
+    listed: dict[str, str] = {}
+    for name, data in whole.items():
+        keys: list[str] = []
+
+        def keep(key: str, make: Callable[[], bytes], keys: list[str] = keys) -> bytes:
+            keys.append(key)
+            return make()
+
+        copies = compressed_files([OutputFile(f"assets/{name}", data)], keep)
+        if len(copies) == len(keys):  # those that do not shrink are not published
+            for key, copy in zip(keys, copies, strict=True):
+                listed[key] = copy.path.removeprefix("assets/")
+                files[listed[key]] = copy.data
+    text = json.dumps(listed, indent=1, sort_keys=True)
+    return {**files, "copies.json": f"{text}\n".encode()}
+
+
+def main(bundle: Path) -> None:
+    """Write them into the bundle."""
+    for name, data in prepared(bundle).items():
+        (bundle / "prepared" / name).write_bytes(data)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,144 @@
+"""Documents of one face are the same to the rest of their course, wherever things stand in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_skeleton import MAP, PARTS, assets, document, with_documents
+
+from coursebuild.checks.course import check_course
+from coursebuild.measured.shown import Reports
+from coursebuild.model import Course, Document
+from coursebuild.model.skeleton import skeleton
+from coursebuild.pipeline.faces import course_face, outline_face, results_face
+from coursebuild.render.lab_files import PublishedLabs
+from coursebuild.render.library import Library, document_scripts, lexicon_of, named_models, place
+from coursebuild.render.lookup.lexicon import lexicon
+from coursebuild.render.lookup.references import mentions
+from coursebuild.render.page_list import page_list
+from coursebuild.render.sheet import fingerprint
+from coursebuild.results import Outcome, Results, ScriptRun
+from coursebuild.scripts.compare import verify
+from coursebuild.scripts.extract import extract
+from coursebuild.source import Source
+from coursebuild.syntax.coursemap import parse_course_map
+
+PROSE = ["Plain words.\n\n", "More of *them*, `code`.\n\n", "- a\n- b\n\n", "***\n\n", "\n"]
+SECOND = "".join(PARTS[:9])
+
+
+def bare(text: str) -> Document:
+    whole = document("content/0.md", text)
+    return replace(skeleton(whole), lexicon=lexicon(whole, {}))
+
+
+def course_of(first: Document) -> Course:
+    parsed = parse_course_map(Source("content/course.toml", MAP))
+    assert parsed.value is not None
+    second = document("content/1.md", SECOND)
+    second = replace(skeleton(second), lexicon=lexicon(second, {}))
+    return with_documents(parsed.value, [first, second])
+
+
+def results_of(course: Course) -> Results:
+    runs = [ScriptRun(e.path, Outcome.OK, 0, "one 1.5\n", "", 0.0) for e in extract(course).value]
+    return Results(tuple(runs), verify(course, runs), (), (), "3", "3")
+
+
+def seen_elsewhere(course: Course) -> list[object]:
+    """What is seen of the first lesson by others: other pages, and whether anything is wrong."""
+    results = results_of(course)
+    library = Library.made(
+        course,
+        results,
+        assets(),
+        scripts_of=document_scripts,
+        models_of=named_models,
+        mentions_of=lambda document: mentions(document, course, lexicon_of(document, {})),
+        labs=PublishedLabs({}, ()),
+        formulas={},
+        verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
+    )
+    found: list[object] = [bool(check_course(course))]
+    for page in page_list(library):
+        if page.id != "1.1":
+            try:
+                found.append((page.path, fingerprint(page.sheet(library))))
+            except (KeyError, StopIteration) as error:  # a link or model that is nowhere
+                found.append((page.path, repr(error)))
+    return found
+
+
+@given(st.lists(st.sampled_from(PARTS), max_size=5), st.data())
+@settings(max_examples=60)
+def test_what_has_one_face_is_seen_alike(parts: list[str], data: st.DataObject) -> None:
+    other: list[str] = []
+    for part in data.draw(st.one_of(st.just(parts), st.permutations(parts))):
+        other += [*data.draw(st.lists(st.sampled_from(PROSE), max_size=2)), part]
+    one, two = bare("".join(parts)), bare("".join(other))
+    if outline_face(one) == outline_face(two):
+        assert seen_elsewhere(course_of(one)) == seen_elsewhere(course_of(two))
+
+
+def test_prose_moves_things_and_changes_no_face() -> None:
+    text = "".join(PARTS)
+    moved = outline_face(bare("Plain words.\n\n" + text))
+    assert moved == outline_face(bare(text)) == outline_face(bare(text + "Plain words.\n"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("{#here}", "{#there}"),
+        ("lesson:1.2#here", "lesson:1.1#here"),
+        ("<b id=b>", "<b id=c>"),
+        ('href="#gone"', 'href="#raw"'),
+        ("[thing]{term}", "[thing]{term=sing}"),
+        ("{#eq:a}", "{#eq:b}"),
+        ("print(2)", "print(3)"),
+        ("| x | 1 |", "| x | 2 |"),
+        ("<mujoco/>", "<mujoco />"),
+        ('"id": "q"', '"id": "r"'),
+        ('"model": "box"', '"model": "ball"'),
+        ("bench box", "bench arm"),
+        ("[!note]", "[!warning]"),
+        ("![p](p.png)", "![p](q.png)"),
+    ],
+)
+def test_what_others_see_changes_the_face(old: str, new: str) -> None:
+    text = "".join(PARTS)
+    assert old in text
+    assert outline_face(bare(text)) != outline_face(bare(text.replace(old, new, 1)))
+
+
+def test_the_face_of_a_course() -> None:
+    first = bare(PARTS[0])
+    course = course_of(first)
+    faces = [(document, outline_face(document)) for document in course.documents]
+    face = course_face(course, faces)
+    assert face is not None
+    moved = course_of(bare(PROSE[0] + PARTS[0]))
+    again = [(document, outline_face(document)) for document in moved.documents]
+    assert course_face(moved, again) == face
+    assert course_face(replace(course, title="Other"), faces) != face
+    assert course_face(replace(course, files=("content/a.png",)), faces) != face
+    assert course_face(course, faces[1:]) is None  # one that is not known has none
+    assert course_face(course, [(document, "") for document, _ in faces]) is None
+
+
+def test_the_face_of_results() -> None:
+    course = course_of(bare("".join(PARTS)))
+    results = results_of(course)
+    face = results_face(results, Reports())
+    slower = tuple(replace(run, seconds=9.0) for run in results.runs)
+    assert results_face(replace(results, runs=slower), Reports()) == face
+    other = (replace(results.runs[0], stdout="two\n"), *results.runs[1:])
+    assert results_face(replace(results, runs=other), Reports()) != face
+    assert results_face(replace(results, engine="4"), Reports()) != face
+    verdicts = tuple(replace(v, status="drift") for v in results.verdicts)
+    assert results_face(replace(results, verdicts=verdicts), Reports()) != face
+    models = (("box", None),)
+    assert results_face(replace(results, models=models), Reports()) != face  # type: ignore[arg-type]

@@ -1,0 +1,141 @@
+"""What is done faster here than in markdown-it gives the same as there: lines, rows, tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+from markdown_it.rules_block import StateBlock
+from markdown_it.token import Token
+
+from coursebuild.model import Table
+from coursebuild.source import Excerpt, Source
+from coursebuild.syntax import tables
+from coursebuild.syntax.block_parser import Blocks, Definitions
+from coursebuild.syntax.document import parse_document
+from coursebuild.syntax.markdown import block_tokens
+from coursebuild.syntax.spans import BlockState, Row, locate, trimmed
+
+_MARKDOWN = MarkdownIt("gfm-like", {"linkify": False})
+_OURS = MarkdownIt("zero")
+_OURS.block = Blocks()
+
+texts = st.text(st.sampled_from("ab \t\t\n\n>-|\\é\x0b\xa0\u2028"), max_size=60)
+rows = st.lists(
+    st.text(st.sampled_from("|||---:: \\a\t>é\xa0\x0b"), max_size=12), min_size=2, max_size=5
+)
+likely = st.builds(
+    lambda head, below, rest: [head, below, *rest],
+    st.text(st.sampled_from("|a \\"), min_size=3, max_size=9),
+    st.sampled_from(["|-|-|", "-|-", ":-:|--:", "| - | :-- |", "---", "|-", "-|", "- -|", ":|-:"]),
+    st.lists(st.text(st.sampled_from("||a \\>`"), max_size=9), max_size=4),
+)
+tables_within = st.builds(
+    lambda prefix, lines: "\n".join(prefix + line for line in lines),
+    st.sampled_from(["", "  ", "> ", "    ", "\t"]),
+    rows | likely,
+)
+
+
+@given(texts)
+def test_the_lines_of_a_text_are_those_that_markdown_it_finds(text: str) -> None:
+    theirs, ours = StateBlock(text, _OURS, {}, []), BlockState(text, _OURS, {})
+    own = ("rows", "count")
+    assert {k: v for k, v in vars(ours).items() if k not in own} == vars(theirs)
+
+
+@given(texts, st.data())
+def test_the_lines_that_are_cut_out_are_those_that_markdown_it_cuts(
+    text: str, data: st.DataObject
+) -> None:
+    theirs, ours = StateBlock(text, _OURS, {}, []), BlockState(text, _OURS, {})
+    begin = data.draw(st.integers(0, ours.lineMax))
+    end = data.draw(st.integers(begin, ours.lineMax))
+    arguments = (begin, end, data.draw(st.integers(0, 5)), data.draw(st.booleans()))
+    assert ours.getLines(*arguments) == theirs.getLines(*arguments)
+    assert ours.count == end - begin
+    base = Excerpt(Source("a.md", text), text, ((0, 0),))
+    cut = locate(base, ours.rows)
+    one_by_one = [
+        ours._row(line, arguments[2], arguments[3] or line + 1 < end) for line in range(begin, end)
+    ]
+    assert cut == locate(base, one_by_one)
+
+
+def _their_tables(text: str) -> list[tuple[list[int] | None, list[list[str]], list[str]]]:
+    """Lines, cells and alignments of the tables that markdown-it finds in a text."""
+    found: list[tuple[list[int] | None, list[list[str]], list[str]]] = []
+    tokens = _MARKDOWN.parse(text)
+    for i, token in enumerate(tokens):
+        if token.type == "table_open":
+            found.append((token.map, [], []))
+        elif token.type == "tr_open":
+            found[-1][1].append([])
+        elif token.type in ("th_open", "td_open"):
+            found[-1][1][-1].append(tokens[i + 1].content)
+            if token.type == "th_open":
+                found[-1][2].append(str(token.attrs.get("style", "")))
+    return found
+
+
+def _our_tables(text: str) -> list[tuple[list[int] | None, list[list[str]], list[str]]]:
+    base = Excerpt(Source("a.md", text), text, ((0, 0),))
+    tokens = block_tokens(base, Definitions())
+    found: list[tuple[list[int] | None, list[list[str]], list[str]]] = []
+
+    def plain(cell: Excerpt) -> tuple[Any, ...]:
+        return ()
+
+    for i, token in enumerate(tokens):
+        if token.type == "table_open":
+            table, _ = tables.read_table(tokens, i, base, plain, lambda wrong: None)
+            cells = [[cell.text.text for cell in row] for row in (table.header, *table.rows)]
+            align = [f"text-align:{one}" if one else "" for one in table.align]
+            found.append((token.map, cells, align))
+    return found
+
+
+@given(tables_within)
+def test_tables_are_those_that_markdown_it_finds(text: str) -> None:
+    assert _our_tables(text) == _their_tables(text)
+
+
+@given(st.text(st.sampled_from("||a \\\t\xa0é"), max_size=20))
+def test_a_row_in_one_piece_is_split_like_any_other(row: str) -> None:
+    source = Source("a.md", "xx" + row + "\n")
+    whole = Excerpt(source, source.text, ((0, 0),))
+    pieced = Excerpt(source, source.text, ((0, 0), (1, 1)))
+    cells = tables.split_row(whole, 2, 2 + len(row))
+    again = tables.split_row(pieced, 2, 2 + len(row))
+    assert [(cell.text, cell.span()) for cell in cells] == [
+        (cell.text, cell.span()) for cell in again
+    ]
+    assert all(trimmed(cell) is cell for cell in cells)
+
+
+def test_a_token_has_attributes_when_it_is_asked_for_them() -> None:
+    base = Excerpt(Source("a.md", "a"), "a", ((0, 0),))
+    token = block_tokens(base, Definitions())[0]
+    assert token == token
+    plain = Token("paragraph_open", "p", 1)
+    assert token.attrs == plain.attrs == {}
+    token.attrSet("start", 3)
+    token.meta["checked"] = True
+    assert (token.attrs, token.meta) == ({"start": 3}, {"checked": True})
+
+
+def test_a_table_in_a_lesson_has_cells_where_they_stand() -> None:
+    source = Source("a.md", "> | a | b \\| c |\n> |:-:|---|\n> | 1 |\n")
+    quote = parse_document(source, frozenset(), lesson=True).value.blocks[0]
+    table = quote.blocks[0]  # type: ignore[union-attr]
+    assert isinstance(table, Table)
+    assert table.align == ("center", None)
+    assert [cell.text.text for cell in table.header] == ["a", "b | c"]
+    assert [cell.span.text for cell in table.header] == ["a", "b \\| c"]
+    assert [cell.span.text for cell in table.rows[0]] == ["1", ""]
+
+
+def test_rows_say_where_their_text_begins() -> None:
+    assert Row("a", 3) == ("a", 3, 0)
