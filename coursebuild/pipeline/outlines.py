@@ -14,7 +14,8 @@ import hashlib
 import io
 import pickle
 import struct
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Iterable
 from typing import Any
 
 from coursebuild.diagnostics import Diagnostic
@@ -57,8 +58,8 @@ class Outline:
     skeleton: Document
     diagnostics: tuple[Diagnostic, ...]
     """Those of formulas among them."""
-    imports: Mapping[str, tuple[str, ...]]
-    """Modules that each script imports, by its path."""
+    imports: tuple[tuple[str, tuple[str, ...]], ...]
+    """Paths of scripts, each with the modules that it imports."""
     lasting: bool
     """Whether the same text gives the same again."""
     face: str = ""
@@ -111,7 +112,7 @@ def unpack(data: bytes, source: Source) -> Any:
 
 def packed(outline: Outline) -> bytes:
     """An outline as bytes."""
-    head = pack((outline.diagnostics, dict(outline.imports), outline.lasting, outline.face))
+    head = pack((outline.diagnostics, outline.imports, outline.lasting, outline.face))
     return _LENGTH.pack(len(head)) + head + pack(outline.skeleton)
 
 
@@ -126,7 +127,10 @@ def parted(data: bytes, source: Source) -> tuple[Outline, bytes] | None:
     head = unpack(data[_LENGTH.size : end], source)
     if not isinstance(head, tuple) or len(head) != 4:
         return None
-    return Outline(Document(source, (), ()), *head), data[end:]
+    diagnostics, imports, lasting, face = head
+    # The names of modules are the same few in all lessons.
+    imports = tuple((path, tuple(map(sys.intern, modules))) for path, modules in imports)
+    return Outline(Document(source, (), ()), diagnostics, imports, lasting, face), data[end:]
 
 
 def unpacked(data: bytes, source: Source) -> Outline | None:
@@ -140,8 +144,4 @@ def unpacked(data: bytes, source: Source) -> Outline | None:
 
 def all_imports(outlines: Iterable[Outline]) -> dict[str, frozenset[str]]:
     """Modules by the path of the script that imports them."""
-    return {
-        path: frozenset(modules)
-        for outline in outlines
-        for path, modules in outline.imports.items()
-    }
+    return {path: frozenset(modules) for outline in outlines for path, modules in outline.imports}

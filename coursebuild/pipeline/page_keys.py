@@ -26,35 +26,42 @@ class PageKeys:
         self._around = around
         self._name = hashlib.sha256(f"keys of pages\0{tool_digest()}".encode()).hexdigest()
         self._before = self._load()
+        """What was not asked for yet; what was is moved, so that no row is held twice."""
         self._now: dict[str, str] = {}
+        self._changed = False
 
     def get(self, path: str, document: str) -> str | None:
         """The key of the page at a site path, with the key of its document, if it has one."""
-        key = self._before.get(_row(path, document))
+        row = _row(path, document)
+        key = self._before.pop(row, None)
         if key is not None:
-            self.add(path, document, key)
-        return key
+            self._now[row] = key
+        return self._now.get(row)
 
     def add(self, path: str, document: str, key: str) -> None:
         """The same of a page whose sheet was made."""
-        self._now[_row(path, document)] = key
+        row = _row(path, document)
+        self._changed = self._changed or self._now.get(row) != key
+        self._now[row] = key
 
     def save(self) -> None:
         """Keep them for the next build."""
-        if self._around is not None and self._now != self._before:
+        if self._around is not None and (self._changed or self._before):
             rows = (f"{key} {row}" for row, key in self._now.items())
-            data = "\n".join((self._around, *rows)).encode("utf-8", "surrogatepass")
+            data = "\n".join((self._around, *rows)).encode()
             self._store.keep(_KIND, self._name, data, packed=True)
 
     def _load(self) -> dict[str, str]:
         data = None if self._store.fresh else self._store.peek(_KIND, self._name)
         if data is None or self._around is None:
             return {}
-        around, *rows = data.decode("utf-8", "surrogatepass").split("\n")
+        around, *rows = data.decode().split("\n")
         if around != self._around:
             return {}
         return {row: key for key, _, row in (line.partition(" ") for line in rows)}
 
 
 def _row(path: str, document: str) -> str:
-    return f"{document} {path}"
+    """A name for a page and its document that takes little memory: there is one for each page."""
+    text = f"{document} {path}".encode("utf-8", "surrogatepass")
+    return hashlib.blake2b(text, digest_size=16).hexdigest()

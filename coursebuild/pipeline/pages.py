@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -272,7 +273,8 @@ class Pages:
         entry = None
         if record.search is not None:
             name, digest = record.search
-            entry = Entry(draft.path, draft.kind, draft.title, name, digest)
+            # Of what a record says twice or as others do, no copy is held.
+            entry = Entry(page.path, sys.intern(draft.kind), draft.title, name, digest)
         return _Page(page, kept, draft.indexed, entry)
 
     def _load_last(self) -> dict[str, bytes]:

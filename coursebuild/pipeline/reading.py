@@ -188,7 +188,7 @@ class Reader:
         return Outline(
             skeleton=bones,
             diagnostics=(*whole.diagnostics, *found, *told),
-            imports={s.path: tuple(sorted(imports(s.code.text))) for s in scripts},
+            imports=tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts),
             lasting=not found,
             face=outline_face(bones),
         )
