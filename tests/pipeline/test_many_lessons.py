@@ -77,7 +77,7 @@ def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
 def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
     peaks = []
-    # What is made once, whatever the course: twice, since the first build keeps things for the next.
+    # Twice what is made once, whatever the course: the first build keeps things for the next.
     for name, count in (("first", FEW), ("second", FEW), ("few", FEW), ("many", MANY)):
         folder = Folder(tmp_path / name)
         write_course(folder, count)
