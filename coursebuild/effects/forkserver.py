@@ -42,7 +42,7 @@ from coursebuild.effects.preload import Recorder
 from coursebuild.effects.spawned import Waiting
 from coursebuild.effects.supervisor import Job, Slot, die_with, library_is_installed
 from coursebuild.effects.tracing import Tracer, installed_folders, library_folders
-from coursebuild.effects.watching import Launched
+from coursebuild.effects.watching import Launched, has_ended
 
 PLACEHOLDER = "/coursebuild: the place of a script's path"
 """What the server is told to run."""
@@ -138,7 +138,7 @@ class _Server:
                 elif self._slot(request["scratch"], fds):
                     return True
         self._reap(0)
-        if os.getppid() != self.tool:  # it was killed; otherwise the folder is its own
+        if has_ended(self.tool):  # it was killed; otherwise the folder is its own
             for folder in self.scratch:
                 with contextlib.suppress(OSError):
                     Path(folder).rmdir()

@@ -37,7 +37,7 @@ from typing import Literal, Protocol, TypedDict
 
 from coursebuild.effects.notes import Notes, read_notes
 from coursebuild.effects.required import missing_modules
-from coursebuild.effects.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched
+from coursebuild.effects.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
 
 LENGTH = struct.Struct(">I")
 
@@ -182,7 +182,7 @@ def main(reports: int) -> None:
         slot.work()
     finally:
         # While the tool lives the folder is its own: another supervisor may be about to use it.
-        if slot.scratch and os.getppid() != tool:
+        if slot.scratch and has_ended(tool):
             with contextlib.suppress(OSError):  # others still use it
                 Path(slot.scratch).rmdir()
 

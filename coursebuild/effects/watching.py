@@ -18,6 +18,8 @@ from typing import Literal, NamedTuple
 
 from coursebuild.effects.notes import Notes
 
+_EXITING = 0x4
+"""A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
 STDOUT_LIMIT = 1 << 20
 """Bytes that a script may print."""
 STDERR_KEPT = 1 << 16
@@ -36,6 +38,22 @@ class Launched(NamedTuple):
     stderr: int
     notes: Callable[[], Notes | None]
     """What it looked at, once it has ended; `None` where nobody took notes."""
+
+
+def has_ended(parent: int) -> bool:
+    """Whether the process that started this one has ended, or is about to.
+
+    One that ends closes its files before its children get another parent: who finds its end of a
+    pipe closed may still find it as its parent. Linux says of such a process that it is exiting.
+    """
+    if os.getppid() != parent:
+        return True
+    try:
+        with open(f"/proc/{parent}/stat", "rb") as file:  # noqa: PTH123 (as cheap as can be)
+            state, *fields = file.read().rpartition(b")")[2].split()
+        return state in (b"Z", b"X") or bool(int(fields[5]) & _EXITING)
+    except (OSError, ValueError, IndexError):
+        return False
 
 
 class Watched:
