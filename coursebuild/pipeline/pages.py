@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import itertools
+import operator
 import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -126,12 +128,12 @@ class Pages:
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
         pages = {page.wanted.path: page for page in self._pages}
-        if not self._facts.sound or not self._facts.leads <= files | pages.keys():
+        if not self._facts.sound or not self._facts.leads.keys() <= files | pages.keys():
             return False
-        for path, anchors in self._facts.anchors.items():
+        for path, led in itertools.groupby(sorted(self._facts.anchors), operator.itemgetter(0)):
             if path in pages:
                 ids = frozenset(self._record(pages[path]).ids)
-                if not all(anchor == "top" or has(ids, anchor) for anchor in anchors):
+                if not all(has(ids, anchor) for _, anchor in led):
                     return False
         return True
 
@@ -322,10 +324,10 @@ class _Facts:
         self._declarations: set[str] = set()
         self.sound = True
         """Whether every page has the anchors that it leads to itself."""
-        self.leads: set[str] = set()
-        """Site paths that pages lead to."""
-        self.anchors: dict[str, set[str]] = {}
-        """Anchors that pages lead to on others, by the site path of these."""
+        self.leads: dict[str, str] = {}
+        """Site paths that pages lead to, each by itself, so that none is held twice."""
+        self.anchors: set[tuple[str, str]] = set()
+        """Anchors that pages lead to on others, each after the site path of its page."""
 
     def add(self, record: PageRecord) -> None:
         """Note what a page shows and where it leads."""
@@ -337,9 +339,9 @@ class _Facts:
             if path == record.draft.path:
                 self.sound = self.sound and has(own, anchor)
             else:
-                self.leads.add(path)
+                path = self.leads.setdefault(path, path)
                 if anchor not in ("", "top"):
-                    self.anchors.setdefault(path, set()).add(anchor)
+                    self.anchors.add((path, sys.intern(anchor)))
 
     def together(self) -> PageFacts:
         """What the shared files must know."""

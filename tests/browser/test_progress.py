@@ -74,6 +74,7 @@ def test_the_home_page_leads_back_to_the_section(calm: BrowserContext, site: str
     assert note.startswith("at “The x")
     assert note.endswith("law & its reach”")
     start.locator("a").click()
+    page.wait_for_load_state()  # Chromium may not close a window that is on its way
     assert page.url == site + PUSH_PAGE + "#law"
 
 

@@ -59,7 +59,7 @@ def alive(pid: int) -> bool:
 
 def wait_for(path: Path) -> int:
     """The process whose number a script writes into a file."""
-    until = time.monotonic() + 20
+    until = time.monotonic() + 120
     while time.monotonic() < until:
         if path.exists() and path.read_text():
             return int(path.read_text())

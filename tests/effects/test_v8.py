@@ -389,7 +389,7 @@ class TestLife:
             process.stdout.readline()
             time.sleep(0.1)
             os.kill(process.pid, signal.SIGINT)
-            said, errors = process.communicate(timeout=20)
+            said, errors = process.communicate(timeout=120)
         assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
 
     def test_a_process_that_forgets_to_close_ends(self) -> None:

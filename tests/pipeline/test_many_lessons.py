@@ -47,6 +47,7 @@ def options(folder: Folder, jobs: int = 1) -> Options:
 def peak(folder: Folder) -> int:
     """The most bytes of Python's that a build holds at once, files that it makes included."""
     gc.collect()
+    gc.freeze()  # else what other tests left decides how long garbage lies about
     tracemalloc.start()
     try:
         with prepare(options(folder), Progress(quiet=True)) as prepared:
@@ -59,6 +60,7 @@ def peak(folder: Folder) -> int:
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+        gc.unfreeze()
 
 
 @pytest.fixture

@@ -202,7 +202,7 @@ def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\ntime.sleep(0.7)\nprint(1)"
     folder = make("## First\n\n" + block("x.py", slow, "1"))
     with serving(folder) as preview, preview.events() as events:
-        until = time.monotonic() + 20
+        until = time.monotonic() + 120
         while not (folder.root / "begun").exists():
             assert time.monotonic() < until
             time.sleep(0.01)
@@ -217,7 +217,7 @@ def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
 
 def begins(folder: Folder, times: int) -> None:
     """Wait until the script has begun so many times."""
-    until = time.monotonic() + 20
+    until = time.monotonic() + 120
     while not (folder.root / "begun").exists() or len(folder.read("begun")) < times:
         assert time.monotonic() < until
         time.sleep(0.01)

