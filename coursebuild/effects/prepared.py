@@ -55,31 +55,24 @@ def prepared_copy(key: str) -> bytes | None:
     return None if file is None else (assets_dir() / FOLDER / file).read_bytes()
 
 
-@functools.cache
 def _copies() -> dict[str, str]:
-    try:
-        text = (assets_dir() / FOLDER / "copies.json").read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return {}
-    copies: dict[str, str] = json.loads(text)
-    return copies
+    return _made_ahead("copies.json")
 
 
-@functools.cache
 def _templates() -> dict[str, str]:
-    try:
-        text = (assets_dir() / FOLDER / "templates.json").read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return {}
-    templates: dict[str, str] = json.loads(text)
-    return templates
+    return _made_ahead("templates.json")
+
+
+def _listing() -> dict[str, Any]:
+    return _made_ahead("fonts.json") or {"cuts": {}, "smaller": {}}
 
 
 @functools.cache
-def _listing() -> dict[str, Any]:
+def _made_ahead(name: str) -> dict[str, Any]:
+    """A list of what was made ahead; empty in a bundle that somebody made without."""
     try:
-        text = (assets_dir() / FOLDER / "fonts.json").read_text(encoding="utf-8")
-    except FileNotFoundError:  # a bundle that somebody made without
-        return {"cuts": {}, "smaller": {}}
-    listing: dict[str, Any] = json.loads(text)
-    return listing
+        text = (assets_dir() / FOLDER / name).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return {}
+    found: dict[str, Any] = json.loads(text)
+    return found
