@@ -31,12 +31,12 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import pack
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
+from coursebuild.python_text import forget_texts
 from coursebuild.render.assets import Assets
 from coursebuild.render.draft import Draft
 from coursebuild.render.draw import draw
 from coursebuild.render.folding import forget_folds, imported
 from coursebuild.render.fonts import FontJob, subset_font
-from coursebuild.render.highlight import highlight_lines
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
 from coursebuild.render.record import record
@@ -146,7 +146,6 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     tools = library.tools
 
     def draws() -> list[Draft]:
-        highlight_lines.cache_clear()
         forget_folds()
         return [draw(sheet, document, tools) for sheet, document in drawn]
 
@@ -154,10 +153,14 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         forget_folds()
         return [imported(script) for script in scripts]
 
+    def parses() -> list[object]:
+        forget_texts()
+        return [parse_document(d.source, kinds, lesson=True) for d in documents]
+
     drafts = draws()
     documents = [document for _, document in drawn]
     steps: dict[str, Callable[[], object]] = {
-        "parse": lambda: [parse_document(d.source, kinds, lesson=True) for d in documents],
+        "parse": parses,
         "its outline": lambda: [pack(skeleton(d)) for d in documents],
         "modules that scripts import": modules,
         "draw": draws,
@@ -178,7 +181,7 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=9)
     arguments = parser.parse_args()
     root = arguments.course.resolve()
-    gc.set_threshold(200_000, 50, 50)  # as for a command
+    gc.set_threshold(1_000_000, 50, 50)  # as for a command
     print(f"{platform.platform()}, {len(os.sched_getaffinity(0))} cores, {platform.processor()}")
     names = ("markdown-it-py", "mujoco", "numpy")
     print(f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in names))

@@ -69,6 +69,8 @@ class Report:
         self.scripts = {way: scripts.ratios(way) for way in scripts.found}
         self.compute = scripts.compute
         self.script_count = len(scripts.paths)
+        if scripts.failed:
+            self.failed.append(scripts.failed)
 
     def as_json(self) -> dict[str, object]:
         """All figures, not only medians."""

@@ -14,7 +14,9 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.courses import FLAVORS, names_of, write_course  # noqa: E402
+from benchmarks.measure.building import make_site, remove  # noqa: E402
 from benchmarks.measure.report import BEGIN, END, Report, markdown, put_into  # noqa: E402
+from benchmarks.measure.tools import Places, all_tools  # noqa: E402
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -154,3 +156,23 @@ def test_ratios_are_to_coursebuild(tmp_path: Path) -> None:
     assert "| coursebuild | 0.900 |" in text
     assert "| another | 1.80 (2.0 ×) |" in text
     assert "not measured: a third." in text
+
+
+def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -> None:
+    places = Places(None, None)
+    tool = next(tool for tool in all_tools(places) if tool.key == "coursebuild")
+    site = make_site(tool, 1, tmp_path, places)
+    before = files(site.folder)
+    site.clear()  # there is nothing yet
+    assert not site.earlier.exists()
+    for _ in range(2):
+        for name in ("public/index.html", ".coursebuild/packs/1", ".coursebuild/scripts/1"):
+            path = site.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(name, encoding="utf-8")
+        site.clear()
+        left = {path: data for path, data in files(site.folder).items() if path not in before}
+        assert left == {".coursebuild/scripts/1": b".coursebuild/scripts/1"}
+    assert len(files(site.earlier)) == 4
+    remove(site.earlier)
+    assert not site.earlier.exists()
