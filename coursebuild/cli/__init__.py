@@ -3,6 +3,9 @@
 Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
 usage. Heavy imports happen in the command that needs them.
 
+- `unchanged`: a command with nothing to do, which loads no more than that
+- `running`: memory, and what a command ends with
+- `interrupts`: Ctrl-C and SIGTERM, wherever they come
 - `arguments`: what can be said
 - `commands`: one function for each command
 - `output`: what is written where, and the status that says it too
@@ -10,64 +13,41 @@ usage. Heavy imports happen in the command that needs them.
 
 from __future__ import annotations
 
-import argparse
-import gc
-import signal
 import sys
-import threading
-from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
 
-from coursebuild.cli.arguments import parser
-from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
-from coursebuild.effects.errors import EffectError, PublishRefusedError, UsageError
+from coursebuild.cli.output import CLEAN, INTERRUPTED, say, write
+from coursebuild.cli.unchanged import said_before
 
-
-class _Terminated(KeyboardInterrupt):
-    """Somebody asked this process to end: what it has begun is cleaned up, as after Ctrl-C."""
+TYPE_CHECKING = False
+"""As type checkers know it: to import `typing` takes a tenth of a run with nothing to do."""
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command that the arguments name; gives the exit status."""
-    before = _heed_sigterm()
-    collected = gc.get_threshold()
-    # What a command makes lives until its end, and hardly any of it is in cycles.
-    gc.set_threshold(200_000, 50, 50)
-    try:
-        return _main(arguments)
-    finally:
-        gc.set_threshold(*collected)
-        if before is not None:
-            signal.signal(signal.SIGTERM, before)
+    """Run the command that the arguments name; gives the exit status.
 
-
-def _heed_sigterm() -> Any:
-    """Make SIGTERM an exception; gives the handler there was, or nothing where it is left alone."""
-    if threading.current_thread() is not threading.main_thread():
-        return None
-
-    def terminate(*_: object) -> NoReturn:
-        raise _Terminated
-
-    return signal.signal(signal.SIGTERM, terminate)
-
-
-def _main(arguments: Sequence[str] | None) -> int:
+    Without arguments it is the command of this process, which ends with it.
+    """
     _utf8_streams()
-    options = parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        command: Callable[[argparse.Namespace], int] = options.command
-        return command(options)
-    except UsageError as error:
-        return fail(USAGE, str(error))
-    except PublishRefusedError as error:
-        return fail(USAGE, error.message, error.help)
-    except EffectError as error:
-        return fail(WRONG, error.message, error.help)
-    except _Terminated:
-        return say(TERMINATED, "terminated")
+        said = said_before(given)
+        if said is not None:
+            return _end(write(said, CLEAN), alone=arguments is None)
+        from coursebuild.cli.running import run
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
+    return run(given, alone=arguments is None)
+
+
+def _end(status: int, *, alone: bool) -> int:
+    """End this process at once, if it is one command's: Python takes its time to clean up."""
+    if alone:
+        from coursebuild.effects.leaving import leave
+
+        leave(status)
+    return status
 
 
 def _utf8_streams() -> None:

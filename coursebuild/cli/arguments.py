@@ -1,12 +1,12 @@
 """What can be said on the command line.
 
-Entry point: `parser()`.
+Entry point: `parser(given)`.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from coursebuild.cli.commands import (
     bench_command,
@@ -23,8 +23,12 @@ from coursebuild.cli.commands import (
 )
 
 
-def parser() -> argparse.ArgumentParser:
-    """What can be said, each command with the function that does it."""
+def parser(given: Sequence[str]) -> argparse.ArgumentParser:
+    """What can be said, each command with the function that does it.
+
+    Of a command whose name is not among what is given only that is told: to declare what else can
+    be said to all of them takes as long as looking at every file of a course.
+    """
     from coursebuild import __version__
 
     parser = argparse.ArgumentParser(
@@ -42,156 +46,185 @@ def parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, prog=parser.prog
     )
-    build = _command(commands, "build", build_command, "verify everything and publish the site")
-    build.add_argument(
+    for name, summary, function, declare in _COMMANDS:
+        if name not in given:
+            commands.add_parser(name, help=summary, add_help=False)
+            continue
+        command = commands.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+        command.set_defaults(command=function)
+        declare(command)
+    return parser
+
+
+# --- what each command takes
+
+
+def _build(parser: argparse.ArgumentParser) -> None:
+    _running(parser)
+    parser.add_argument(
         "--out",
         default="public",
         metavar="FOLDER",
         help="where the site goes, from the course's folder (default: %(default)s)",
     )
-    check = _command(commands, "check", check_command, "verify, publish nothing")
-    _lessons(check)
-    _format(check)
-    _parts(check)
-    check.add_argument(
+
+
+def _check(parser: argparse.ArgumentParser) -> None:
+    _running(parser)
+    _lessons(parser)
+    _format(parser, "text", "json", "junit", "sarif", "github")
+    _parts(parser)
+    parser.add_argument(
         "--executor",
         metavar="PLACE",
         default=None,
         help="run the scripts on a Dask cluster: dask://HOST:PORT",
     )
-    check.add_argument(
+    parser.add_argument(
         "--sensitivity",
         action="store_true",
         help="move initial states by 1e-12, and say which printed digits hold",
     )
-    check.add_argument(
+    parser.add_argument(
         "--against",
         metavar="VERSION",
         default=None,
         help="run the scripts with this version of MuJoCo, and say what it changes",
     )
-    update = _command(commands, "update", update_command, "bring recorded outputs up to date")
-    _lessons(update)
-    update.add_argument(
+
+
+def _update(parser: argparse.ArgumentParser) -> None:
+    _running(parser)
+    _lessons(parser)
+    parser.add_argument(
         "--dry-run", action="store_true", help="show what would change; write nothing"
     )
-    extract = _command(
-        commands, "extract", extract_command, "write the scripts to examples/", runs=False
-    )
-    extract.add_argument(
+
+
+def _extract(parser: argparse.ArgumentParser) -> None:
+    _quiet(parser)
+    parser.add_argument(
         "--adopt",
         action="store_true",
         help="bring extracted files that were edited by hand back into their lessons",
     )
-    serve = _command(
-        commands,
-        "serve",
-        serve_command,
-        "preview: build, serve, rebuild and reload on change",
-    )
-    serve.add_argument(
+
+
+def _serve(parser: argparse.ArgumentParser) -> None:
+    _running(parser)
+    parser.add_argument(
         "--port",
         type=_port,
         default=8000,
         help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
     )
-    export = _command(
-        commands,
-        "export",
-        export_command,
-        "verify everything and write an archive for learning platforms",
-    )
-    export.add_argument(
+
+
+def _export(parser: argparse.ArgumentParser) -> None:
+    _running(parser)
+    parser.add_argument(
         "kind",
         choices=("qti", "scorm"),
         help="the quizzes as IMS QTI 2.1, or the course as SCORM 1.2",
     )
-    export.add_argument(
+    parser.add_argument(
         "--out",
         default=None,
         metavar="FILE",
         help="from the course's folder (default: quizzes-qti.zip, course-scorm.zip)",
     )
-    explain = commands.add_parser(
-        "explain",
-        help="say why something would run again, and what depends on it",
-        description="Say whether a script or lab would run again and why, and what depends on it.",
-        allow_abbrev=False,
+
+
+def _explain(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Say whether a script or lab would run again and why, and what depends on it."
     )
-    explain.add_argument(
+    parser.set_defaults(quiet=False)
+    parser.add_argument(
         "path",
         metavar="PATH",
         help="a script, lab, lesson, page, model, or any file of the project",
     )
-    explain.add_argument(
-        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
-    )
-    explain.set_defaults(command=explain_command, quiet=False)
-    bench = _command(
-        commands,
-        "bench",
-        bench_command,
-        "measure speed against error of the course's models",
-        runs=False,
-    )
-    bench.add_argument(
+    _format(parser, "text", "json")
+
+
+def _bench(parser: argparse.ArgumentParser) -> None:
+    _quiet(parser)
+    parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help="a model, as in models/SCENE.xml (default: all)"
     )
-    bench.add_argument(
-        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
-    )
-    bench.add_argument(
+    _format(parser, "text", "json")
+    parser.add_argument(
         "--quick", action="store_true", help="fewer settings and rough times, for a first look"
     )
-    bench.add_argument(
+    parser.add_argument(
         "--plot",
         metavar="FILE.svg",
         default=None,
         help="draw error against cost; of several scenarios each into a file of its own",
     )
-    _recorded(bench)
-    _cache(bench)
-    stability = _command(
-        commands,
-        "stability",
-        stability_command,
-        "measure MuJoCo on hard cases, beside theory",
-        runs=False,
-    )
-    stability.add_argument(
+    _recorded(parser)
+    _cache(parser)
+
+
+def _stability(parser: argparse.ArgumentParser) -> None:
+    _quiet(parser)
+    parser.add_argument(
         "problems", nargs="*", metavar="PROBLEM", help="a hard case or a family (default: all)"
     )
-    stability.add_argument(
-        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
+    _format(parser, "text", "json")
+    _recorded(parser)
+    _cache(parser)
+
+
+def _diet(parser: argparse.ArgumentParser) -> None:
+    _quiet(parser)
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)"
     )
-    _recorded(stability)
-    _cache(stability)
-    diet = _command(
-        commands,
-        "diet",
-        diet_command,
-        "say what models hold that their scenarios do not need",
-        runs=False,
-    )
-    diet.add_argument("models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)")
-    writes = diet.add_mutually_exclusive_group()
+    writes = parser.add_mutually_exclusive_group()
     writes.add_argument(
         "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
     )
     writes.add_argument(
         "--record", action="store_true", help="write what was found to content/reports/"
     )
-    diet.add_argument("--quick", action="store_true", help="short runs, rough times")
-    diet.add_argument(
-        "--format", choices=("text", "json"), default="text", help="(default: %(default)s)"
-    )
-    _cache(diet)
-    schema = commands.add_parser(
-        "schema", help="print a JSON Schema for an editor", allow_abbrev=False
-    )
-    schema.add_argument("name", choices=("quiz", "lab", "course", "model"))
-    schema.set_defaults(command=schema_command)
-    return parser
+    parser.add_argument("--quick", action="store_true", help="short runs, rough times")
+    _format(parser, "text", "json")
+    _cache(parser)
+
+
+def _schema(parser: argparse.ArgumentParser) -> None:
+    parser.description = None
+    parser.add_argument("name", choices=("quiz", "lab", "course", "model"))
+
+
+_COMMANDS = (
+    ("build", "verify everything and publish the site", build_command, _build),
+    ("check", "verify, publish nothing", check_command, _check),
+    ("update", "bring recorded outputs up to date", update_command, _update),
+    ("extract", "write the scripts to examples/", extract_command, _extract),
+    ("serve", "preview: build, serve, rebuild and reload on change", serve_command, _serve),
+    (
+        "export",
+        "verify everything and write an archive for learning platforms",
+        export_command,
+        _export,
+    ),
+    (
+        "explain",
+        "say why something would run again, and what depends on it",
+        explain_command,
+        _explain,
+    ),
+    ("bench", "measure speed against error of the course's models", bench_command, _bench),
+    ("stability", "measure MuJoCo on hard cases, beside theory", stability_command, _stability),
+    ("diet", "say what models hold that their scenarios do not need", diet_command, _diet),
+    ("schema", "print a JSON Schema for an editor", schema_command, _schema),
+)
+
+
+# --- what several take
 
 
 def _recorded(parser: argparse.ArgumentParser) -> None:
@@ -228,28 +261,22 @@ def _cache(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _command(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser],
-    name: str,
-    function: Callable[[argparse.Namespace], int],
-    summary: str,
-    *,
-    runs: bool = True,
-) -> argparse.ArgumentParser:
-    parser = commands.add_parser(name, help=summary, description=summary, allow_abbrev=False)
-    parser.set_defaults(command=function)
+def _quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
-    if runs:
-        parser.add_argument(
-            "--jobs",
-            "-j",
-            type=_jobs,
-            default=None,
-            metavar="N",
-            help="scripts at a time (default: one a core)",
-        )
-        _cache(parser)
-    return parser
+
+
+def _running(parser: argparse.ArgumentParser) -> None:
+    """What commands take that run scripts."""
+    _quiet(parser)
+    parser.add_argument(
+        "--jobs",
+        "-j",
+        type=_jobs,
+        default=None,
+        metavar="N",
+        help="scripts at a time (default: one a core)",
+    )
+    _cache(parser)
 
 
 def _lessons(parser: argparse.ArgumentParser) -> None:
@@ -261,12 +288,13 @@ def _lessons(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _format(parser: argparse.ArgumentParser) -> None:
+def _format(parser: argparse.ArgumentParser, *formats: str) -> None:
+    said = "(default: %(default)s)"
     parser.add_argument(
         "--format",
-        choices=("text", "json", "junit", "sarif", "github"),
+        choices=formats,
         default="text",
-        help="how to print what was found (default: %(default)s)",
+        help=f"how to print what was found {said}" if len(formats) > 2 else said,
     )
 
 

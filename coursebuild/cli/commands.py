@@ -8,12 +8,15 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from coursebuild.cli.output import CLEAN, look, print_report, report_text, style_of, write
+from coursebuild.cli.output import CLEAN, print_report, report_text, style_of, write
 
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from coursebuild.effects.published import Entry
+    from coursebuild.effects.stamp import State
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
@@ -64,8 +67,7 @@ def check_command(arguments: argparse.Namespace) -> int:
     if arguments.format != "text" or parts or arguments.sensitivity:
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
-    command = ("check", *arguments.lessons)
-    return _unless_unchanged(arguments, command, ("examples",), work)
+    return _leaving_a_stamp(arguments, "check", ("examples",), work)
 
 
 def _against(arguments: argparse.Namespace) -> int:
@@ -91,50 +93,47 @@ def _against(arguments: argparse.Namespace) -> int:
 
 def build_command(arguments: argparse.Namespace) -> int:
     """Verify everything and publish the site."""
+    out: str = arguments.out
+    known: dict[str, list[State]] = {}
+
+    def left(site: Mapping[str, Entry]) -> None:
+        known[out] = [(path, e.mode, e.size, e.modified, e.inode) for path, e in site.items()]
 
     def work(options: Options) -> Report:
         from pathlib import Path
 
         from coursebuild.pipeline.build import build
 
-        return build(options, Path(arguments.out))
+        return build(options, Path(out), left)
 
-    return _unless_unchanged(arguments, ("build", arguments.out), ("examples", arguments.out), work)
+    return _leaving_a_stamp(arguments, "build", ("examples", out), work, known)
 
 
-def _unless_unchanged(
+def _leaving_a_stamp(
     arguments: argparse.Namespace,
-    command: tuple[str, ...],
+    name: str,
     made: tuple[str, ...],
     work: Callable[[Options], Report],
+    known: Mapping[str, Iterable[State]] | None = None,
 ) -> int:
-    """Do the work, unless all is as it was when it was last done and all was well.
+    """Do the work; where all is well, the same command has nothing to do as long as all stays so.
 
-    `made` is what the command leaves behind. Nothing is imported before it is needed.
+    `made` is what the command leaves behind, `known` the files in such folders as the work knows.
     """
-    from coursebuild.effects.place import course_above
-    from coursebuild.effects.stamp import Watcher, unchanged
+    from coursebuild.cli.unchanged import command_of
+    from coursebuild.effects.stamp import Watcher
 
-    colour, columns = look(sys.stdout)
-    given = [arguments.quiet, colour, columns, arguments.cache, arguments.cache_size]
-    given += [getattr(arguments, "executor", None)]
-    given += [os.environ.get(name) for name in ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")]
-    command = (*command, *map(repr, given))
-    root = arguments.root or course_above(".")
-    said = None
-    if root and not arguments.no_cache:
-        said = unchanged(os.path.realpath(root), command)
-    if said is not None:
-        return write(said, CLEAN)
     options = options_of(arguments)
-    watcher = Watcher(str(options.root), command)
+    command = command_of(arguments.given)
+    watcher = None if command is None else Watcher(str(options.root), command)
     report = work(options)
     status = print_report(report, "text", options)
-    if report.ok and report.depends is not None:
+    if watcher is not None and report.ok and report.depends is not None:
         from coursebuild.report import unchanged_report
 
-        remark = f"nothing has changed since the last {command[0]}"
-        watcher.keep(report_text(unchanged_report(report, remark), options), report.depends, made)
+        remark = f"nothing has changed since the last {name}"
+        said = report_text(unchanged_report(report, remark), options)
+        watcher.keep(said, report.depends, made, known or {})
     return status
 
 
@@ -171,11 +170,7 @@ def serve_command(arguments: argparse.Namespace) -> int:
     """Preview."""
     from coursebuild.pipeline.serve import serve
 
-    options = options_of(arguments)
-    try:
-        serve(options, arguments.port)
-    finally:
-        options.store.close()
+    serve(options_of(arguments), arguments.port)
     return CLEAN
 
 

@@ -5,14 +5,13 @@ Entry points: `write`, `say`, `fail`; `print_report`, `report_text`.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
-from typing import TYPE_CHECKING, TextIO
 
-from coursebuild.effects.errors import reason
-
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
+    from typing import TextIO
+
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report, Style
 
@@ -27,8 +26,10 @@ def fail(status: int, message: str, help: str = "") -> int:
 def say(status: int, text: str) -> int:
     """Write a text to standard error; gives the status."""
     if sys.stderr is not None:  # print would take standard output in its place
-        with contextlib.suppress(OSError):  # nobody reads it; the status says it too
+        try:
             print(text, file=sys.stderr, flush=True)
+        except OSError:  # nobody reads it; the status says it too
+            return status
     return status
 
 
@@ -42,6 +43,8 @@ def write(text: str, status: int) -> int:
     except BrokenPipeError:  # the reader has seen enough; what was found is as it was
         _forget_stdout()
     except OSError as error:
+        from coursebuild.effects.errors import reason
+
         _forget_stdout()
         return fail(WRONG, f"standard output cannot be written: {reason(error)}")
     return status

@@ -1,0 +1,57 @@
+"""A command with nothing to do: known before its arguments are read.
+
+Entry points: `said_before`, what it says then; `command_of`, the name of its stamp.
+
+The stamp goes by the arguments as they were given, and by what else decides what is printed. To
+read arguments takes longer than to look at the files of a course; a command that is spelled in
+another way has another stamp.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from coursebuild.cli.output import look
+from coursebuild.effects.place import course_above
+from coursebuild.effects.stamp import unchanged
+
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+COMMANDS = ("build", "check")
+"""Those that may leave a stamp."""
+_ALL_ANEW = "--no-cache"
+_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")
+"""Of the environment: what says the same as arguments."""
+
+
+def said_before(given: Sequence[str]) -> str | None:
+    """What this command said when all was as it is now; `None` where that is not known."""
+    command = command_of(given)
+    if command is None or _ALL_ANEW in given:
+        return None
+    try:
+        root = (given[1] or ".") if given[0] == "-C" else course_above(".")
+        return unchanged(os.path.realpath(root), command) if root else None
+    except OSError:  # the working directory is gone, for one
+        return None
+
+
+def command_of(given: Sequence[str]) -> tuple[str, ...] | None:
+    """The name of a command's stamp; `None` where it leaves none, or may be said elsewhere.
+
+    Which course is meant is no part of it, since the stamp lies there.
+    """
+    own = given[2:] if given and given[0] == "-C" else given
+    if not own or own[0] not in COMMANDS:
+        return None
+    words = [word for word in own if word != _ALL_ANEW]
+    around = [*look(sys.stdout), *map(os.environ.get, _VARIABLES)]
+    if any("/" in w or os.sep in w or os.path.exists(w) for w in words):  # noqa: PTH110
+        try:
+            around.append(os.getcwd())  # noqa: PTH109  # from where paths are meant
+        except OSError:
+            return None
+    return (*words, *map(repr, around))
