@@ -18,15 +18,38 @@ length can be held, of which few places are ever shown.
 
 from __future__ import annotations
 
+import hashlib
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coursebuild.patterns import pattern
 from coursebuild.values import dataclass, field
 
 _NEWLINE = pattern(r"\r\n|\r|\n")
+
+
+def text_digest(text: str) -> bytes:
+    """SHA-256 of a text in UTF-8."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).digest()
+
+
+def key_of(*texts: str) -> str:
+    """A name for what is made from these texts: SHA-256, in hexadecimal digits."""
+    return text_digest("\0".join(texts)).hex()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Away:
+    """How to read what is away, and what is known of it without."""
+
+    read: Callable[[], Any]
+    digest: bytes
+
+    def __call__(self) -> Any:
+        """What is away."""
+        return self.read()
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +68,22 @@ class Source:
     )
     """Gives the text, where it is away."""
 
+    @property
+    def digest(self) -> bytes:
+        """SHA-256 of the text; where that is away, it need not be read for this."""
+        read = self._read
+        return read.digest if isinstance(read, _Away) else text_digest(self.text)
+
     @classmethod
-    def away(cls, path: str, read: Callable[[], str]) -> Source:
-        """A source whose text is read each time it is asked for; it must be the same each time."""
+    def away(cls, path: str, read: Callable[[], str], digest: bytes | None = None) -> Source:
+        """A source whose text is read each time it is asked for; it must be the same each time.
+
+        `digest` is that of the text, where it is known.
+        """
         source = object.__new__(cls)
         object.__setattr__(source, "path", path)
         object.__setattr__(source, "_line_starts", [])
-        object.__setattr__(source, "_read", read)
+        object.__setattr__(source, "_read", read if digest is None else _Away(read, digest))
         return source
 
     def present(self) -> Source:
@@ -179,12 +211,23 @@ class Excerpt:
         """Whether it is read each time."""
         return self._read is not None
 
+    @property
+    def digest(self) -> bytes:
+        """SHA-256 of the text; where that is away, it need not be read for this."""
+        read = self._read
+        return read.digest if isinstance(read, _Away) else text_digest(self.text)
+
     @classmethod
-    def away(cls, source: Source, read: Callable[[], Excerpt]) -> Excerpt:
-        """An excerpt that is read each time it is asked for; it must be the same each time."""
+    def away(
+        cls, source: Source, read: Callable[[], Excerpt], digest: bytes | None = None
+    ) -> Excerpt:
+        """An excerpt that is read each time it is asked for; it must be the same each time.
+
+        `digest` is that of its text, where it is known.
+        """
         excerpt = object.__new__(cls)
         object.__setattr__(excerpt, "source", source)
-        object.__setattr__(excerpt, "_read", read)
+        object.__setattr__(excerpt, "_read", read if digest is None else _Away(read, digest))
         return excerpt
 
     if not TYPE_CHECKING:
@@ -226,22 +269,25 @@ class Excerpt:
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The source span that `text[start:end]` came from, with what lies between its pieces."""
         end = len(self.text) if end is None else end
-        pieces, size = self.pieces, len(self.source.text)
-        if len(pieces) == 1:
+        source, pieces = self.source, self.pieces
+        size = len(source.text)
+        if len(pieces) == 1:  # nearly always, and asked for often
             shift = pieces[0][1] - pieces[0][0]
-            first = min(start + shift, size)
-            return Span(self.source, first, max(first, min(end + shift, size)))
+            first, last = start + shift, end + shift
+            if first > size or last > size:
+                first, last = min(first, size), min(last, size)
+            return Span(source, first, last if last > first else first)
         first = self.offset(start)
         last = self.offset(end - 1) + 1 if end > start else first
         return Span(self.source, first, max(first, min(last, size)))
 
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
-        end = len(self.text) if end is None else end
-        if len(self.pieces) == 1:
-            text_at, source_at = self.pieces[0]
-            at = min(source_at + start - text_at, len(self.source.text))
-            return Excerpt(self.source, self.text[start:end], ((0, at),))
+        source, text, pieces = self.source, self.text, self.pieces
+        if len(pieces) == 1:
+            at, size = pieces[0][1] + start - pieces[0][0], len(source.text)
+            return Excerpt(source, text[start:end], ((0, at if at < size else size),))
+        end = len(text) if end is None else end
         first = bisect_right(self.pieces, start, key=_text_offset)
         last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
         inner = ((t - start, s) for t, s in self.pieces[first:last])

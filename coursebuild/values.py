@@ -6,8 +6,8 @@ go with it, and `dataclasses.fields` and `dataclasses.replace` work with its cla
 The standard one writes and compiles half a dozen methods for each class, when it is defined: for
 the classes of this tool that takes longer than building a lesson. Here
 
-1. a class gets its `__init__` when it has been called some times: of most only few values are made
-   in a run, and to write it takes as long as making thirty without;
+1. a class gets its `__init__` when it is first called, and the code of it from another class with
+   fields of the same kinds: to compile one takes as long as making hundreds of values;
 2. the other methods are the same for all classes, and know the fields;
 3. fields of frozen values are set through their slots, which is four times as fast as
    `object.__setattr__`.
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dataclasses import field as field
     from dataclasses import replace as replace
 else:
+    from copyreg import dispatch_table
     from operator import attrgetter
     from reprlib import recursive_repr
 
@@ -67,10 +68,9 @@ else:
 
     def replace(value, /, **changes):
         """The value with some of its fields changed."""
-        for one in type(value).__value_fields__:
-            if one.init and one.name not in changes:
-                changes[one.name] = getattr(value, one.name)
-        return type(value)(**changes)
+        parts = dict(zip(value.__match_args__, value.__value_parts__, strict=True))
+        parts.update(changes)
+        return type(value)(**parts)
 
     def _made(cls, frozen, eq, order):
         own = _own_fields(cls)
@@ -85,7 +85,7 @@ else:
         namespace |= {
             "__slots__": tuple(one.name for one in own),
             "__value_fields__": fields,
-            "__value_parts__": staticmethod(_getter([one.name for one in fields if one.init])),
+            "__value_parts__": property(_getter([one.name for one in fields if one.init])),
             "__match_args__": tuple(one.name for one in fields if one.init),
             "__dataclass_fields__": _StandardFields(),
         }
@@ -98,6 +98,8 @@ else:
         namespace = methods | namespace
         made = type(cls)(cls.__name__, cls.__bases__, namespace)
         made.__qualname__ = cls.__qualname__
+        if made.__reduce__ is _reduce:
+            dispatch_table[made] = _REDUCED
         return made
 
     def _fields_of(cls):
@@ -125,89 +127,77 @@ else:
 
     # --- making a value
 
-    _calls = {}
-    _FEW = 12
-    """Calls of a class for which no `__init__` is written."""
+    _makers = {}
+    """What makes an `__init__`, by the kinds of fields and whether `__post_init__` follows."""
+    _LINES = {
+        "given": "set{0}(self, value{0})",
+        "given or made": "set{0}(self, make{0}() if value{0} is missing else value{0})",
+        "made": "set{0}(self, make{0}())",
+        "constant": "set{0}(self, make{0})",
+        "left out": "pass",
+    }
+
+    def _kind(one):
+        if one.factory is not _MISSING:
+            return "given or made" if one.init else "made"
+        if one.init:
+            return "given"
+        return "left out" if one.default is _MISSING else "constant"
 
     def _first_init(self, *args, **kwargs):
-        """Makes the first values of a class, then writes the class's own `__init__`."""
-        cls = type(self)
-        while "__init__" not in cls.__dict__:  # a class that was derived without being decorated
-            cls = cls.__mro__[1]
-        calls = _calls[cls] = _calls.get(cls, 0) + 1
-        if calls <= _FEW and _is_call(cls, args, kwargs):
-            _init(cls, self, args, kwargs)
-            return
-        cls.__init__ = _written_init(cls)
-        _calls.pop(cls, None)
+        """Gives a class its own `__init__`, and calls it."""
+        # What was derived without being decorated has none of these, and maybe one of its own.
+        cls = next(one for one in type(self).__mro__ if one.__dict__.get("__init__") in _ours)
+        cls.__init__ = _own_init(cls)
         cls.__init__(self, *args, **kwargs)
 
-    def _is_call(cls, args, kwargs):
-        """Whether there is a value for each parameter; what else is wrong a written one tells."""
-        parameters = [one for one in cls.__value_fields__ if one.init]
-        if len(args) > len(parameters):
-            return False
-        named = parameters[len(args) :]
-        left = len(kwargs)
-        for one in named:
-            if one.name in kwargs:
-                left -= 1
-            elif one.default is _MISSING and one.factory is _MISSING:
-                return False
-        return left == 0
+    _ours = {_first_init}
+    """Each `__init__` that was made here."""
 
-    def _init(cls, self, args, kwargs):
-        """What a written `__init__` does."""
-        given = iter(args)
-        for one in cls.__value_fields__:
-            value = next(given, _MISSING) if one.init else _MISSING
-            if value is _MISSING and one.init:
-                value = kwargs.get(one.name, _MISSING)
-            if value is _MISSING:
-                if one.factory is not _MISSING:
-                    value = one.factory()
-                elif one.default is not _MISSING:
-                    value = one.default
-                else:
-                    continue
-            getattr(cls, one.name).__set__(self, value)
-        if hasattr(cls, "__post_init__"):
-            self.__post_init__()
+    def _own_init(cls):
+        """The code of another class with fields of the same kinds, with its own names in it."""
+        fields = cls.__value_fields__
+        follows = hasattr(cls, "__post_init__")
+        kinds = (*map(_kind, fields), follows)
+        maker = _makers.get(kinds)
+        if maker is None:
+            maker = _makers[kinds] = _maker(kinds[:-1], follows)
+        own = maker(
+            _MISSING,
+            *[getattr(cls, one.name).__set__ for one in fields],
+            *[one.default if one.factory is _MISSING else one.factory for one in fields],
+        )
+        given = [one for one in fields if one.init]
+        optional = [
+            one for one in given if one.default is not _MISSING or one.factory is not _MISSING
+        ]
+        if optional != given[len(given) - len(optional) :]:
+            raise TypeError(f"{cls.__qualname__}: a field without a default follows one with it")
+        own.__code__ = own.__code__.replace(co_varnames=("self", *[one.name for one in given]))
+        own.__defaults__ = tuple([one.default for one in optional])
+        own.__qualname__ = f"{cls.__qualname__}.__init__"
+        _ours.add(own)
+        return own
 
-    def _written_init(cls):
-        parameters, lines, names = [], [], {"_missing": _MISSING}
-        for number, one in enumerate(cls.__value_fields__):
-            names[f"_set{number}"] = getattr(cls, one.name).__set__
-            value = one.name
-            if one.factory is not _MISSING:
-                names[f"_make{number}"] = one.factory
-                value = f"_make{number}()"
-                if one.init:
-                    parameters.append(f"{one.name}=_missing")
-                    value += f" if {one.name} is _missing else {one.name}"
-            elif one.default is not _MISSING:
-                names[f"_default{number}"] = one.default
-                if one.init:
-                    parameters.append(f"{one.name}=_default{number}")
-                else:
-                    value = f"_default{number}"
-            elif one.init:
-                parameters.append(one.name)
-            else:
-                continue
-            lines.append(f"_set{number}(self, {value})")
-        if hasattr(cls, "__post_init__"):
-            lines.append("self.__post_init__()")
-        text = f"def __init__(self, {', '.join(parameters)}):\n " + "\n ".join(lines or ["pass"])
-        exec(text, names)
-        written = names["__init__"]
-        written.__qualname__ = f"{cls.__qualname__}.__init__"
-        return written
+    def _maker(kinds, follows):
+        numbers = range(len(kinds))
+        parameters = [f"value{n}" for n, kind in enumerate(kinds) if kind.startswith("given")]
+        lines = [_LINES[kind].format(n) for n, kind in enumerate(kinds)]
+        lines += ["self.__post_init__()"] if follows else []
+        known = ["missing", *[f"set{n}" for n in numbers], *[f"make{n}" for n in numbers]]
+        text = f"def maker({', '.join(known)}):\n"
+        text += f" def __init__({', '.join(['self', *parameters])}):\n  "
+        text += "\n  ".join(lines or ["pass"]) + "\n return __init__"
+        namespace = {}
+        exec(text, namespace)
+        return namespace["maker"]
 
     def _reduce(self):
         """Values are pickled as what they were made from."""
-        cls = self.__class__
-        return cls, cls.__value_parts__(self)
+        return _REDUCED(self)
+
+    _REDUCED = attrgetter("__class__", "__value_parts__")
+    """The same, for the table that pickling looks into first: without a call of Python's."""
 
     # --- methods that all classes have
 

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.render import cutting, fonts
+from coursebuild.render import cutting, fonts, woff2
 from coursebuild.values import replace
 
 OFTEN = (
@@ -47,8 +47,8 @@ def prepared(bundle: Path) -> dict[str, bytes]:
     faces = [(face, (bundle / "fonts" / face.file).read_bytes()) for face in listed]
     ready: dict[str, bytes] = {}
     for face, data in faces:
-        often = set(map(chr, OFTEN)) if face.family == fonts.MATH else fonts.covered(data)
-        characters = "".join(sorted(often & fonts.covered(data)))
+        often = set(map(chr, OFTEN)) if face.family == fonts.MATH else cutting.covered(data)
+        characters = "".join(sorted(often & cutting.covered(data)))
         made = fonts.ready_font(fonts.FontJob(face, data, characters))
         ready[face.file] = made
         name = face.file.replace(".woff2", ".ttf")
@@ -66,7 +66,7 @@ def prepared(bundle: Path) -> dict[str, bytes]:
 def made_from(bundle: Path) -> str:
     """A hash of the fonts and of what cuts them."""
     digest = hashlib.sha256()
-    for path in (Path(__file__), Path(fonts.__file__), Path(cutting.__file__)):
+    for path in map(Path, (__file__, fonts.__file__, cutting.__file__, woff2.__file__)):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
     for face in fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes()):
         whole = replace(face, characters="", measure=None)  # which may not be noted yet
@@ -80,8 +80,8 @@ def noted(bundle: Path) -> bytes:
     faces = json.loads(path.read_bytes())
     for face in faces:
         data = (bundle / "fonts" / face["file"]).read_bytes()
-        face["characters"] = fonts.unicode_range("".join(sorted(fonts.covered(data))))
-        face["measure"] = fonts.measured(data)
+        face["characters"] = fonts.unicode_range("".join(sorted(cutting.covered(data))))
+        face["measure"] = cutting.measured(data)
     return (json.dumps(faces, indent=2, ensure_ascii=False) + "\n").encode()
 
 

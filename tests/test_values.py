@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import io
 import pickle
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 import pytest
@@ -138,6 +140,43 @@ def test_showing() -> None:
     assert repr(holder) == "Open(a=1, b=[...])"
 
 
+@values.dataclass(frozen=True, slots=True)
+class Counted:
+    """Says itself what it is pickled as."""
+
+    x: int
+
+    def __reduce__(self) -> tuple[type[Counted], tuple[int]]:
+        return Counted, (self.x + 1,)
+
+
+class Derived(Point):
+    """Not decorated."""
+
+    __slots__ = ()
+
+
+def test_values_are_pickled_as_what_they_are() -> None:
+    assert pickle.loads(pickle.dumps(Counted(1))) == Counted(2)
+    derived = pickle.loads(pickle.dumps(Derived(1, 3)))
+    assert type(derived) is Derived and derived.both == (1, 3)
+    # With a table that does not know their classes they are written as the same bytes.
+    for value in (Point(1), Named(1, 2, "n"), Box([Empty(), Ranked(1, "r")]), Source("p", "a")):
+        out = io.BytesIO()
+        pickler = pickle.Pickler(out, pickle.HIGHEST_PROTOCOL)
+        pickler.dispatch_table = {}
+        pickler.dump(value)
+        assert out.getvalue() == pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+
+
+@pytest.mark.parametrize("replace", [values.replace, dataclasses.replace])
+def test_a_value_with_other_fields(replace: Callable[..., Any]) -> None:
+    assert replace(Named(1, 2, "n"), y=3) == Named(1, 3, "n")
+    assert replace(Named(1)) == Named(1)
+    with pytest.raises(TypeError):
+        replace(Point(1), z=3)
+
+
 def test_copies() -> None:
     for value in (Point(1), Named(1, 2, "n"), Open(3, [1]), Empty(), Ranked(1, "r")):
         for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
@@ -246,6 +285,16 @@ def test_the_first_values_are_made_like_the_others(which: int, call: Any) -> Non
     assert outcome(new) == outcome(used)
 
 
+def test_a_field_without_a_default_follows_none_with_it() -> None:
+    @values.dataclass(frozen=True, slots=True)
+    class Wrong:
+        first: int = 1
+        second: int  # type: ignore[misc]
+
+    with pytest.raises(TypeError, match="Wrong: a field without a default follows one with it"):
+        Wrong(1, 2)
+
+
 def test_the_first_values_do_not_share_what_is_made_for_them() -> None:
     @values.dataclass(frozen=True, slots=True)
     class Holder:
@@ -254,3 +303,22 @@ def test_the_first_values_do_not_share_what_is_made_for_them() -> None:
     one, other = Holder(), Holder()
     one.items.append(1)
     assert other.items == []
+
+
+def test_a_class_that_derives_keeps_an_init_of_its_own() -> None:
+    @values.dataclass(frozen=True, slots=True)
+    class Pair:
+        x: int
+        y: list[int] = values.field(default_factory=list)
+
+    class Twice(Pair):
+        __slots__ = ()
+
+        def __init__(self, x: int) -> None:
+            super().__init__(x, [x])
+
+    assert [(one.x, one.y) for one in (Twice(1), Twice(2), Pair(3))] == [
+        (1, [1]),
+        (2, [2]),
+        (3, []),
+    ]

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from coursebuild.checks.benches import check_keyframes, declared_scenarios
 from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Bench, Course, Lab, Mjcf, document_blocks
+from coursebuild.model import Bench, Course, Lab, Mjcf, document_blocks, document_has
 from coursebuild.patterns import pattern
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Excerpt, Span
@@ -42,6 +42,8 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     """Every MJCF text in the lessons, in document order."""
     texts: list[MjcfText] = []
     for document in course.documents:
+        if not document_has(document, Mjcf, Lab):
+            continue
         for block in document_blocks(document):
             if isinstance(block, Mjcf):
                 texts.append(_whole(block))

@@ -8,7 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.model import Block, Course, Heading, OutputQuestion, Quiz, document_blocks
+from coursebuild.model import (
+    Block,
+    Course,
+    Heading,
+    OutputQuestion,
+    Quiz,
+    document_blocks,
+    document_has,
+)
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.source import Span
 
@@ -86,6 +94,8 @@ def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagn
     printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
     found: list[Diagnostic] = []
     for document in course.documents:
+        if not document_has(document, OutputQuestion):
+            continue
         for quiz in document_blocks(document):
             if not isinstance(quiz, Quiz):
                 continue

@@ -5,15 +5,19 @@ Entry points: `markup_text`, `text_width`, `shortened`; `apart`, `clear_place`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from html import escape
 
 from coursebuild.values import dataclass
 
+_REMEMBERED = 1024
+"""Texts: those of a drawing stand in others as well, in several sizes."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")
 
 
+@functools.lru_cache(maxsize=_REMEMBERED)
 def markup_text(text: str) -> str:
     """Text for markup; characters that no markup can hold are left out."""
     return escape(
@@ -26,6 +30,7 @@ def _half(char: str) -> bool:
     return "\ud800" <= char <= "\udfff"
 
 
+@functools.lru_cache(maxsize=_REMEMBERED)
 def text_width(text: str, size: float) -> float:
     """About how wide a text is in a sans-serif face of this size; rather too much."""
     letters = 0.0

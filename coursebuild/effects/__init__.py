@@ -3,8 +3,8 @@
 The course's files:
 
 - `place`, `read`: where a course is, and its files as sources
-- `examples`, `write`, `site_swap` (with `exchange`, `published`), `locks`: what the tool writes, so
-  that killing it at any instant loses nothing
+- `examples`, `write`, `site_swap` (with `site_listing`, `site_staging`, `site_files`, `exchange`,
+  `published`), `locks`: what the tool writes, so that killing it at any instant loses nothing
 - `errors`: what can go wrong with all that
 
 Scripts:
@@ -26,10 +26,10 @@ What is kept:
 
 Engines and processes:
 
-- `v8` (with `typeset.js`): formulas to MathML
+- `v8` (with `typeset.js`): formulas to MathML, by `v8_library` and `v8_start`
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
-- `lab_engine` (with `lab_pieces.js`), `native` (with `native_worker`): labs in the browser's engine
-  and natively
+- `lab_engine` (with `lab_pieces.js`), `lab_files` (with `lab_timers.js`), `native` (with
+  `native_worker`): labs in the browser's engine and natively
 - `child`, `pool`: processes that answer, and copies of this one
 - `leaving`: the end of this process
 

@@ -19,7 +19,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from types import TracebackType
 from typing import Any, Self
 
 from coursebuild.effects.errors import EffectError
@@ -46,12 +45,7 @@ class JsonChild:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
         if self._folder is not None:
             self._folder.cleanup()

@@ -25,7 +25,7 @@ from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.effects.write import remove_leftovers, resolve_inside, write_atomic
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, field
 
 FOLDER = "examples"
 MANIFEST = f"{FOLDER}/.extracted.json"
@@ -68,6 +68,8 @@ class ExamplesReport:
     unchanged: tuple[str, ...]
     removed: tuple[str, ...]
     blocked: tuple[Blocked, ...]
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """The SHA-256 that each script should have, in hexadecimal digits."""
 
 
 def write_examples(
@@ -115,6 +117,7 @@ class _Update:
         self.unchanged: list[str] = []
         self.removed: list[str] = []
         self.blocked: list[Blocked] = []
+        self.digests: dict[str, str] = {}
 
     def run(self) -> ExamplesReport:
         for path in sorted(self.wanted):
@@ -122,7 +125,8 @@ class _Update:
         for path in sorted(self.known.keys() - self.wanted.keys()):
             self._plan_removal(path)
         (self.root / FOLDER).mkdir(exist_ok=True)
-        remove_leftovers({self.root / FOLDER, *((self.root / p).parent for p in self.wanted)})
+        folders = {FOLDER, *(path.rpartition("/")[0] for path in self.wanted)}
+        remove_leftovers(self.root / folder for folder in folders)
         before = {
             path: tuple(dict.fromkeys((*self.manifest.get(path, ()), *self.known.get(path, ()))))
             for path in self.manifest.keys() | set(self.removed)
@@ -139,20 +143,22 @@ class _Update:
             tuple(self.unchanged),
             tuple(self.removed),
             tuple(sorted(self.blocked, key=lambda b: b.path)),
+            self.digests,
         )
 
     def _plan_write(self, path: str) -> None:
         data = self.wanted[path]
+        digest = self.digests[path] = _hash(data)
         obstacle, current = self._look(path)
         if obstacle is not None:
             self._block(path, obstacle, None)
         elif current == data:
             self.unchanged.append(path)
-            self.manifest[path] = (_hash(data),)
+            self.manifest[path] = (digest,)
         elif self._is_ours(path, current):
             self.written.append(path)
             self.current[path] = current
-            self.manifest[path] = (_hash(data),)
+            self.manifest[path] = (digest,)
         else:
             self._block(path, Obstacle.EDITED if path in self.known else Obstacle.FOREIGN, current)
 

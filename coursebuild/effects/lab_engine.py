@@ -1,7 +1,7 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.mistakes`, `engine_digest`. See docs/labs.md for what is
-asked and answered.
+Entry points: `LabEngine.trial`, `LabEngine.mistakes`. See docs/labs.md for what is asked and
+answered.
 
 The engine is started when it is first needed, and again after a trial that ran too long or took too
 much memory: such a trial is told as what it is, and takes no other along.
@@ -9,23 +9,21 @@ much memory: such a trial is told as what it is, and takes no other along.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import functools
-import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.resources import assets_dir
-from coursebuild.effects.v8 import Isolate, LimitError, ScriptError
+from coursebuild.effects.lab_files import script_paths, wasm_path
+from coursebuild.effects.v8 import Isolate
+from coursebuild.effects.v8_library import LimitError, ScriptError, StoppedError
 
 _MEMORY = 1 << 30
 """Bytes: the engine's WebAssembly memory counts."""
 _START_SECONDS = 60.0
+_PIECES = Path(__file__).with_name("lab_pieces.js")
 _MARGIN = 15.0
 """A trial ends itself when its time is over; this is for code that never returns."""
 
@@ -41,12 +39,7 @@ class LabEngine:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -56,7 +49,7 @@ class LabEngine:
             self._isolate = None
 
     def stop(self) -> None:
-        """From another thread: end what runs, and all that comes after, by a cancellation there."""
+        """From another thread: end what runs, and what comes after, by a `StoppedError` there."""
         self._stopped = True
         if self._isolate is not None:
             self._isolate.stop()
@@ -99,17 +92,17 @@ class LabEngine:
         return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
 
     def _ready(self) -> Isolate:
+        if self._stopped:
+            raise StoppedError
         isolate = self._isolate or self._start()
         if self._stopped:  # before there was anything to stop
-            raise asyncio.CancelledError
+            raise StoppedError
         return isolate
 
     def _start(self) -> Isolate:
-        folder = assets_dir()
-        script = (folder / "js" / "lab-trial.js").read_text(encoding="utf-8")
-        pieces = Path(__file__).with_name("lab_pieces.js").read_text(encoding="utf-8")
-        self._isolate = isolate = Isolate(script, pieces, memory=_MEMORY)
-        isolate.fill("wasm", (folder / "mujoco" / "mujoco.wasm").read_bytes())
+        scripts = (path.read_text(encoding="utf-8") for path in (*script_paths(), _PIECES))
+        self._isolate = isolate = Isolate(*scripts, memory=_MEMORY)
+        isolate.fill("wasm", wasm_path().read_bytes())
         try:
             isolate.call("boot", "", _START_SECONDS)
             self.version = isolate.call("booted", "", _START_SECONDS)
@@ -127,12 +120,3 @@ def _running(isolate: Isolate) -> list[str | int]:
         found: list[str | int] = told["entry"] or told["trying"] or []
         return found
     return []
-
-
-@functools.lru_cache(maxsize=1)
-def engine_digest() -> str:
-    """A hash of everything that a trial runs besides the lab itself."""
-    folder = assets_dir()
-    digest = hashlib.sha256((folder / "mujoco" / "mujoco.wasm").read_bytes())
-    digest.update((folder / "js" / "lab-trial.js").read_bytes())
-    return digest.hexdigest()

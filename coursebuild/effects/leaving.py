@@ -6,16 +6,20 @@ for a large course in memory that takes seconds, in which nobody sees why Ctrl-C
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
-from typing import NoReturn
+
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 
 def leave(status: int) -> NoReturn:
     """Exit, once streams are flushed; whoever calls has ended all else that others can see."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:  # there is none where the tool was started without one
-            with contextlib.suppress(OSError, ValueError):
+            try:
                 stream.flush()
+            except (OSError, ValueError):
+                continue
     os._exit(status)

@@ -70,19 +70,6 @@ def wrap(mujoco: ModuleType, re: ModuleType) -> None:
     def attach(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         files.of_spec(_get(args, keywords, 1, "child"))
 
-    def library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        at = _text(_get(args, keywords, 0, "path", "directory"))
-        if tracer is not None:
-            tracer.library(at)
-
-    def writer(position: int) -> _Before:
-        def write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-            at = _get(args, keywords, position, "filename")
-            if at is not None and tracer is not None:
-                tracer.write(at)
-
-        return write
-
     of_class: tuple[tuple[Any, str, _Before], ...] = (
         (model, "from_xml_path", path),
         (model, "from_xml_string", string),
@@ -97,21 +84,38 @@ def wrap(mujoco: ModuleType, re: ModuleType) -> None:
         ("compile", compile),
         ("recompile", compile),
         ("attach", attach),
-        ("to_file", writer(1)),
+        ("to_file", _writer(1)),
     )
     for name, before in of_spec:
         if name in getattr(spec, "__dict__", ()):
             setattr(spec, name, wrapped(vars(spec)[name].__get__(None, spec), before))
     functions: list[tuple[str, _Before]] = [
-        ("mj_loadPluginLibrary", library),
-        ("mj_loadAllPluginLibraries", library),
+        ("mj_loadPluginLibrary", _library),
+        ("mj_loadAllPluginLibraries", _library),
+        ("mju_getXMLDependencies", path),
+        *[(name, _writer(position)) for name, position in _WRITERS],
     ]
-    functions += [("mju_getXMLDependencies", path)]
-    functions += [(name, writer(position)) for name, position in _WRITERS]
     for name, before in functions:
         real = getattr(mujoco, name, None)
         if real is not None:
             replace_function(mujoco, name, wrapped(real, before))
+
+
+def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+    at = _text(_get(args, keywords, 0, "path", "directory"))
+    if tracer is not None:
+        tracer.library(at)
+
+
+def _writer(position: int) -> _Before:
+    """Notes a file that is written, whose name is at a position."""
+
+    def write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        at = _get(args, keywords, position, "filename")
+        if at is not None and tracer is not None:
+            tracer.write(at)
+
+    return write
 
 
 def wrapped(

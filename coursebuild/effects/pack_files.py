@@ -72,12 +72,23 @@ class Pack:
         if len(self.places) > _FEW:
             self.rows, self.places = self.all(), {}
 
+    def add_all(self, entries: dict[bytes, tuple[int, int]]) -> None:
+        """Note entries, the latest of each key."""
+        if len(self.places) + len(entries) <= _FEW:
+            self.places |= entries
+            return
+        known = {key: (start, size) for key, start, size in self} | entries
+        self.rows = b"".join(_ROW.pack(key, *known[key]) for key in sorted(known))
+        self.places = {}
+
     def all(self) -> bytes:
         """The rows of all entries, sorted."""
-        rows = (self.rows[at : at + _ROW.size] for at in range(0, len(self.rows), _ROW.size))
-        found = [row for row in rows if row[:16] not in self.places]
-        found += (_ROW.pack(key, *place) for key, place in self.places.items())
-        return b"".join(sorted(found))
+        rows = bytearray(self.rows)
+        for key, place in self.places.items():
+            at = bisect_left(_Keys(rows), key) * _ROW.size
+            end = at + _ROW.size if rows.startswith(key, at) else at
+            rows[at:end] = _ROW.pack(key, *place)
+        return bytes(rows)
 
     def __iter__(self) -> Iterator[tuple[bytes, int, int]]:
         """Key, start and bytes of all entries."""
@@ -88,12 +99,12 @@ class Pack:
 class _Keys:
     """The keys of rows."""
 
-    rows: bytes
+    rows: bytes | bytearray
 
     def __len__(self) -> int:
         return len(self.rows) // _ROW.size
 
-    def __getitem__(self, index: int) -> bytes:
+    def __getitem__(self, index: int) -> bytes | bytearray:
         at = index * _ROW.size
         return self.rows[at : at + 16]
 
@@ -107,17 +118,18 @@ def made(path: str) -> int:
     return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
 
 
-def append(fd: int, pack: Pack, key: bytes, entry: bytes) -> None:
-    """Write an entry behind the others, whole or not at all."""
-    head = _HEAD.pack(_ENTRY_MARK, _check(key, len(entry)), key, len(entry))
+def append(fd: int, pack: Pack, key: bytes, *entry: bytes) -> None:
+    """Write an entry behind the others, whole or not at all; it may come in parts."""
+    size = sum(map(len, entry))
+    head = _HEAD.pack(_ENTRY_MARK, _check(key, size), key, size)
     try:
-        _write(fd, (head, entry), pack.end)
+        _write(fd, (head, *entry), pack.end)
     except BaseException:
         with contextlib.suppress(OSError):
             os.ftruncate(fd, pack.end)
         raise
-    pack.add(key, pack.end + len(head), len(entry))
-    pack.end += len(head) + len(entry)
+    pack.add(key, pack.end + len(head), size)
+    pack.end += len(head) + size
 
 
 def close(fd: int, pack: Pack) -> None:
@@ -208,16 +220,36 @@ def grown(pack: Pack) -> bool:
 def _walk(pack: Pack, fd: int, size: int) -> None:
     """Note the entries behind those that are known, as far as they are whole."""
     pack.size = size
+    found: dict[bytes, tuple[int, int]] = {}
     while pack.end + _HEAD.size <= size:
         head = os.pread(fd, _HEAD.size, pack.end)
         if len(head) < _HEAD.size:
-            return
+            break
         mark, check, key, length = _HEAD.unpack(head)
         start = pack.end + _HEAD.size
         if mark != _ENTRY_MARK or check != _check(key, length) or start + length > size:
-            return
-        pack.add(key, start, length)
+            break
+        found[key] = start, length
         pack.end = start + length
+    pack.add_all(found)
+
+
+def finish_left(pack: Pack) -> None:
+    """Close a pack whose writer is no more, which needs not be walked through then.
+
+    Whoever else does so at the same time writes the same.
+    """
+    fd = os.open(pack.path, os.O_RDWR | os.O_CLOEXEC)
+    if not is_abandoned(fd):
+        os.close(fd)
+        return
+    try:
+        _walk(pack, fd, os.fstat(fd).st_size)
+        os.ftruncate(fd, pack.end)
+    except BaseException:
+        os.close(fd)
+        raise
+    close(fd, pack)
 
 
 def is_left(pack: Pack) -> bool:

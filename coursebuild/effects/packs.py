@@ -7,7 +7,8 @@ Entry point: `Packs`, whose `put` takes an entry and whose `get` gives it back.
 2. What was written is never changed. Of two entries of one name that in the later pack counts.
 3. What other processes keep meanwhile is found: when a name is not known, it is looked whether
    there are more packs, or whether those that are still written have grown.
-4. When a command ends, small packs of which there are many are put together into one.
+4. When a command ends, packs whose writers are gone are closed, and small ones of which there are
+   many are put together into one.
 
 Entries are sealed by the store, which finds what is damaged. A pack is removed like any entry when
 the store has grown too large: when it was not used for longest.
@@ -28,6 +29,7 @@ from coursebuild.effects.pack_files import (
     Pack,
     append,
     close,
+    finish_left,
     grown,
     is_left,
     made,
@@ -98,15 +100,15 @@ class Packs:
         with self._lock:
             self._lost.add(_key(name))
 
-    def put(self, name: str, entry: bytes) -> None:
-        """Keep an entry.
+    def put(self, name: str, *entry: bytes) -> None:
+        """Keep an entry, which may come in parts.
 
         Raises:
             OSError: it cannot be written.
         """
         key = _key(name)
         with self._lock:
-            self._append(key, entry)
+            self._append(key, *entry)
             self._lost.discard(key)
 
     def close(self) -> None:
@@ -116,6 +118,10 @@ class Packs:
             if self._written:
                 self._written = False
                 self._look_again()
+                for pack in self._order:  # those of copies of this process, and of killed ones
+                    if not pack.is_closed:
+                        with contextlib.suppress(OSError):  # it is gone, or somebody else's
+                            finish_left(pack)
                 self._put_together()
 
     # --- what there is
@@ -178,9 +184,9 @@ class Packs:
 
     # --- what is kept
 
-    def _append(self, key: bytes, entry: bytes) -> None:
+    def _append(self, key: bytes, *entry: bytes) -> None:
         pack = self._begun()
-        append(self._fd, pack, key, entry)
+        append(self._fd, pack, key, *entry)
         self._written = True
         if pack.end >= self._large or pack.count >= LONG:
             self._finish()
@@ -189,7 +195,7 @@ class Packs:
         """The pack that this process writes; open and locked as long as it lives."""
         if self._process != os.getpid():  # the file is that of the process that it is a copy of
             self._process, self._mine, self._fd = os.getpid(), None, -1
-        if self._mine is None:
+        while self._mine is None:
             name = f"{time.time_ns():016x}{os.urandom(24).hex()}"
             path = f"{self._folder}/{name}"
             try:
@@ -198,7 +204,10 @@ class Packs:
                 make_private_folder(self._store)
                 Path(self._folder).mkdir(exist_ok=True)
                 self._fd = made(path)
-            try_lock(self._fd)  # by which others see that its writer lives
+            if try_lock(self._fd) is False:  # by which others see that its writer lives
+                os.close(self._fd)  # one of them took it for left before it was locked
+                self._fd = -1
+                continue
             self._mine = self._packs[name] = Pack(path, time.time())
             self._order = (self._mine, *self._order)
         return self._mine

@@ -40,6 +40,9 @@ class Recorder:
         """Names of the modules that every interpreter has from its start."""
         self.modules: dict[str, ModuleType] = {}
         """The others, in the order of their import, without this tool's own."""
+        self.known: dict[str, ModuleType] = {}
+        """Both, as they were when they were hidden. A script's process only reads it: to make it
+        there, each module's memory would have to be copied first."""
         self.closures: dict[str, tuple[str, ...]] = {}
         self.loaded: list[str] = []
         """Packages that were imported for scripts."""
@@ -139,6 +142,7 @@ class Recorder:
         What is imported from now on is imported anew, until `offer`.
         """
         modules = sys.modules
+        self.known = {name: modules[name] for name in self.bare - _NEEDED} | self.modules
         self.attributes.clear()
         for name in [n for n in modules if n not in self.bare]:
             module = modules.pop(name)
@@ -250,8 +254,7 @@ class Finder:
         import _imp
 
         self._told = told
-        self._modules = {name: sys.modules[name] for name in recorder.bare - _NEEDED}
-        self._modules |= recorder.modules
+        self._modules = recorder.known
         self._recorder = recorder
         self._bare_path = frozenset(bare_path)
         self._restored: set[str] = set()

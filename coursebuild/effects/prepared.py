@@ -5,7 +5,7 @@ Entry points: `prepared_cut`, `prepared_source`; `prepared_template`; `prepared_
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
 2. Every font is there a second time, with all done that does not depend on the course: what is cut
-   from it takes a third of the time. The largest has the characters only that are used at all
+   from it takes a tenth of the time. The largest has the characters only that are used at all
    often.
 
 Where the way of cutting is another than when the files were made, no key is found, and everything

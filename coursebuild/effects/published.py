@@ -1,6 +1,7 @@
 """What was published last: by its key and its stat, a file of the site that need not be made again.
 
-Entry points: `Published.read(root, place)`, `Published.is_whole`, `write_published`.
+Entry points: `Published.read(root, place)`, `Published.is_whole`, `Published.earlier`,
+`write_published`.
 
 The record lies in `.coursebuild/`, since a site holds nothing that changes from build to build
 without need. It is only ever believed of a file that is, by size, time of change and inode, the one
@@ -13,13 +14,17 @@ import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.values import dataclass, field
+from coursebuild.effects.splicing import Earlier
+from coursebuild.values import dataclass, field, replace
 
-_FOLDER = "published"
+RECORDS = ".coursebuild/published"
+"""The folder in a course where the records are."""
+_NONE = "-"
+"""In the place of no places."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +40,31 @@ class Entry:
     modified: int
     """ns."""
     inode: int
+    mode: int
+    """Its kind and permissions when it was last looked at: they may be changed."""
+    places: str = ""
+    """Where its pieces are; see `splicing`."""
 
     @classmethod
-    def of(cls, key: str, digest: str, status: os.stat_result) -> Entry:
+    def of(cls, key: str, digest: str, status: os.stat_result, places: str = "") -> Entry:
         """The entry of a file that was just written, or linked."""
-        return cls(key, digest, status.st_size, status.st_mtime_ns, status.st_ino)
+        numbers = status.st_size, status.st_mtime_ns, status.st_ino, status.st_mode
+        return cls(key, digest, *numbers, places)
+
+    def fits(self, status: os.stat_result) -> bool:
+        """Whether a file is the one that was written, as it was then."""
+        return (
+            status.st_ino == self.inode
+            and status.st_mtime_ns == self.modified
+            and status.st_size == self.size
+            and stat.S_ISREG(status.st_mode)
+        )
+
+    def seen(self, status: os.stat_result) -> Entry | None:
+        """The entry of a file that was just looked at, if it is the one that was written."""
+        if not self.fits(status):
+            return None
+        return self if status.st_mode == self.mode else replace(self, mode=status.st_mode)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +94,33 @@ class Published:
             status = os.lstat(f"{self.place}/{path}")
         except OSError:
             return False
-        return stat.S_ISREG(status.st_mode) and Entry.of(key, entry.digest, status) == entry
+        return entry.fits(status)
+
+    @contextlib.contextmanager
+    def earlier(self, path: str) -> Iterator[Earlier | None]:
+        """The file there, whatever its key, where pieces can be taken out of it."""
+        entry = self.entries.get(path)
+        if entry is None or not entry.places:
+            yield None
+            return
+        try:
+            # Whatever somebody has put there: neither a link's aim, nor a pipe that is waited for.
+            flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+            fd = os.open(f"{self.place}/{path}", flags)
+        except OSError:
+            yield None
+            return
+        try:
+            yield Earlier(fd, entry.places) if entry.fits(os.fstat(fd)) else None
+        finally:
+            os.close(fd)
 
 
 def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> None:
     """Keep a record; one that cannot be written only costs time."""
     body = "".join(
-        f"{entry.key} {entry.digest} {entry.size} {entry.modified} {entry.inode} {path}\n"
+        f"{entry.key} {entry.digest} {entry.size} {entry.modified} {entry.inode} {entry.mode}"
+        f" {entry.places or _NONE} {path}\n"
         for path, entry in sorted(entries.items())
     )
     data = f"{hashlib.sha256(body.encode()).hexdigest()}\n{body}".encode()
@@ -98,9 +143,10 @@ def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> No
 def _file(root: Path, place: Path) -> Path:
     """One for each place, which keeps its record when the project is moved with the site in it."""
     named = place.relative_to(root) if place.is_relative_to(root) else place
-    return root / ".coursebuild" / _FOLDER / hashlib.sha256(os.fsencode(named)).hexdigest()
+    return root / RECORDS / hashlib.sha256(os.fsencode(named)).hexdigest()
 
 
 def _parsed(line: str) -> tuple[str, Entry]:
-    key, digest, size, modified, inode, path = line.split(" ", 5)
-    return path, Entry(key, digest, int(size), int(modified), int(inode))
+    key, digest, size, modified, inode, mode, places, path = line.split(" ", 7)
+    known = "" if places == _NONE else places
+    return path, Entry(key, digest, int(size), int(modified), int(inode), int(mode), known)

@@ -13,6 +13,7 @@ Entry points: `find_root`, `read_course`, `read_bytes`.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from collections.abc import Iterator
@@ -182,6 +183,7 @@ class _Reader:
                 name.startswith(".")
                 or name.endswith("~")
                 or (name.startswith("#") and name.endswith("#"))
+                or name == "__pycache__"
             ):
                 continue
             plainly = plain and not is_link
@@ -243,7 +245,9 @@ class _Reader:
     def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source:
         try:
             text = data.decode("utf-8")
-            return Source(path, text) if aside is None else Source.away(path, aside.put(data).text)
+            if aside is None:
+                return Source(path, text)
+            return Source.away(path, aside.put(data).text, hashlib.sha256(data).digest())
         except UnicodeDecodeError as error:
             source = Source(path, data.decode("utf-8", "replace"))
             at = len(data[: error.start].decode("utf-8"))

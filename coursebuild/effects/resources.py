@@ -9,6 +9,7 @@ In an installed package both are inside it. In a source tree they are where they
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -46,10 +47,13 @@ class Bundle(Mapping[str, bytes]):
 
     def __init__(self) -> None:
         self._folder = assets_dir()
-        self._paths: dict[str, Path] | None = None
+        self._paths: tuple[str, ...] | None = None
 
     def __getitem__(self, path: str) -> bytes:
-        return self._found()[path].read_bytes()
+        try:  # most runs ask for one or two, and need not know which there are
+            return (self._folder / path).read_bytes()
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
+            raise KeyError(path) from error
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._found())
@@ -57,25 +61,32 @@ class Bundle(Mapping[str, bytes]):
     def __len__(self) -> int:
         return len(self._found())
 
-    def _found(self) -> dict[str, Path]:
+    def _found(self) -> tuple[str, ...]:
         if self._paths is None:
-            self._paths = dict(_bundled(self._folder))
+            self._paths = tuple(name for name, _ in _bundled(self._folder))
         return self._paths
 
 
 def _bundled(folder: Path) -> Iterator[tuple[str, Path]]:
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.name != "stamp.json":
-            yield path.relative_to(folder).as_posix(), path
+    for path in _paths(folder):
+        if not path.endswith("/stamp.json") and path != "stamp.json":
+            yield path, folder / path
+
+
+def _paths(folder: Path) -> Iterator[str]:
+    """The files below a folder by path relative to it, sorted."""
+    top = len(f"{folder}/")
+    found = (f"{at}/{name}"[top:] for at, _, names in os.walk(folder) for name in names)
+    return iter(sorted(found, key=lambda path: path.split("/")))
 
 
 def template_texts() -> tuple[tuple[str, str], ...]:
     """Every template and table of strings by path relative to `templates_dir()`, sorted."""
     folder = templates_dir()
     return tuple(
-        (path.relative_to(folder).as_posix(), path.read_text(encoding="utf-8"))
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.suffix in (".html", ".toml", ".svg", ".css")
+        (path, (folder / path).read_text(encoding="utf-8"))
+        for path in _paths(folder)
+        if path.endswith((".html", ".toml", ".svg", ".css"))
     )
 
 

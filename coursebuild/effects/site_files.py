@@ -4,7 +4,8 @@ Entry points: `writing`; `write_file`, for one.
 
 1. Copies of this process make files and write them, some at a time; of what they did comes back
    what the record of the site holds.
-2. What was put aside can be read in this process only: files that are made of that are made here.
+2. What was put aside they can read as it was when they were made. Files that are made of something
+   that is not open in them are made here.
 3. What a copy did not finish, because it died, is written here anew.
 """
 
@@ -13,48 +14,63 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import TypeAlias
 
-from coursebuild.effects.aside import AsideError
-from coursebuild.effects.published import Entry
-from coursebuild.results import OutputFile, SiteFile
+from coursebuild.effects.aside import AsideError, for_copies
+from coursebuild.effects.published import Entry, Published
+from coursebuild.effects.splicing import Spliced
+from coursebuild.results import KeptFile, OutputFile, Piece, SiteFile
 
 _MANY = 128
 """Files for which copies of this process are worth their start."""
-_AT_ONCE = 12
-"""Files that are written for one request."""
+_FEWEST = 6
+"""Files that are written for one request, where so many are left."""
+_PARTS = 4
+"""Of its part of all that is left, a copy is asked for one of so many."""
 _MOST = 4
 """Copies: more would wait for the disk."""
+_Facts: TypeAlias = tuple[str, int, int, int, int, str]
+"""What the record of the site holds of a file besides its key; see `Entry`."""
 
 
 @contextmanager
 def writing(
-    folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int
+    folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int, old: Published | None = None
 ) -> Iterator[Callable[[], dict[str, Entry]]]:
     """Gives what writes files with their keys into a folder; its own folders are there.
 
-    What that gives is the record of the files, by path.
+    What that gives is the record of the files, by path. `old` is the site that is there, of whose
+    files pieces are taken.
     """
     here = os.getpid()
 
-    def one(file: SiteFile, key: str, again: bool) -> Entry | None:
+    def one(file: SiteFile, again: bool) -> _Facts | None:
         target = f"{folder}/{file.path}"
         if again:
             Path(target).unlink(missing_ok=True)
-        try:
-            digest = write_file(target, _pieces(file))
-        except AsideError:
-            Path(target).unlink(missing_ok=True)
-            return None
-        return Entry.of(key, digest, os.lstat(target))
+        with nullcontext() if old is None else old.earlier(file.path) as earlier:
+            spliced = Spliced(earlier)
+            try:
+                digest = write_file(target, spliced.pieces(_pieces(file)))
+            except AsideError:
+                Path(target).unlink(missing_ok=True)
+                return None
+        status = os.lstat(target)
+        numbers = status.st_size, status.st_mtime_ns, status.st_ino, status.st_mode
+        return digest, *numbers, spliced.places
 
-    def some(start: int) -> list[Entry | None]:
+    # What takes longest comes first, lest one copy be at it when the others have no more to do.
+    order = sorted(range(len(files)), key=lambda index: not _is_long(files[index][0]))
+    long = sum(_is_long(file) for file, _ in files)
+
+    def some(which: slice) -> list[_Facts | None]:
         again = os.getpid() == here
-        return [one(*file, again) for file in files[start : start + _AT_ONCE]]
+        return [one(files[index][0], again) for index in order[which]]
 
     def alone() -> dict[str, Entry]:
-        return {file.path: _sure(one(file, key, False)) for file, key in files}
+        return {file.path: _entry(key, one(file, False)) for file, key in files}
 
     if jobs == 1 or len(files) < _MANY:
         yield alone
@@ -64,26 +80,44 @@ def writing(
     if not can_fork():
         yield alone
         return
-    with Pool(some, min(jobs, _MOST)) as pool:
+    opened, begin = for_copies()
+    with Pool(some, min(jobs, _MOST), begin, opened) as pool:
 
         def together() -> dict[str, Entry]:
-            requests = [(None, start) for start in range(0, len(files), _AT_ONCE)]
-            answers, _ = pool.run(requests)
-            found = [entry for answer in answers for entry in answer]
+            shares = _shares(len(files), max(1, pool.count), long)
+            answers, _ = pool.run((None, share) for share in shares)
+            found = dict(zip(order, (facts for answer in answers for facts in answer), strict=True))
             return {
-                file.path: _sure(one(file, key, True) if entry is None else entry)
-                for (file, key), entry in zip(files, found, strict=True)
+                file.path: _entry(key, found[index] or one(file, True))
+                for index, (file, key) in enumerate(files)
             }
 
         yield together
 
 
-def _sure(entry: Entry | None) -> Entry:
-    assert entry is not None, "what was put aside here can be read here"
-    return entry
+def _shares(count: int, copies: int, start: int = 0) -> Iterator[slice]:
+    """What is asked for at once: less and less, so that no copy waits long for the others.
+
+    Each that comes before `start` is asked for by itself.
+    """
+    yield from (slice(alone, alone + 1) for alone in range(start))
+    while start < count:
+        size = max(_FEWEST, (count - start) // (_PARTS * copies))
+        yield slice(start, start + size)
+        start += size
 
 
-def _pieces(file: SiteFile) -> Iterable[bytes]:
+def _is_long(file: SiteFile) -> bool:
+    """Whether it is put together of all lessons."""
+    return isinstance(file, KeptFile) and file.pieces is not None
+
+
+def _entry(key: str, facts: _Facts | None) -> Entry:
+    assert facts is not None, "what was put aside here can be read here"
+    return Entry(key, *facts)
+
+
+def _pieces(file: SiteFile) -> Iterable[bytes | Piece]:
     """The bytes of a file, at once or one after the other."""
     if isinstance(file, OutputFile):
         return (file.data,)

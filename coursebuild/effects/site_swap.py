@@ -6,12 +6,13 @@ for those who serve.
 1. The place is checked: never the project or what its author wrote, never a folder with files that
    we did not put there.
 2. What killed builds left beside it is removed; what a running build has there is not.
-3. Every file is written into a fresh folder beside the place, on the same file system
-   (`site_files`). One that was published before under the same key, and is whole, is linked from
-   the old site instead; where all are, the old site stays.
+3. Every file is written into a folder beside the place, on the same file system (`site_files`).
+   One that was published before under the same key, and is whole, is linked from the old site
+   instead, or is there already, if the folder is that of the site before (`site_staging`); where
+   all are whole, the old site stays.
 4. The two folders are exchanged in one step. Where the system cannot, the old one is renamed away
    and the new one renamed in; a build that was killed between the two is mended by `recover`.
-5. The old site is removed.
+5. The old site is removed, or kept for the next build to put into it what it lacks.
 
 A site is derived and can be built again, so it is not forced to the disk: after a power cut, build
 again.
@@ -23,28 +24,34 @@ import contextlib
 import errno
 import hashlib
 import os
-import shutil
 import stat
-import unicodedata
-from collections.abc import Callable, Container, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 from coursebuild.effects.exchange import exchange
-from coursebuild.effects.locks import is_abandoned, try_lock
 from coursebuild.effects.published import Entry, Published, write_published
 from coursebuild.effects.site_files import write_file, writing
+from coursebuild.effects.site_listing import MARKER as MARKER
+from coursebuild.effects.site_listing import TRIES, foreign_files, holds, marker
+from coursebuild.effects.site_staging import (
+    Staging,
+    beside,
+    clean,
+    held,
+    is_alive,
+    keep_spare,
+    remove,
+    sift,
+)
+from coursebuild.patterns import pattern
 from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, field
 
-MARKER = ".coursebuild-site"
-"""A file in every site: a line that says what it is, then the path of every file of the site."""
-_HEADER = "site built by coursebuild; every file listed here may be replaced"
-_JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
-"""What file managers strew about."""
-_TRIES = 100
-"""How often to start again when another build publishes to the same place."""
+_NO_PATH = pattern(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
+"""A part of a path that is empty or stands for a folder, a control character, a backslash."""
+_MEDDLED = "somebody else changes what is being written"
 _AUTHORED = ("content", "models", "examples", ".coursebuild", ".git")
 
 
@@ -73,7 +80,7 @@ def check_out(root: Path, out: Path) -> Path:
             f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
         )
     try:
-        foreign = _foreign(place)
+        foreign = foreign_files(place)
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
@@ -95,6 +102,7 @@ def publish(
     *,
     jobs: int = 1,
     stage: Callable[[], AbstractContextManager[None]] = nullcontext,
+    left: Callable[[Mapping[str, Entry]], object] = len,
 ) -> tuple[str, ...]:
     """Replace the site at `out` by these files.
 
@@ -105,6 +113,7 @@ def publish(
         listed: a file that is made of what all these are.
         jobs: copies of this process, at most, that make and write files where there are many.
         stage: is entered when the files are made.
+        left: is given the entries of a site that was put there, by path.
 
     Returns:
         The paths of the files that were written, sorted: the others are as they were.
@@ -123,55 +132,62 @@ def publish(
         return ()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        _clean(place)
-        staging = _Staging.make(place)
-        try:
-            entries, made = site.write(staging.path, jobs, stage)
-            staging.path.chmod(_mode(place))
-            _swap(staging.path, place)
-        finally:
-            os.close(staging.fd)
-            recover(out)
-            _remove(staging.path)
-        _clean(place)
+        clean(place)
+        with _ground(root, place, site) as (folder, kept):
+            entries, made = site.write(folder, kept, jobs, stage)
+            if kept.files and not holds(folder, entries):
+                raise EffectError(f"the site cannot be written to {out}: {_MEDDLED}")
+            folder.chmod(_mode(place))
+            with held(place) as old:
+                exchanged = _swap(folder, place)
+                if exchanged and old is not None and len(made) < len(entries) / 2:
+                    keep_spare(root, folder, old)
+        clean(place)
     except OSError as error:
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
     write_published(root, place, entries)
+    left(entries)
     return tuple(sorted(made))
 
 
 def recover(out: Path) -> None:
     """Put the last good site back, if a build was killed after renaming it away."""
     place = Path(os.path.realpath(out))
-    if os.path.lexists(place) or any(_is_alive(path) for path in _beside(place, "new")):
+    if os.path.lexists(place) or any(is_alive(path) for path in beside(place, "new")):
         return
-    whole = [path for path in _beside(place, "old") if (path / MARKER).is_file()]
+    whole = [path for path in beside(place, "old") if (path / MARKER).is_file()]
     if whole:
         with contextlib.suppress(OSError):  # another build was faster
             max(whole, key=lambda path: path.stat().st_mtime_ns).rename(place)
 
 
-@dataclass(frozen=True, slots=True)
-class _Staging:
-    """A fresh folder beside the place; open and locked as long as its builder lives."""
+@contextmanager
+def _ground(root: Path, place: Path, site: _Site) -> Iterator[tuple[Path, _Kept]]:
+    """A folder beside the place, with what is in it already; what is there at the end goes."""
+    staging, kept = _begun(root, place, site)
+    try:
+        yield staging.path, kept
+    finally:
+        os.close(staging.fd)
+        recover(place)
+        remove(staging.path)
 
-    path: Path
-    fd: int
 
-    @classmethod
-    def make(cls, place: Path) -> _Staging:
-        while True:
-            path = place.with_name(f".{place.name}.new-{os.urandom(4).hex()}")
-            path.mkdir(0o700)
-            try:
-                fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-                try_lock(fd)
-            except FileNotFoundError:  # another build took it for abandoned before it was locked
-                continue
-            with contextlib.suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(fd), path.stat()):
-                    return cls(path, fd)
-            os.close(fd)
+def _begun(root: Path, place: Path, site: _Site) -> tuple[Staging, _Kept]:
+    spare = Staging.spare(root, place)
+    if spare is not None:
+        try:
+            if (place / MARKER).is_file():
+                return spare, site.sift(spare.fd)
+        except OSError:
+            pass
+        except BaseException:
+            os.close(spare.fd)
+            remove(spare.path)
+            raise
+        os.close(spare.fd)
+        remove(spare.path)
+    return Staging.make(place), _Kept()
 
 
 def _key(file: SiteFile) -> str:
@@ -179,6 +195,15 @@ def _key(file: SiteFile) -> str:
     if isinstance(file, OutputFile):
         return "=" + hashlib.sha256(file.data).hexdigest()
     return file.key
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What is in a folder before the site is written into it."""
+
+    files: Mapping[str, Entry] = field(default_factory=dict)
+    """By path; each is as it is to be."""
+    folders: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,51 +217,74 @@ class _Site:
 
     def is_there(self) -> bool:
         """Whether it is there already, whole and with nothing beside it."""
-        keys = [(file.path, key) for file, key in self.files]
+        entries = self.old.entries
+        keys = {file.path: key for file, key in self.files}
+        if any(path not in entries or entries[path].key != key for path, key in keys.items()):
+            return False  # as after every edit: no file is looked at for that
         if self.listed is not None:
-            keys.append((self.listed.path, self._list_key(self.listed)))
-        paths = {path for path, _ in keys}
-        if len(paths) != len(keys) or paths != self.old.entries.keys():
+            keys[self.listed.path] = self._list_key(self.listed)
+        paths = keys.keys()
+        if len(keys) != len(self.files) + (self.listed is not None) or paths != entries.keys():
             return False
-        if not all(self.old.is_whole(path, key) for path, key in keys):
+        if not all(self.old.is_whole(path, key) for path, key in keys.items()):
             return False
         try:
-            found = [path for path in _files(self.old.place) if path != MARKER]
-            marker = (self.old.place / MARKER).read_bytes()
+            listing = (self.old.place / MARKER).read_bytes()
+            return holds(self.old.place, paths) and listing == marker(paths)
         except OSError:
             return False
-        return len(found) == len(paths) and paths.issuperset(found) and marker == _marker(paths)
+
+    def sift(self, folder: int) -> _Kept:
+        """Remove from an open folder what the site is not to have, or not as it is there."""
+        known: dict[str, Entry] = {}
+        for file, key in self.files:
+            entry = self.old.entries.get(file.path)
+            if entry is not None and entry.key == key:
+                known[file.path] = entry
+        parents = {file.path.rpartition("/")[0] for file, _ in self.files}
+        folders = {path[:end] for path in parents for end in _ends(path)}
+        files, there = sift(folder, known, folders)
+        return _Kept(files, frozenset(there))
 
     def write(
-        self, folder: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
+        self,
+        folder: Path,
+        kept: _Kept,
+        jobs: int,
+        stage: Callable[[], AbstractContextManager[None]],
     ) -> tuple[dict[str, Entry], list[str]]:
         """Fill a folder; gives its record, and what is new in it."""
-        folders, paths = {""}, set[str]()
+        folders, paths = {"", *kept.folders}, set[str]()
         entries: dict[str, Entry] = {}
         new: list[tuple[SiteFile, str]] = []
         for file, key in self.files:
-            target = _room(folder, file.path, folders, paths)
-            if self._linked(file.path, key, target):
-                digest = self.old.entries[file.path].digest
-                entries[file.path] = Entry.of(key, digest, os.lstat(target))
+            path = file.path
+            there = kept.files.get(path)
+            if there is not None and path not in paths:
+                paths.add(path)
+                entries[path] = there
+                continue
+            target = _room(folder, path, folders, paths)
+            linked = self._linked(path, key, target)
+            if linked is not None:
+                entries[path] = linked
             else:
                 new.append((file, key))
-        with writing(folder, new, jobs) as written, stage():
+        with writing(folder, new, jobs, self.old) as written, stage():
             entries |= written()
         made = [file.path for file, _ in new]
         if self.listed is not None:
             listed, key = self.listed, self._list_key(self.listed)
             target = _room(folder, listed.path, folders, paths)
-            if self._linked(listed.path, key, target):
-                entries[listed.path] = Entry.of(
-                    key, self.old.entries[listed.path].digest, os.lstat(target)
-                )
+            linked = self._linked(listed.path, key, target)
+            if linked is not None:
+                entries[listed.path] = linked
             else:
                 facts = [FileFacts(p, e.digest, e.size) for p, e in sorted(entries.items())]
                 digest = write_file(target, (listed.make(facts),))
                 entries[listed.path] = Entry.of(key, digest, os.lstat(target))
                 made.append(listed.path)
-        write_file(f"{folder}/{MARKER}", (_marker(entries),))
+        write_file(f"{folder}/{MARKER}", (marker(entries),))
         return entries, made
 
     def _list_key(self, listed: FileList) -> str:
@@ -244,33 +292,30 @@ class _Site:
         text = "\n".join((listed.key, *(f"{key} {file.path}" for file, key in self.files)))
         return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
-    def _linked(self, path: str, key: str, target: str) -> bool:
-        """Link a file of the old site that is as it should be."""
-        if not self.old.is_whole(path, key):
-            return False
+    def _linked(self, path: str, key: str, target: str) -> Entry | None:
+        """Link a file of the old site that is as it should be; gives its entry."""
+        entry = self.old.entries.get(path)
+        if entry is None or entry.key != key:
+            return None
         try:
             os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
-        except (OSError, NotImplementedError):  # a file system without links, or too many of them
-            return False
-        # Somebody may have written to it since it was looked at, or may do so through a link of
-        # theirs: then it is made anew.
-        if self.old.is_whole(path, key):
-            return True
-        Path(target).unlink()
-        return False
+        except (OSError, NotImplementedError):  # it is gone, or nothing more can be linked there
+            return None
+        # What was linked is looked at, not what stands there: that may be another by now. Somebody
+        # may have written to it, or do so through a link of theirs: then it is made anew.
+        seen = entry.seen(os.lstat(target))
+        if seen is None:
+            Path(target).unlink()
+        return seen
 
 
-def _marker(paths: Iterable[str]) -> bytes:
-    return "\n".join([_HEADER, *sorted(paths), ""]).encode()
+def _ends(path: str) -> list[int]:
+    """Where the paths of a folder, and of those that it lies in, end in its path."""
+    return [*(at for at, letter in enumerate(path) if letter == "/"), len(path)]
 
 
 def _check_path(path: str, written: Container[str]) -> None:
-    parts = path.split("/")
-    if (
-        any(part in ("", ".", "..") for part in parts)
-        or any(c < " " or c == "\\" for c in path)
-        or path == MARKER
-    ):
+    if _NO_PATH.search(path) or path == MARKER:
         raise ValueError(f"{path!r} is no path that a site may have")
     if path in written:
         raise ValueError(f"the site has two files {path}")
@@ -295,18 +340,22 @@ def _make_folders(folder: Path, path: str, made: set[str]) -> None:
     made.add(path)
 
 
-def _swap(staging: Path, place: Path) -> None:
-    """Put the new site at the place; the old one is then where that was, or is named old."""
-    for _ in range(_TRIES):
+def _swap(staging: Path, place: Path) -> bool:
+    """Put the new site at the place; the old one is then where that was, or is named old.
+
+    Returns:
+        Whether it is where the new one was.
+    """
+    for _ in range(TRIES):
         if os.path.lexists(place):
             if exchange(staging, place):
-                return
+                return True
             old = place.with_name(f".{place.name}.old-{os.urandom(4).hex()}")
             with contextlib.suppress(FileNotFoundError):  # another build is between its two renames
                 place.rename(old)
         try:
             staging.rename(place)
-            return
+            return False
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                 raise
@@ -319,90 +368,3 @@ def _mode(place: Path) -> int:
     with contextlib.suppress(FileNotFoundError):
         return stat.S_IMODE(place.stat().st_mode)
     return 0o755
-
-
-def _foreign(place: Path) -> list[str]:
-    """Files at the place that no build of ours put there; sorted."""
-    for _ in range(_TRIES):
-        try:
-            before = place.stat()
-            found = _foreign_once(place)
-            if os.path.samestat(before, place.stat()):
-                return found
-        except FileNotFoundError:
-            if not place.exists():
-                return []
-        # Another build swapped its site in while we looked.
-    raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
-
-
-def _foreign_once(place: Path) -> list[str]:
-    missing: FileNotFoundError | None = None
-    header, listed = "", list[str]()
-    try:
-        header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
-    except FileNotFoundError as error:
-        missing = error
-    except (IsADirectoryError, UnicodeDecodeError):
-        pass
-    found = list(_files(place))
-    if missing and MARKER in found:
-        raise missing  # the site was away when its list was to be read
-    ours = {MARKER, *map(_normal, listed)} if header == _HEADER else set[str]()
-    return sorted(path for path in found if _normal(path) not in ours)
-
-
-def _normal(path: str) -> str:
-    """The path with its letters composed: some file systems of macOS take them apart."""
-    return path if path.isascii() else unicodedata.normalize("NFC", path)
-
-
-def _files(folder: Path, prefix: str = "") -> Iterator[str]:
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
-                yield from _files(Path(entry.path), f"{prefix}{entry.name}/")
-            elif entry.name not in _JUNK:
-                yield f"{prefix}{entry.name}"
-
-
-def _beside(place: Path, kind: str) -> list[Path]:
-    """Folders beside the place that a build made: `new` being written, `old` replaced."""
-    start = f".{place.name}.{kind}-"
-    try:
-        with os.scandir(place.parent) as entries:
-            return sorted(
-                Path(entry.path)
-                for entry in entries
-                if entry.name.startswith(start)
-                and len(entry.name) == len(start) + 8
-                and entry.is_dir(follow_symlinks=False)
-            )
-    except OSError:
-        return []
-
-
-def _is_alive(staging: Path) -> bool:
-    """Whether the build that writes this folder still runs."""
-    try:
-        fd = os.open(staging, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        return False
-    try:
-        return not is_abandoned(fd)
-    finally:
-        os.close(fd)
-
-
-def _clean(place: Path) -> None:
-    """Remove what builds that are no more left beside the place."""
-    for path in _beside(place, "new"):
-        if not _is_alive(path):
-            _remove(path)
-    if place.exists():  # else the old site may be all there is
-        for path in _beside(place, "old"):
-            _remove(path)
-
-
-def _remove(folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)

@@ -50,11 +50,13 @@ def sealed(name: str, data: bytes) -> bytes:
 def unsealed(name: str, entry: bytes) -> bytes | None:
     """The data of an entry; `None` where it is not what was put under this name."""
     data = entry[_DIGEST:]
-    return data if entry[:_DIGEST] == _seal(name, data) else None
+    return data if entry.startswith(_seal(name, data)) else None
 
 
 def _seal(name: str, data: bytes) -> bytes:
-    return hashlib.sha256(name.encode() + b"\0" + data).digest()
+    digest = hashlib.sha256(name.encode() + b"\0")
+    digest.update(data)
+    return digest.digest()
 
 
 class Store:
@@ -135,10 +137,10 @@ class Store:
         many, made in less time than a file; it is not shared either, nor is it one of a group.
         """
         name = f"{kind}/{key}"
-        entry = sealed(name, data)
         if packed:
-            self._pack(name, entry)
+            self._pack(name, _seal(name, data), data)
             return
+        entry = sealed(name, data)
         self._write_here(name, entry)
         if self.shared is not None and not local:
             self.shared.write(name, entry)
@@ -146,11 +148,16 @@ class Store:
     def group(self, kind: str, key: str, *, newest: int = 8) -> list[str]:
         """The keys, `GROUP/KEY`, that are kept in a group, newest first, then the shared ones."""
         found: list[tuple[float, str]] = []
-        with contextlib.suppress(OSError), os.scandir(self.folder / kind / key) as entries:
-            for entry in entries:
-                if not entry.name.startswith("."):
-                    with contextlib.suppress(OSError):
-                        found.append((entry.stat().st_mtime, entry.name))
+        folder = f"{self.folder}/{kind}/{key}"
+        try:
+            there = [name for name in os.listdir(folder) if name[0] != "."]  # noqa: PTH208
+        except OSError:
+            return []
+        for name in there:
+            with contextlib.suppress(OSError):
+                # Of most groups there is one result: which is the newest need not be asked.
+                when = os.stat(f"{folder}/{name}").st_mtime if len(there) > 1 else 0.0  # noqa: PTH116
+                found.append((when, name))
         found.sort(reverse=True)
         for _, name in found[newest:]:
             with contextlib.suppress(OSError):
@@ -209,14 +216,14 @@ class Store:
     def _say_damaged(self, name: str) -> None:
         self.say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
 
-    def _pack(self, name: str, entry: bytes) -> None:
+    def _pack(self, name: str, *entry: bytes) -> None:
         try:
-            self._packs.put(name, entry)
+            self._packs.put(name, *entry)
         except OSError as error:
             self._say_unwritable(error)
             return
         with self._lock:
-            self._written += len(entry)
+            self._written += sum(map(len, entry))
 
     def _say_unwritable(self, error: OSError) -> None:
         self.say(f"results cannot be kept in {FOLDER}: {reason(error)}")

@@ -47,6 +47,17 @@ const typeset = (() => {
   /** A formula that Temml takes and we do not. */
   class Refusal extends Error {}
 
+  /** Whether a text holds nothing forbidden, as can be seen without the tables of Unicode; most texts are one letter. */
+  function isPlain(text) {
+    for (let i = 0; i < text.length; i++) {
+      const unit = text.charCodeAt(i)
+      if (unit < 0x20 || (unit > 0x7e && unit < 0xa0) || unit > 0xd7ff) return false
+    }
+    return true
+  }
+
+  const isForbidden = (text) => !isPlain(text) && FORBIDDEN.test(text)
+
   function checkValue(name, value) {
     if (/Infinity|NaN/.test(value)) throw new Refusal('a length is not a number')
     if (!/^[\w\s.,%#()+-]*$/.test(value)) throw new Refusal(`\`${value}\` is not a value of ${name}`)
@@ -55,13 +66,13 @@ const typeset = (() => {
     }
   }
 
-  function checkAttributes(node) {
-    for (const [name, value] of Object.entries(node.style ?? {})) checkValue(name, String(value))
-    for (const [name, value] of Object.entries(node.attributes ?? {})) {
-      if (/^(width|height|depth|voffset|[lr]space|mathsize|mathcolor|mathbackground)$/.test(name)) {
-        checkValue(name, String(value))
-      }
-    }
+  const CHECKED = new Set(
+    'width height depth voffset lspace rspace mathsize mathcolor mathbackground'.split(' '),
+  )
+
+  function checkAttributes({ style, attributes }) {
+    for (const name in style) checkValue(name, String(style[name]))
+    for (const name in attributes) if (CHECKED.has(name)) checkValue(name, String(attributes[name]))
   }
 
   /** MathML Core allows these two on every element, and the HTML checker only on mstyle. */
@@ -109,7 +120,7 @@ const typeset = (() => {
     if (node.text !== undefined) {
       // A negated relation is one character where Unicode has one.
       if (node.text.includes('\u0338')) node.text = node.text.normalize('NFC')
-      if (FORBIDDEN.test(node.text)) throw new Refusal('it makes a character that a page must not hold')
+      if (isForbidden(node.text)) throw new Refusal('it makes a character that a page must not hold')
       return
     }
     if (node.href !== undefined) throw new Refusal('references to equations cannot be resolved; link to a heading instead')
@@ -143,7 +154,7 @@ const typeset = (() => {
 
   function one({ tex, display }) {
     if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
-    const forbidden = tex.search(FORBIDDEN)
+    const forbidden = isPlain(tex) ? -1 : tex.search(FORBIDDEN)
     if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
     try {
       const tree = temml.__renderToMathMLTree(tex, { ...OPTIONS, displayMode: display })

@@ -2,7 +2,7 @@
 
 Entry points: `MathEngine.typeset`; `Isolate`, for other scripts.
 
-1. An isolate is made when it is first needed, and reused. mini-racer is imported then.
+1. An isolate is made when it is first needed, and reused. V8 is started then.
 2. Formulas cross the border many at a time, as JSON (see `typeset.js`).
 3. When a batch hits a limit, its isolate is thrown away, and its formulas go one by one, so that
    one of them gets the blame.
@@ -10,24 +10,18 @@ Entry points: `MathEngine.typeset`; `Isolate`, for other scripts.
 
 from __future__ import annotations
 
-import asyncio
-import concurrent.futures
-import contextlib
 import json
 import re
 import threading
 import weakref
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar
+from typing import Self, TypedDict
 
 from coursebuild.effects.resources import assets_dir
+from coursebuild.effects.v8_library import Context, LimitError
 from coursebuild.effects.v8_start import start
 from coursebuild.results import Formula, MathError
-
-if TYPE_CHECKING:
-    from py_mini_racer import MiniRacer
 
 _MEMORY = 128 << 20
 """Bytes of JavaScript objects."""
@@ -37,81 +31,6 @@ _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
 
-T = TypeVar("T")
-
-
-class LimitError(Exception):
-    """A script ran too long or took too much memory; its isolate should not be used any more.
-
-    `resumable`: it can still be asked how far it came.
-    """
-
-    def __init__(self, message: str, *, resumable: bool) -> None:
-        super().__init__(message)
-        self.resumable = resumable
-
-
-class ScriptError(Exception):
-    """A script threw; the text is its message."""
-
-
-class _Loop:
-    """An event loop in a thread of its own, so that whoever calls may have one running itself."""
-
-    def __init__(self) -> None:
-        self._loop = asyncio.new_event_loop()
-        self._cancel_next = False
-        self._thread = threading.Thread(target=self._loop.run_forever, name="v8", daemon=True)
-        self._thread.start()
-
-    def run(self, work: Coroutine[Any, Any, T], *, always: bool = False) -> T:
-        """The result of a coroutine; `always`: even after `cancel`."""
-
-        async def guarded() -> T:
-            if self._cancel_next and not always:
-                self._cancel_next = False
-                work.close()
-                raise asyncio.CancelledError
-            return await work
-
-        future = asyncio.run_coroutine_threadsafe(guarded(), self._loop)
-        try:
-            return future.result()
-        except concurrent.futures.CancelledError:
-            raise asyncio.CancelledError from None
-        except BaseException:
-            future.cancel()  # Ctrl-C while waiting
-            raise
-
-    def cancel(self) -> None:
-        """End what runs, or else what runs next."""
-
-        def cancel() -> None:
-            tasks = asyncio.all_tasks()
-            self._cancel_next = not tasks
-            for task in tasks:
-                task.cancel()
-
-        with contextlib.suppress(RuntimeError):  # it is closed already
-            self._loop.call_soon_threadsafe(cancel)
-
-    def drain(self) -> None:
-        """End what still runs, such as what Ctrl-C left behind, and wait until it has ended."""
-
-        async def drained() -> None:
-            tasks = asyncio.all_tasks() - {asyncio.current_task()}
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-
-        asyncio.run_coroutine_threadsafe(drained(), self._loop).result()
-
-    def close(self) -> None:
-        """End the thread."""
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
 
 class Isolate:
     """A JavaScript context of its own, with some scripts loaded.
@@ -120,13 +39,11 @@ class Isolate:
     """
 
     def __init__(self, *scripts: str, memory: int = _MEMORY) -> None:
-        self._memory = memory
-        self._loop = _Loop()
-        self._context = self._loop.run(_make_context())
-        self.close = weakref.finalize(self, _close, self._loop, self._context)
-        self._context.set_hard_memory_limit(memory)
+        start()
+        self._context = Context(memory)
+        self.close = weakref.finalize(self, self._context.close)
         for script in scripts:
-            self._evaluate(script, _BATCH_SECONDS)
+            self._context.evaluate(script, _BATCH_SECONDS)
 
     def call(self, function: str, argument: str, seconds: float) -> str:
         """Call a global function from string to string.
@@ -135,56 +52,22 @@ class Isolate:
             LimitError: it ran for more than `seconds`, or took too much memory.
             ScriptError: it threw.
         """
-        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds)
-        if not isinstance(result, str):
-            raise TypeError(f"{function} returned {type(result).__name__}, not a string")
+        result = self._context.evaluate(f"{function}({json.dumps(argument)})", seconds)
+        if result is None:
+            raise TypeError(f"{function} returned no string")
         return result
 
     def stop(self) -> None:
-        """From another thread: end what runs, by an `asyncio.CancelledError` there.
+        """From another thread: end what runs, by a `StoppedError` there.
 
         Where nothing runs at this moment, it ends what runs next.
         """
-        self._loop.cancel()
+        self._context.stop()
 
     def fill(self, name: str, data: bytes) -> None:
         """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
-        place = self._evaluate(f"reserve({json.dumps(name)}, {len(data)})", _BATCH_SECONDS)
-        if not isinstance(place, memoryview):
-            raise TypeError(f"reserve returned {type(place).__name__}, not an ArrayBuffer")
-        place[:] = data
-
-    def _evaluate(self, code: str, seconds: float) -> object:
-        from py_mini_racer import JSEvalException, JSOOMException
-
-        async def evaluate() -> object:
-            return await asyncio.wait_for(self._context.eval_cancelable(code), seconds)
-
-        try:
-            return self._loop.run(evaluate())
-        except TimeoutError:
-            raise LimitError(f"ran for more than {seconds:g} s", resumable=True) from None
-        except JSOOMException:
-            raise LimitError(f"took more than {self._memory >> 20} MiB", resumable=False) from None
-        except JSEvalException as error:
-            raise ScriptError(str(error)) from None
-
-
-async def _make_context() -> MiniRacer:
-    # Made inside a running loop, a context needs no thread of its own, and can be interrupted.
-    from py_mini_racer import MiniRacer
-
-    start()
-    return MiniRacer()
-
-
-def _close(loop: _Loop, context: MiniRacer) -> None:
-    async def close() -> None:
-        context.close()
-
-    loop.drain()
-    loop.run(close(), always=True)
-    loop.close()
+        place = f"reserve({json.dumps(name)}, {len(data)})"
+        self._context.fill(place, data, _BATCH_SECONDS)
 
 
 class _Failure(TypedDict):
@@ -202,12 +85,7 @@ class MathEngine:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -220,7 +98,7 @@ class MathEngine:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
 
         Raises:
-            EffectError: Temml is not there.
+            EffectError: Temml or V8 is not there.
         """
         with self._lock:
             return [
@@ -266,7 +144,8 @@ def _result(formula: Formula, reply: str | _Failure) -> str | MathError:
 
 def _code_points(text: str, utf16: int) -> int:
     """An offset in UTF-16 units as one in code points."""
-    return len(text.encode("utf-16-le")[: 2 * utf16].decode("utf-16-le", "ignore"))
+    units = text.encode("utf-16-le", "surrogatepass")[: 2 * utf16]
+    return len(units.decode("utf-16-le", "ignore"))
 
 
 _WORDING = (

@@ -46,6 +46,9 @@ class Watcher(Protocol):
             EffectError: changes cannot be watched.
         """
 
+    exact: bool
+    """Whether `writing` says so of every file: what is not being written then is complete."""
+
     @property
     def writing(self) -> bool:
         """Whether something that `get` has told of is known to be not written to its end yet."""

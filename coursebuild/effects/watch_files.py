@@ -5,9 +5,12 @@ Entry point: `FilesWatcher`, a `Watcher` (see `watch`).
 
 from __future__ import annotations
 
+import contextlib
+import posixpath
 import queue
+import stat
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, reason
@@ -20,7 +23,7 @@ _STEP = 2
 class FilesWatcher:
     """See `watch.Watcher`."""
 
-    writing = False
+    exact = writing = False
     """Nobody says so here."""
 
     def __init__(self, root: Path) -> None:
@@ -85,42 +88,53 @@ class FilesWatcher:
     # --- the course's own folders
 
     def _folders(self, begun: Callable[[], None]) -> None:
-        before: tuple[Path, ...] | None = None
+        before: frozenset[str] | None = None
         while not self._stop.is_set():
-            folders = self._present()
-            if before is not None:
-                # Told of once they are watched: a file may be put into a new one at any time, and
-                # into any while none was.
-                names = frozenset(path.name for path in {*folders, *before})
-                self._events.put(names)
-            for changed in self._watch(folders, recursive=True):
+            folders = self._there(FOLDERS)
+            # Told of once they are watched: a file may be put into a new one at any time, and into
+            # any while none was.
+            news = frozenset() if before is None else before | folders.keys()
+            for changed in self._watch(tuple(self._root / f for f in folders), recursive=True):
                 begun()
-                if changed:
-                    self._events.put(changed)
-                if self._present() != folders:
+                if changed | news:
+                    self._events.put(changed | news)
+                news = frozenset()
+                if self._there(FOLDERS) != folders:
                     break
-            before = folders
-
-    def _present(self) -> tuple[Path, ...]:
-        return tuple(self._root / name for name in FOLDERS if (self._root / name).is_dir())
+            before = frozenset(folders)
 
     # --- files elsewhere
 
     def _files(self, begun: Callable[[], None]) -> None:
-        begun()
+        others: frozenset[str] = frozenset()
+        before: dict[str, tuple[int, int]] = {}
         while not self._stop.is_set():
-            others = self._others
-            folders = {(self._root / path).parent for path in others}
-            there = tuple(sorted(folder for folder in folders if folder.is_dir()))
-            for changed in self._watch(there, recursive=False):
-                if wanted := changed & others:
+            known, others = others, self._others
+            parents = {path: posixpath.dirname(path) for path in others}
+            folders = self._there(parents.values())
+            # As above; of what was not asked for until now nobody has missed anything.
+            moved = {f for f in parents.values() if folders.get(f) != before.get(f)}
+            news = frozenset(path for path in known & others if parents[path] in moved)
+            for changed in self._watch(tuple(self._root / f for f in folders), recursive=False):
+                begun()
+                if wanted := changed & others | news:
                     self._events.put(wanted)
-                if self._others != others or any(not folder.is_dir() for folder in there):
+                news = frozenset()
+                if self._others != others or self._there(parents.values()) != folders:
                     break
-                if len(there) < sum(folder.is_dir() for folder in folders):
-                    break
+            before = folders
 
     # --- both
+
+    def _there(self, folders: Iterable[str]) -> dict[str, tuple[int, int]]:
+        """The folders that there are, and which they are: device and inode."""
+        found = {}
+        for name in sorted(set(folders)):
+            with contextlib.suppress(OSError):
+                status = (self._root / name).stat()
+                if stat.S_ISDIR(status.st_mode):
+                    found[name] = status.st_dev, status.st_ino
+        return found
 
     def _watch(self, folders: tuple[Path, ...], *, recursive: bool) -> Iterator[frozenset[str]]:
         """Changes in these folders; an empty set at first, and now and then."""

@@ -52,6 +52,9 @@ _OPEN = 0.010
 class InotifyWatcher:
     """See `watch.Watcher`."""
 
+    exact = True
+    """The kernel tells when a file is closed."""
+
     def __init__(self, root: Path) -> None:
         self._root = root
         self._others: frozenset[str] = frozenset()

@@ -15,7 +15,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -142,14 +142,31 @@ class _SpawnedWorker(Worker):
         self._process.wait()
 
 
+@contextlib.contextmanager
+def _pipes() -> Iterator[tuple[int, int, int, int]]:
+    """Ends of two pipes: a supervisor's for jobs and reports, and ours, which alone stay open.
+
+    Where it does not come to a supervisor, none stays open.
+    """
+    theirs, jobs = os.pipe()
+    reports, theirs_too = os.pipe()
+    try:
+        yield theirs, theirs_too, jobs, reports
+    except BaseException:
+        os.close(jobs)
+        os.close(reports)
+        raise
+    finally:
+        os.close(theirs)
+        os.close(theirs_too)
+
+
 def spawn_worker(environment: Mapping[str, str], python: str | None = None) -> Worker:
     """A supervisor with an interpreter of its own, which starts one for each script.
 
     `python` is another interpreter than the one that runs this.
     """
-    theirs, jobs = os.pipe()
-    reports, theirs_too = os.pipe()
-    try:
+    with _pipes() as (theirs, theirs_too, jobs, reports):
         process = subprocess.Popen(
             [python or sys.executable, *_SUPERVISED, library_folder(), str(theirs_too)],
             stdin=theirs,
@@ -158,13 +175,6 @@ def spawn_worker(environment: Mapping[str, str], python: str | None = None) -> W
             env=dict(environment),
             start_new_session=True,  # Ctrl-C is for this process, which then ends it
         )
-    except BaseException:
-        os.close(jobs)
-        os.close(reports)
-        raise
-    finally:
-        os.close(theirs)
-        os.close(theirs_too)
     return _SpawnedWorker(environment, process, jobs, reports)
 
 
@@ -248,18 +258,9 @@ class ForkServer:
         Raises:
             ServerLostError: it has gone.
         """
-        theirs, jobs = os.pipe()
-        reports, theirs_too = os.pipe()
-        try:
+        with _pipes() as (theirs, theirs_too, jobs, reports):
             self._send({"scratch": scratch}, [theirs, theirs_too])
             answer = self._receive_until("slot")
-        except BaseException:
-            os.close(jobs)
-            os.close(reports)
-            raise
-        finally:
-            os.close(theirs)
-            os.close(theirs_too)
         return _ForkedWorker(self, answer["slot"], jobs, reports)
 
     def usable(self, environment: Mapping[str, str]) -> bool:

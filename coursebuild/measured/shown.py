@@ -6,11 +6,14 @@ Entry point: `Reports`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.cases import CaseReport
-from coursebuild.measured.diet import DietReport
 from coursebuild.values import dataclass, field
+
+if TYPE_CHECKING:  # a course without reports needs none of it
+    from coursebuild.measured.bench import SceneReport
+    from coursebuild.measured.cases import CaseReport
+    from coursebuild.measured.diet import DietReport
 
 
 @dataclass(frozen=True, slots=True)

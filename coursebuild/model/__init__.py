@@ -105,6 +105,7 @@ from coursebuild.model.scenarios import Visible as Visible
 from coursebuild.model.walk import block_inlines as block_inlines
 from coursebuild.model.walk import child_blocks as child_blocks
 from coursebuild.model.walk import document_blocks as document_blocks
+from coursebuild.model.walk import document_has as document_has
 from coursebuild.model.walk import document_inlines as document_inlines
 from coursebuild.model.walk import document_scripts as document_scripts
 from coursebuild.model.walk import walk_blocks as walk_blocks

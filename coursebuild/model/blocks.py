@@ -329,14 +329,18 @@ class Document:
         default=None, init=False, repr=False, compare=False, hash=False
     )
     """Gives the document with its blocks, where they are away."""
-    _keep: Callable[[Excerpt], Callable[[], Excerpt]] | None = field(
+    _code: Callable[[Script], Callable[[], Excerpt]] | None = field(
         default=None, init=False, repr=False, compare=False, hash=False
     )
-    """Puts code aside, where blocks are away."""
+    """Says how to get the code of a script again, where blocks are away."""
     _scripts: list[Script] | None = field(
         default=None, init=False, repr=False, compare=False, hash=False
     )
     """What `document_scripts` gives, once it was asked for and blocks are away."""
+    _kinds: frozenset[type] | None = field(
+        default=None, init=False, repr=False, compare=False, hash=False
+    )
+    """What `document_has` knows, once it was asked."""
 
     @property
     def is_away(self) -> bool:
@@ -348,18 +352,19 @@ class Document:
         cls,
         source: Source,
         load: Callable[[], Document],
-        keep: Callable[[Excerpt], Callable[[], Excerpt]] | None = None,
+        code: Callable[[Script], Callable[[], Excerpt]] | None = None,
     ) -> Document:
         """A document whose blocks are fetched each time they are asked for.
 
-        They are equal each time, but need not be the same objects. `keep` puts code aside and says
-        how to get it back, without the rest of the document.
+        They are equal each time, but need not be the same objects. `code` says how to get the code
+        of a script of it again, so that scripts can be held without it.
         """
         document = object.__new__(cls)
         object.__setattr__(document, "source", source)
         object.__setattr__(document, "_load", load)
-        object.__setattr__(document, "_keep", keep)
+        object.__setattr__(document, "_code", code)
         object.__setattr__(document, "_scripts", None)
+        object.__setattr__(document, "_kinds", None)
         return document
 
     if not TYPE_CHECKING:

@@ -10,7 +10,6 @@ too.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from coursebuild.model.blocks import Block, Document, Heading, MathBlock
@@ -36,12 +35,15 @@ class DisplayFormula(NamedTuple):
     """Empty where it has none."""
 
 
+_ELSEWHERE = (Quiz, Lab)
+
+
 def blocks_elsewhere(document: Document) -> frozenset[int]:
     """The Python ids of quizzes, labs and the blocks inside them."""
     return frozenset(
         id(block)
         for holder in document_blocks(document)
-        if isinstance(holder, Quiz | Lab)
+        if isinstance(holder, _ELSEWHERE)
         for block in (holder, *walk_blocks(child_blocks(holder)))
     )
 
@@ -72,12 +74,11 @@ def equation_ids(document: Document) -> tuple[str, ...]:
     return tuple(formula.id for formula in display_formulas(document) if formula.id)
 
 
-def _displayed(block: Block) -> Iterator[MathBlock | Math]:
+def _displayed(block: Block) -> list[MathBlock | Math]:
     if isinstance(block, MathBlock):
-        yield block
-    for inline in walk_inlines(block_inlines(block)):
-        if isinstance(inline, Math) and inline.display:
-            yield inline
+        return [block]
+    inlines = walk_inlines(block_inlines(block))
+    return [inline for inline in inlines if isinstance(inline, Math) and inline.display]
 
 
 def _name(tex: str, taken: set[str]) -> str:

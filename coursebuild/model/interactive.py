@@ -25,19 +25,19 @@ class LabControl:
     span: Span
     kind: Literal["slider", "select", "button"]
     label: str
-    unit: str
-    minimum: float | None
-    maximum: float | None
-    step: float | None
-    value: float | str | None
-    digits: int | None
-    options: tuple[tuple[str, float | str], ...]
-    set: str | None
-    apply: str | None
-    param: str | None
-    run: str | None
-    init: bool
-    reset: bool
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    step: float | None = None
+    value: float | str | None = None
+    digits: int | None = None
+    options: tuple[tuple[str, float | str], ...] = ()
+    set: str | None = None
+    apply: str | None = None
+    param: str | None = None
+    run: str | None = None
+    init: bool = False
+    reset: bool = False
 
 
 @dataclass(frozen=True, slots=True)

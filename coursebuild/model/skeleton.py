@@ -44,7 +44,7 @@ from coursebuild.model.walk import block_inlines, document_blocks, walk_inlines
 from coursebuild.source import Span
 from coursebuild.values import replace
 
-_KEPT = (Link, Image, NumberBinding, RawInline, Term)
+_KEPT = frozenset((Link, Image, NumberBinding, RawInline, Term))
 
 
 def skeleton(document: Document) -> Document:
@@ -62,6 +62,8 @@ def skeleton(document: Document) -> Document:
 def _bones(block: Block) -> Iterator[Block]:
     """What stays of a block, without the blocks in it, which come by themselves."""
     match block:
+        case Paragraph() | HtmlFlow() | Io() | Table():
+            yield from _text(block.span, _inlines(block))
         case Heading():
             yield replace(block, children=_inlines(block))
         case Script() | Mjcf() | Bench() | HtmlBlock():
@@ -75,8 +77,6 @@ def _bones(block: Block) -> Iterator[Block]:
             yield from _text(block.span, _inlines(block))
         case Callout():
             yield replace(block, title=_inlines(block), blocks=())
-        case Paragraph() | HtmlFlow() | Io() | Table():
-            yield from _text(block.span, _inlines(block))
         case BlockQuote() | ListBlock() | CodeBlock() | PlainCode() | ThematicBreak() | MathBlock():
             pass
         case _:
@@ -93,7 +93,7 @@ def _inlines(block: Block) -> tuple[Inline, ...]:
     return tuple(
         replace(inline, children=()) if isinstance(inline, Link | Term) else inline
         for inline in walk_inlines(block_inlines(block))
-        if isinstance(inline, _KEPT)
+        if type(inline) in _KEPT
     )
 
 

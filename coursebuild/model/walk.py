@@ -115,14 +115,31 @@ def document_blocks(document: Document) -> Iterator[Block]:
     return iter(known)
 
 
+_KINDS: dict[frozenset[type], frozenset[type]] = {}
+"""The sets that documents have, each once."""
+
+
+def document_has(document: Document, *kinds: type[Block] | type[AnyQuestion]) -> bool:
+    """Whether a document has blocks, or questions in quizzes, of one of these types."""
+    known = document._kinds
+    if known is None:
+        blocks = tuple(document_blocks(document))
+        quizzes = (block for block in blocks if isinstance(block, Quiz))
+        questions = (question for quiz in quizzes for question in quiz.questions)
+        known = frozenset(map(type, (*blocks, *questions)))
+        # Most documents of a course have the same ones.
+        object.__setattr__(document, "_kinds", _KINDS.setdefault(known, known))
+    return not known.isdisjoint(kinds)
+
+
 def document_scripts(document: Document) -> tuple[Script, ...]:
     """The complete scripts of a document; where its blocks are away, so is the code of these."""
     known = document._scripts
     if known is None:
         known = [block for block in document_blocks(document) if isinstance(block, Script)]
-        if document._keep is not None:
-            source, keep = document.source, document._keep
-            known = [replace(s, code=Excerpt.away(source, keep(s.code))) for s in known]
+        if document._code is not None:
+            source, code = document.source, document._code
+            known = [replace(s, code=Excerpt.away(source, code(s), s.code.digest)) for s in known]
             object.__setattr__(document, "_scripts", known)
     return tuple(known)
 
@@ -138,4 +155,6 @@ def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
 def document_inlines(document: Document) -> Iterator[Inline]:
     """Every inline of a document."""
     for block in document_blocks(document):
-        yield from walk_inlines(block_inlines(block))
+        inlines = block_inlines(block)
+        if inlines:
+            yield from walk_inlines(inlines)

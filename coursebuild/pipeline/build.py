@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -31,9 +31,22 @@ from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
+    from coursebuild.effects.published import Entry
     from coursebuild.measured.shown import Reports
     from coursebuild.model import Course
     from coursebuild.pipeline.site import Site
+
+
+_FOLLOWING = (
+    "coursebuild.checks.course",
+    "coursebuild.scripts.printed",
+    "coursebuild.scripts.shown",
+    "coursebuild.pipeline.site",
+    "coursebuild.render.exports.files",
+    "coursebuild.render.reader",
+    "coursebuild.render.search.files",
+)
+"""What is needed when the course was read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +61,13 @@ class Prepared:
     """The list of all files."""
 
 
-def build(options: Options, out: Path) -> Report:
-    """Publish the course into `out` (relative to the course's folder), or nothing."""
+def build(
+    options: Options, out: Path, left: Callable[[Mapping[str, Entry]], object] = len
+) -> Report:
+    """Publish the course into `out` (relative to the course's folder), or nothing.
+
+    `left` is given what is known of the files, if the site is a new one.
+    """
     progress = Progress(quiet=options.quiet)
     check_out(options.root, options.root / out)
     with project_lock(options.root, progress.say), prepare(options, progress) as prepared:
@@ -62,6 +80,7 @@ def build(options: Options, out: Path) -> Report:
             prepared.listed,
             jobs=options.jobs,
             stage=functools.partial(progress.stage, "publishing"),
+            left=left,
         )
     count = len(prepared.files) + (prepared.listed is not None)
     return replace(prepared.report, remarks=(f"published {count} files in {out}",))
@@ -85,7 +104,7 @@ def prepare(options: Options, progress: Progress, make: Make | None = None) -> I
     aside = Aside(options.store.folder)
     with (
         scripts_ahead(options) as run_all,
-        Documents(options.store, options.jobs, progress.stage, aside) as documents,
+        Documents(options.store, options.jobs, progress.stage, aside, _FOLLOWING) as documents,
     ):
         yield _prepared(options, progress, documents, make, run_all)
 

@@ -5,13 +5,13 @@ Entry point: `with_card(root, scene, report)`.
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.mjcf import parts
 from coursebuild.effects.native import NativeEngine, NativeError
+from coursebuild.effects.v8_library import StoppedError
 from coursebuild.measured.bench import SceneCard, SceneReport
 from coursebuild.pipeline.scenes import Scene
 from coursebuild.values import replace
@@ -79,6 +79,6 @@ def _browser(root: Path, scene: Scene, duration: float, keyframe: int) -> float 
                 if reply["main"] is None:
                     break
                 best = max(best, reply.get("stepsPerSecond") or 0)
-    except (NativeError, EffectError, asyncio.CancelledError):
+    except (NativeError, EffectError, StoppedError):
         return None
     return best * timestep if best else None

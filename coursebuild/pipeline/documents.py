@@ -13,28 +13,29 @@ Entry point: `Documents`, a context manager, which gives outlines (`parse`) and 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+import importlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from itertools import islice
-from types import TracebackType
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.effects.aside import Aside
+from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.faces import course_face
+from coursebuild.pipeline.groups import groups
 from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
-from coursebuild.pipeline.requests import OUTLINES, Answer, Cut, Draw, Drawn, Later, Read, Request
+from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Drawn, Later, Read, Request
 from coursebuild.pipeline.shelf import Shelf
-from coursebuild.source import Source
+from coursebuild.pipeline.together import Together
+from coursebuild.source import Source, key_of
 from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.pool import Pool
     from coursebuild.pipeline.reading import Reader
-    from coursebuild.render.fonts import FontJob
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
@@ -44,12 +45,14 @@ def _silent(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-_MAPS, _DECLARATIONS, _FONTS = "maps", "declarations", "fonts"
-"""Kinds of entries in the store: course maps, and cut fonts."""
+_MAPS, _DECLARATIONS = "maps", "declarations"
+"""Kinds of entries in the store."""
 _CHECKED = "checked"
 """The kind of the entry that says in what nothing was wrong."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
+_FEW = 16
+"""Texts whose outlines are kept together, about."""
 _AT_ONCE = 256
 """Texts whose outlines are waited for before more are read."""
 
@@ -58,21 +61,31 @@ class Documents:
     """Outlines of the documents of a course, and their pages."""
 
     def __init__(
-        self, store: Store, jobs: int, stage: Stage = _silent, aside: Aside | None = None
+        self,
+        store: Store,
+        jobs: int,
+        stage: Stage = _silent,
+        aside: Aside | None = None,
+        following: Sequence[str] = (),
     ) -> None:
         """`jobs` copies of this process at most; `stage` is told when long work begins.
 
-        `aside` is where skeletons are put; without it they stay in memory.
+        `aside` is where skeletons are put; without it they stay in memory. `following` are modules
+        that will be needed later, and are imported while copies read.
         """
         self.aside = aside
         self._shelf = Shelf(aside) if aside is not None else None
+        self._together = Together(store, aside) if aside is not None else None
         self._store = store
         self._stage = stage
         self._jobs = jobs
+        self._following = following
         self._tasks: dict[str, Task] = {}
         self._outlines: dict[str, Outline] = {}
+        self._put: dict[str, Kept] = {}
+        """Where outlines lie that may be kept together, by the keys of their texts."""
         self._face: tuple[Course, str | None] | None = None
-        self._readers: dict[str, int | None] = {}
+        self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
         self._reader: Reader | None = None
         self._pool: Pool[Request, Answer] | None = None
@@ -80,15 +93,10 @@ class Documents:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._rest()
+    def __exit__(self, *error: object) -> None:
+        self.rest()
         if self._reader is not None:
-            self._reader.__exit__(kind, error, traceback)
+            self._reader.__exit__(*error)
 
     @property
     def outlines(self) -> tuple[Outline, ...]:
@@ -117,31 +125,54 @@ class Documents:
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the outlines of sources, of which it is said which are lessons."""
+        tasks = [Task.of(source, callouts, lesson) for source, lesson in sources]
+        self._tasks.update((task.source.path, task) for task in tasks)
+        together = self._together if len(tasks) >= _MANY else None
         missing: list[Task] = []
-        for source, lesson in sources:
-            task = Task.of(source, callouts, lesson)
-            self._tasks[source.path] = task
-            outline = self._stored(task)
-            if outline is None:
-                missing.append(task)
-            else:
-                self._outlines[source.path] = outline
+        changed: list[tuple[Task, ...]] = []
+        for group in groups(tasks, lambda task: task.source.path, _FEW):
+            known = together.get(group) if together is not None else {}
+            missing += [task for task in group if not self._has(task, known.get(task.key))]
+            if any(task.key not in known for task in group):
+                changed.append(group)
         if len(missing) >= _MANY:
             from coursebuild.pipeline.reading import prepare_to_read
 
             prepare_to_read(missing[0])
         rest = iter(missing)
-        while tasks := tuple(islice(rest, _AT_ONCE)):
-            self._read(tasks)
+        while at_once := tuple(islice(rest, _AT_ONCE)):
+            self._read(at_once)
+        if together is not None:
+            for group in changed:
+                together.keep(group, self._put)
+        self._put.clear()
+
+    def _has(self, task: Task, known: Kept | None) -> bool:
+        """Whether there is the outline of a text: at a place, or in the store by itself."""
+        data = known() if known is not None else None
+        outline = None if data is None else self._opened(data, task, known)
+        if outline is None and not self._store.fresh:
+            data = self._store.peek(OUTLINES, task.key)
+            outline = None if data is None else self._opened(data, task)
+        if outline is not None:
+            self._outlines[task.source.path] = outline
+        return outline is not None
 
     def _read(self, tasks: Sequence[Task]) -> None:
-        requests: list[tuple[int | None, Request]] = [(None, Read(task)) for task in tasks]
-        answers, readers = self._work("reading lessons and pages", requests)
+        answers, readers = self._work("reading lessons and pages", self._requests(tasks))
         for task, data, reader in zip(tasks, answers, readers, strict=True):
             outline = self._opened(data, task)
             assert outline is not None
             self._outlines[task.source.path] = outline
-            self._readers[task.source.path] = reader
+            if reader is not None:
+                self._readers[task.source.path] = reader
+
+    def _requests(self, tasks: Sequence[Task]) -> Iterator[tuple[int | None, Request]]:
+        yield from ((None, Read(task)) for task in tasks)
+        if self._pool is not None:
+            for name in self._following:
+                importlib.import_module(name)
+            self._following = ()
 
     def parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
         """The skeleton of a document, and what is wrong in it."""
@@ -175,8 +206,7 @@ class Documents:
         self, kind: str, source: Source, parse: Callable[[Source], Parsed[Value]]
     ) -> Parsed[Value]:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
-        parts = (tool_digest(), source.path, source.text)
-        key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+        key = key_of(tool_digest(), source.path, source.text)
         data = None if self._store.fresh else self._store.peek(kind, key)
         found = None if data is None else unpack(data, source)
         if isinstance(found, Parsed):
@@ -189,67 +219,56 @@ class Documents:
         """The text of a path, with all that its document depends on."""
         return self._tasks[path]
 
-    def draw(self, pages: Sequence[Later]) -> list[bytes]:
-        """Draw pages; gives their packed records, and their bodies are in the store then."""
-        requests: list[tuple[int | None, Request]] = [
-            (self._readers.get(page.path) if page.path is not None else None, page)
-            for page in pages
-        ]
-        return self._work("drawing pages", requests)[0] if requests else []
+    def draw(self, pages: Iterable[Later]) -> list[bytes]:
+        """Draw pages; gives their packed records, and their bodies are in the store then.
 
-    def cut(self, jobs: Sequence[FontJob]) -> Callable[[FontJob], bytes]:
-        """Fonts, cut already or cut now; gives them."""
-        from coursebuild.effects.prepared import prepared_cut
+        Pages are asked for while others are drawn.
+        """
+        rest = iter(pages)
+        first = tuple(islice(rest, 1))
+        return self._work("drawing pages", map(self._to, chain(first, rest)))[0] if first else []
 
-        found: dict[str, bytes] = {}
-        for job in jobs:
-            data = prepared_cut(job.key) or self._store.load(_FONTS, job.key)
-            if data is not None:
-                found[job.key] = data
-        # The largest first, so that none of them is left for the end.
-        missing = sorted((j for j in jobs if j.key not in found), key=lambda j: -len(j.data))
-        if missing:
-            from coursebuild.pipeline.reading import prepare_to_cut
-
-            self._rest()  # which have seen everything; what cuts fonts needs room
-            prepare_to_cut()
-            requests: list[tuple[int | None, Request]] = [(None, Cut(job)) for job in missing]
-            answers, _ = self._work("cutting fonts", requests, many=2)
-            for job, made in zip(missing, answers, strict=True):
-                found[job.key] = made
-                self._store.keep(_FONTS, job.key, made)
-            self._rest()
-        return lambda job: found[job.key]
+    def _to(self, page: Later) -> tuple[int | None, Request]:
+        """The page, to the copy that has its document."""
+        return (self._readers.get(page.path) if page.path is not None else None), page
 
     def drawn(self, page: Draw) -> Drawn:
         """A page, its body, and what it is found by, drawn here and now."""
         return self._here().draw(page)
 
-    def _stored(self, task: Task) -> Outline | None:
-        data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
-        return None if data is None else self._opened(data, task)
+    def _opened(self, data: bytes, task: Task, kept: Kept | None = None) -> Outline | None:
+        """An outline, put aside where that is wanted; `None` where the bytes are none.
 
-    def _opened(self, data: bytes, task: Task) -> Outline | None:
-        """An outline, put aside where that is wanted; `None` where the bytes are none."""
+        `kept`: where they lie already.
+        """
         if self._shelf is None:
             return unpacked(data, task.source)
         parts = parted(data, task.source)
         if parts is None:
             return None
         outline, skeleton = parts
+        kept = self._shelf.aside.put(data) if kept is None else kept
+        if outline.lasting:
+            self._put[task.key] = kept
+        there = kept.part(len(data) - len(skeleton), len(skeleton))
+        return replace(outline, skeleton=self._shelf.document(task.source, there, self._again))
 
-        def again() -> Document:
-            return self._here().outline(task).skeleton
-
-        return replace(outline, skeleton=self._shelf.document(task.source, skeleton, again))
+    def _again(self, source: Source) -> Document:
+        """The skeleton of a document that was put aside, and cannot be used."""
+        task = self._tasks[source.path]
+        if task.source is not source:  # it was read again since
+            task = Task.of(source, task.callouts, task.lesson)
+        return self._here().outline(task).skeleton
 
     def _work(
-        self, name: str, requests: Sequence[tuple[int | None, Request]], *, many: int = _MANY
+        self, name: str, requests: Iterator[tuple[int | None, Request]]
     ) -> tuple[list[Answer], list[int | None]]:
         """The answers to requests, from copies of this process where there are many requests."""
         reader = self._here()
         if self._pool is None:
-            few = len(requests) < many or self._jobs == 1
+            first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
+            requests = chain(first, requests)
+            few = len(first) < _MANY or self._jobs == 1
             if not few:
                 from coursebuild.effects.pool import Pool, can_fork
 
@@ -258,13 +277,13 @@ class Documents:
                     answers = [reader.answer(request) for _, request in requests]
                 return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
-            count = min(self._jobs, -(-2 * len(requests) // many))
+            count = min(self._jobs, -(-2 * len(first) // _MANY))
             self._pool = Pool(reader.answer, count, reader.begin_copy)
         with self._stage(name):
             return self._pool.run(requests)
 
-    def _rest(self) -> None:
-        """End the copies; what they remember is gone."""
+    def rest(self) -> None:
+        """End the copies; what they remember is gone, and the room is free that they took."""
         if self._pool is not None:
             self._pool.close()
             self._pool = None

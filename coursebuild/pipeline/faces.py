@@ -17,6 +17,7 @@ import pickle
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from coursebuild import model, results, source
 from coursebuild.effects.tool import tool_digest
 from coursebuild.measured.shown import Reports
 from coursebuild.model import (
@@ -52,6 +53,21 @@ _PLACELESS: dict[type, Any] = {
 }
 
 
+_NAMED = sorted(
+    {
+        kind
+        for names in (vars(model), vars(results), vars(source), {"": tuple})
+        for kind in names.values()
+        if isinstance(kind, type)
+    },
+    key=lambda kind: (kind.__module__, kind.__qualname__),
+)
+_NUMBERS = pickle.Pickler(io.BytesIO(), 5)
+"""Knows these classes by number: else each value would be written with the name of its class, which
+takes longer than the value."""
+_NUMBERS.memo = {id(kind): (number, kind) for number, kind in enumerate(_NAMED)}
+
+
 def _face(value: object, documents: Mapping[int, str] | None = None) -> str:
     """The same for values that are equal but for places; documents have the faces that are given.
 
@@ -61,6 +77,7 @@ def _face(value: object, documents: Mapping[int, str] | None = None) -> str:
     out = io.BytesIO()
     pickler = pickle.Pickler(out, 5)
     pickler.fast = True  # what is written depends on what is equal, not on what is one object
+    pickler.memo = _NUMBERS.memo
     known = documents or {}
     pickler.dispatch_table = {
         **_PLACELESS,

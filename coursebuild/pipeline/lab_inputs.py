@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from coursebuild.effects.lab_engine import engine_digest
+from coursebuild.effects.lab_files import engine_digest
 from coursebuild.effects.native import native_digest
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs.compile import LabModule, compile_lab

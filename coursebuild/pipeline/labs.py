@@ -22,11 +22,11 @@ import time
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.lab_engine import LabEngine, engine_digest
+from coursebuild.effects.lab_engine import LabEngine
+from coursebuild.effects.lab_files import engine_digest
 from coursebuild.effects.mjcf import model_files
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
 from coursebuild.effects.versions import engine_version
@@ -71,16 +71,11 @@ class Engines:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         try:
             self.browser.close()
         finally:
-            self.native.__exit__(kind, error, traceback)
+            self.native.__exit__(*error)
 
     def stop(self) -> None:
         """From another thread: end what runs, and let nothing begin."""

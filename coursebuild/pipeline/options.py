@@ -46,7 +46,11 @@ def find_course(directory: str | None) -> Path:
     the course.
     """
     try:
-        root = find_root(None if directory is None else Path(directory), Path.cwd())
+        start = Path.cwd()
+    except OSError:
+        raise UsageError("the working directory is not there any more") from None
+    try:
+        root = find_root(None if directory is None else Path(directory), start)
     except EffectError as error:
         raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
     try:

@@ -40,9 +40,9 @@ class Task:
     @classmethod
     def of(cls, source: Source, callouts: frozenset[str], lesson: bool) -> Task:
         """With its key."""
-        digest = hashlib.sha256(f"{tool_digest()}\0{engine_digest()}\0{lesson}".encode())
-        for part in (*sorted(callouts), "", source.path, source.text):
-            digest.update(b"\0" + part.encode("utf-8", "surrogatepass"))
+        parts = (tool_digest(), engine_digest(), str(lesson), *sorted(callouts), "", source.path)
+        digest = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass"))
+        digest.update(b"\0" + source.digest)
         return cls(source, callouts, lesson, digest.hexdigest())
 
     def is_of(self, source: Source, callouts: frozenset[str], lesson: bool) -> bool:
@@ -80,6 +80,10 @@ class _Packer(pickle.Pickler):
     dispatch_table = _LEFT_OUT
 
 
+_CLASSES: dict[tuple[str, str], type] = {}
+"""What names mean: to find out takes longer than to make a value of the class."""
+
+
 class _Unpacker(pickle.Unpickler):
     """Puts the source in."""
 
@@ -89,10 +93,16 @@ class _Unpacker(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """What a name means; there is only one source."""
+        found = _CLASSES.get((module, name))
+        if found is not None:
+            return found
         if name == _source.__name__ and module == __name__:
             source = self.source  # not through `self`, which holds all that it has unpacked
             return lambda: source
-        return super().find_class(module, name)
+        meant = super().find_class(module, name)
+        if isinstance(meant, type):
+            _CLASSES[module, name] = meant
+        return meant
 
 
 def pack(value: object) -> bytes:

@@ -41,6 +41,7 @@ from coursebuild.render.library import Library
 from coursebuild.render.packages import qti, scorm
 from coursebuild.render.packages.items import Loss, MadeQuiz
 from coursebuild.render.page_list import PageEntry, page_list
+from coursebuild.render.sheet import sheet_bytes
 from coursebuild.render.tools import Tools
 from coursebuild.report import Report
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
@@ -175,7 +176,8 @@ class _Items:
         for page in page_list(library):
             document = page.document(library)
             if document is not None and any(map(_is_quiz, document_blocks(document))):
-                key = page_key(library.course, self._documents, page.sheet(library))
+                sheet = sheet_bytes(page.sheet(library))
+                key = page_key(library.course, self._documents, document.source.path, sheet)
                 yield _Asked(document.source, key, page)
 
     def _made(self, asked: list[_Asked]) -> dict[str, Kept]:
@@ -197,9 +199,8 @@ class _Items:
     def _request(self, asked: _Asked) -> Ask:
         course = self._library.course
         task = self._documents.task(asked.source.path)
-        return Ask(
-            Draw(asked.page.sheet(self._library), task, course.language, course.base_url, asked.key)
-        )
+        sheet = sheet_bytes(asked.page.sheet(self._library))
+        return Ask(Draw(sheet, task, course.language, course.base_url, asked.key))
 
 
 def _is_quiz(block: Block) -> bool:

@@ -5,9 +5,9 @@ Entry point: `Pages`.
 1. Every page has a sheet, all that it shows of the course, and a key: a hash of its sheet, of its
    document's text, and of the tool.
    Where nothing has changed of what sheets are made of, the key is known without (`page_keys`).
-2. The record of a page under its key comes from the record of the site that was put together last,
-   or from the store; where it is nowhere, the page is drawn.
-3. From the records alone it is known whether all links lead somewhere, and which characters and
+2. What the records of some pages say together is kept (`page_facts`). Where one of the pages has
+   changed, their records come from the store; a page that has none is drawn.
+3. From that alone it is known whether all links lead somewhere, and which characters and
    styles the pages use.
 4. A body is fetched, and framed, when its file is written.
 
@@ -20,8 +20,7 @@ import functools
 import hashlib
 import itertools
 import operator
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from coursebuild.effects.aside import Aside, Kept
@@ -30,12 +29,12 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.faces import results_face
+from coursebuild.pipeline.outlines import Task
+from coursebuild.pipeline.page_facts import Facts, Gathered, Known, groups, pack, unpack
 from coursebuild.pipeline.page_keys import PageKeys
 from coursebuild.pipeline.records import (
-    bundle,
     part,
     searched_part,
-    unbundle,
     unpack_record,
     unpack_value,
 )
@@ -48,8 +47,9 @@ from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.files import Entry
 from coursebuild.render.shared import PageFacts
-from coursebuild.render.sheet import Sheet, fingerprint
+from coursebuild.render.sheet import fingerprint, sheet_bytes
 from coursebuild.results import KeptFile
+from coursebuild.source import key_of
 from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from coursebuild.render.exports.parts import LessonPart, OpenChapter
 
 _SITE = "site"
-"""The kind of the entry that holds the records of the last site."""
+"""The kind of the entries that say what the records of some pages say together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +78,7 @@ class _Wanted:
 @dataclass(frozen=True, slots=True)
 class _Page:
     wanted: _Wanted
-    record: Kept
-    """Packed."""
-    indexed: bool
-    entry: Entry | None
-    """Where it is searched."""
+    known: Known
 
 
 class Pages:
@@ -93,10 +89,15 @@ class Pages:
         self._documents = documents
         self._store = store
         self._aside = documents.aside or Aside(store.folder)
-        self._facts = _Facts()
+        self._facts = Facts()
         self._by_path: dict[str, _Wanted] = {}
+        self._beside: tuple[str, Beside] | None = None
+        """What the page that was asked for last gives: two files are made of it."""
+        self._sheets: dict[str, Kept] = {}
+        """Of the pages without a known key, by site path, until these are drawn."""
         keys = PageKeys(store, self._around())
-        self._pages = self._made([self._wanted(page, keys) for page in page_list(library)])
+        self._pages = self._made(page_list(library), keys)
+        self._sheets.clear()
         keys.save()
 
     @property
@@ -107,12 +108,13 @@ class Pages:
     @property
     def indexed(self) -> Iterator[str]:
         """Site paths of the pages that search engines should list."""
-        return (page.wanted.path for page in self._pages if page.indexed)
+        return (page.wanted.path for page in self._pages if page.known.indexed)
 
     @property
     def searched(self) -> tuple[Entry, ...]:
         """The pages that are searched, in order."""
-        return tuple(page.entry for page in self._pages if page.entry is not None)
+        entries = (page.known.entry for page in self._pages)
+        return tuple(entry for entry in entries if entry is not None)
 
     def found_by(self, path: str) -> tuple[bytes, bytes]:
         """The text and the terms that a page is found by."""
@@ -132,7 +134,7 @@ class Pages:
             return False
         for path, led in itertools.groupby(sorted(self._facts.anchors), operator.itemgetter(0)):
             if path in pages:
-                ids = frozenset(self._record(pages[path]).ids)
+                ids = pages[path].known.ids
                 if not all(has(ids, anchor) for _, anchor in led):
                     return False
         return True
@@ -156,7 +158,12 @@ class Pages:
         return self._at(path).key
 
     def beside(self, path: str) -> Beside:
-        """What a page gives to the files beside it."""
+        """What a page gives to the files beside it, which are made one after the other."""
+        if self._beside is None or self._beside[0] != path:
+            self._beside = path, self._beside_of(path)
+        return self._beside[1]
+
+    def _beside_of(self, path: str) -> Beside:
         from coursebuild.render.exports.page import Beside
 
         page = self._at(path)
@@ -206,17 +213,19 @@ class Pages:
         if key is None:
             sheet = page.sheet(self._library)
             assert sheet.document == path
-            key = page_key(self._library.course, self._documents, sheet)
+            data = sheet_bytes(sheet)
+            key = page_key(self._library.course, self._documents, path, data)
             keys.add(page.path, task, key)
+            self._sheets[page.path] = self._aside.put(data)
         return _Wanted(page, key, path)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
         path = wanted.document
         task = self._documents.task(path) if path is not None else None
-        return Draw(
-            wanted.page.sheet(self._library), task, course.language, course.base_url, wanted.key
-        )
+        kept = self._sheets.pop(wanted.path, None)
+        sheet = sheet_bytes(wanted.page.sheet(self._library)) if kept is None else kept()
+        return Draw(sheet, task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
         """All that a frame shows besides its page."""
@@ -239,55 +248,75 @@ class Pages:
 
     # --- records and bodies
 
-    def _made(self, pages: list[_Wanted]) -> list[_Page]:
-        """The pages with their records, which are drawn where they are nowhere."""
-        last = self._load_last()
-        packed = {page.key: self._known(page.key, last) for page in pages}
-        found = {page.key: made for page in pages if (made := self._noted(page, packed[page.key]))}
-        new = [page for page in pages if page.key not in found]
+    def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> list[_Page]:
+        """The pages with what their records say; they are drawn where they have none."""
+        chunks: list[tuple[tuple[_Wanted, ...], tuple[_Page, ...] | None]] = []
+        packed: dict[str, bytes] = {}
+        new: list[_Wanted] = []
+
+        def is_new(page: _Wanted) -> bool:
+            packed[page.key] = self._known(page.key)
+            if unpack_record(packed[page.key]) is not None:
+                return False
+            new.append(page)
+            return True
+
+        def missing() -> Iterator[Later]:  # sheets are made while pages are drawn
+            for group in groups(entries, lambda page: page.path):
+                pages: list[_Wanted] = []
+                whole = True
+                for entry in group:
+                    page = self._wanted(entry, keys)
+                    pages.append(page)
+                    if page.path in self._sheets and is_new(page):
+                        whole = False
+                        yield self._later(page)
+                chunk = tuple(pages)
+                known = self._gathered(chunk) if whole else None
+                chunks.append((chunk, known))
+                if known is None:
+                    left = (page for page in chunk if page.key not in packed)
+                    yield from (self._later(page) for page in left if is_new(page))
+
+        for page, data in zip(new, self._documents.draw(missing()), strict=True):
+            packed[page.key] = data
         self.drawn = tuple(page.path for page in new)
         """Site paths of the pages that were drawn just now."""
-        later = [Later(p.document, functools.partial(self._request, p)) for p in new]
-        for page, data in zip(new, self._documents.draw(later), strict=True):
-            packed[page.key] = data
-            made = self._noted(page, data)
-            assert made is not None
-            found[page.key] = made
-        if list(last) != list(packed):
-            self._store.keep(_SITE, self._name(), bundle(packed.items()), packed=True)
-        return [found[page.key] for page in pages]
+        made: list[_Page] = []
+        for chunk, known in chunks:
+            made += self._gather(chunk, packed) if known is None else known
+        return made
 
-    def _known(self, key: str, last: Mapping[str, bytes]) -> bytes:
+    def _later(self, page: _Wanted) -> Later:
+        return Later(page.document, functools.partial(self._request, page))
+
+    def _gathered(self, pages: tuple[_Wanted, ...]) -> tuple[_Page, ...] | None:
+        """These pages, where an earlier build has gathered what their records say."""
+        data = None if self._store.fresh else self._store.peek(_SITE, self._name(pages))
+        gathered = unpack(data, len(pages))
+        return None if gathered is None else self._noted(pages, gathered)
+
+    def _gather(self, pages: tuple[_Wanted, ...], packed: Mapping[str, bytes]) -> tuple[_Page, ...]:
+        """These pages, by their records, for the next build as well."""
+        gathered = Gathered.of([self._record(packed[page.key]) for page in pages])
+        self._store.keep(_SITE, self._name(pages), pack(gathered), packed=True)
+        return self._noted(pages, gathered)
+
+    def _noted(self, pages: tuple[_Wanted, ...], gathered: Gathered) -> tuple[_Page, ...]:
+        """These pages, now that it is known what they say."""
+        self._facts.update(gathered)
+        return tuple(map(_Page, pages, gathered.known(self._aside)))
+
+    def _known(self, key: str) -> bytes:
         """A packed record; empty where there is none."""
-        data = last.get(key)
-        if data is None and not self._store.fresh:
-            kept = self._store.peek(PAGES, key)
-            data = None if kept is None else part(kept)[0]
-        return data or b""
+        kept = None if self._store.fresh else self._store.peek(PAGES, key)
+        return b"" if kept is None else part(kept)[0]
 
-    def _noted(self, page: _Wanted, packed: bytes) -> _Page | None:
-        """A page whose record can be read, now that it is known what it says."""
-        record = unpack_record(packed) if packed else None
-        if record is None:
-            return None
-        self._facts.add(record)
-        kept, draft = self._aside.put(packed), record.draft
-        entry = None
-        if record.search is not None:
-            name, digest = record.search
-            # Of what a record says twice or as others do, no copy is held.
-            entry = Entry(page.path, sys.intern(draft.kind), draft.title, name, digest)
-        return _Page(page, kept, draft.indexed, entry)
+    def _name(self, pages: tuple[_Wanted, ...]) -> str:
+        return key_of("records of pages", tool_digest(), *(page.key for page in pages))
 
-    def _load_last(self) -> dict[str, bytes]:
-        data = None if self._store.fresh else self._store.peek(_SITE, self._name())
-        return {} if data is None else unbundle(data)
-
-    def _name(self) -> str:
-        return hashlib.sha256(f"records of pages\0{tool_digest()}".encode()).hexdigest()
-
-    def _record(self, page: _Page) -> PageRecord:
-        record = unpack_record(page.record())
+    def _record(self, packed: bytes) -> PageRecord:
+        record = unpack_record(packed)
         assert record is not None
         return record
 
@@ -302,49 +331,13 @@ class Pages:
         return before.encode() + body + after.encode()
 
 
-def page_key(course: Course, documents: Documents, sheet: Sheet) -> str:
-    """A hash of all that a page depends on."""
-    task = documents.task(sheet.document) if sheet.document is not None else None
-    parts = (
-        tool_digest(),
-        course.language,
-        course.base_url,
-        fingerprint(sheet),
-        task.key if task is not None else "",
-    )
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+def page_key(course: Course, documents: Documents, document: str | None, sheet: bytes) -> str:
+    """A hash of all that a page depends on: its document's path and its sheet's bytes."""
+    return text_page_key(course, documents.task(document) if document is not None else None, sheet)
 
 
-class _Facts:
-    """What is known of all pages together."""
-
-    def __init__(self) -> None:
-        self._text: set[str] = set()
-        self._mathematics: set[str] = set()
-        self._declarations: set[str] = set()
-        self.sound = True
-        """Whether every page has the anchors that it leads to itself."""
-        self.leads: dict[str, str] = {}
-        """Site paths that pages lead to, each by itself, so that none is held twice."""
-        self.anchors: set[tuple[str, str]] = set()
-        """Anchors that pages lead to on others, each after the site path of its page."""
-
-    def add(self, record: PageRecord) -> None:
-        """Note what a page shows and where it leads."""
-        self._text.update(record.text)
-        self._mathematics.update(record.mathematics)
-        self._declarations.update(record.declarations)
-        own = {"", "top", *record.ids}
-        for path, anchor in record.references:
-            if path == record.draft.path:
-                self.sound = self.sound and has(own, anchor)
-            else:
-                path = self.leads.setdefault(path, path)
-                if anchor not in ("", "top"):
-                    self.anchors.add((path, sys.intern(anchor)))
-
-    def together(self) -> PageFacts:
-        """What the shared files must know."""
-        return PageFacts(
-            frozenset(self._text), frozenset(self._mathematics), frozenset(self._declarations)
-        )
+def text_page_key(course: Course, text: Task | None, sheet: bytes) -> str:
+    """The same, by the text of its document."""
+    shown = hashlib.sha256(sheet).hexdigest()
+    key = text.key if text is not None else ""
+    return key_of(tool_digest(), course.language, course.base_url, shown, key)

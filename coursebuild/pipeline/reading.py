@@ -19,7 +19,6 @@ import importlib
 import json
 from collections import OrderedDict
 from collections.abc import Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, assert_never
 
 from markupsafe import Markup
@@ -46,7 +45,6 @@ from coursebuild.pipeline.requests import (
     SECTIONS,
     Answer,
     Ask,
-    Cut,
     Draw,
     Drawn,
     Later,
@@ -58,12 +56,11 @@ from coursebuild.render.record import record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
-from coursebuild.source import Source
+from coursebuild.source import Source, key_of
 from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.v8 import MathEngine
-    from coursebuild.render.fonts import FontJob
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
@@ -76,8 +73,9 @@ _FORMULAS = 1024
 _COLLECT = 512
 """Texts after which what is left in cycles is looked for, of each some 2 kB: the collector's own
 measure would let a process grow for much longer."""
-_RENEW = 256
-"""Texts after which the engine is made anew, since it keeps a little of every formula."""
+_RENEW = 512
+"""Texts after which the engine is made anew, since it keeps a little of every formula: of each text
+some 6 kB. A new one takes as long for its first texts as for 20 further ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +88,11 @@ class _Whole:
 _HEAVY = (
     "coursebuild.effects.v8",
     "coursebuild.render.draw",
+    "coursebuild.render.exports.page",
     "coursebuild.render.highlight",
+    "coursebuild.render.lesson",
+    "coursebuild.render.pages",
+    "coursebuild.render.search.page",
     "coursebuild.syntax.document",
     "coursebuild.syntax.lab",
     "coursebuild.syntax.quiz",
@@ -105,16 +107,12 @@ def prepare_to_read(sample: Task) -> None:
 
     # Much is made only when it is needed for the first time.
     read = parse_document(sample.source.present(), sample.callouts, lesson=sample.lesson).value
-    mark_now("python", "")
+    mark_now("python", 'f"{x}"\n')
+    imports("x\n")
     if document_formulas(read):
         from coursebuild.effects.v8_start import preload
 
         preload()
-
-
-def prepare_to_cut() -> None:
-    """The same for cutting fonts."""
-    importlib.import_module("fontTools.subset")
 
 
 class Reader:
@@ -135,12 +133,7 @@ class Reader:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._rest()
 
     def _rest(self) -> None:
@@ -168,8 +161,6 @@ class Reader:
                 return self._ask(request.page)
             case Later():
                 return self.answer(request.make())
-            case Cut():
-                return cut_font(request.job)
             case _:
                 assert_never(request)
 
@@ -292,13 +283,14 @@ class Reader:
         document = None
         if whole is not None:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
-        draft, text, page = draw_whole(request.sheet, document, tools)
-        found, body = record(draft, request.base_url)
-        by = searched(request.sheet, document, str(draft.body))
+        sheet = request.sheet
+        draft, text, page = draw_whole(sheet, document, tools)
+        found, body, article = record(draft, str(text), request.base_url)
+        by = searched(sheet, document, str(draft.body))
         if by is not None:
             found = replace(found, search=(by.name, by.digest))
         base = request.base_url
-        exports = page_exports(request.sheet, page, tools, base, body, str(text))
+        exports = page_exports(sheet, page, tools, base, body, article)
         return Drawn(found, body, by, exports)
 
     def _draw(self, request: Draw) -> bytes:
@@ -333,15 +325,6 @@ class Reader:
         return self._tools[language]
 
 
-def cut_font(job: FontJob) -> bytes:
-    """A font, cut from a smaller one where there is one that has all it needs."""
-    from coursebuild.effects.prepared import prepared_source
-    from coursebuild.render.fonts import VERSION, subset_font
-
-    source = prepared_source(job.data, job.characters, VERSION)
-    return subset_font(job if source is None else replace(job, data=source))
-
-
 def drawing_tools(store: Store, language: str) -> Tools:
     """Words and templates, these compiled by an earlier run where there was one."""
     from coursebuild.render.templates import templates_of
@@ -359,8 +342,7 @@ class _Marks:
         self._version = package_version("pygments")
 
     def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
-        parts = (tool_digest(), self._version, language, code)
-        key = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+        key = key_of(tool_digest(), self._version, language, code)
         found = None if self._store.fresh else self._store.peek(_CODE, key)
         if found is not None:
             return tuple(map(Markup, json.loads(found)))

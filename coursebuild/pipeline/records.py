@@ -1,7 +1,6 @@
-"""Records of pages as bytes, alone, with the body of their page, and all of a site together.
+"""Records of pages as bytes, alone and with the body of their page.
 
-Entry points: `pack_record` and `unpack_record`; `join`, `part` and `searched_part`; `bundle` and
-`unbundle`, for any bytes whose keys are hashes.
+Entry points: `pack_record` and `unpack_record`; `join`, `part` and `searched_part`.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 import pickle
 import struct
 import zlib
-from collections.abc import Iterable
 from typing import TypeVar
 
 from coursebuild.render.record import PageRecord
@@ -18,8 +16,6 @@ from coursebuild.render.search.values import Searched
 Value = TypeVar("Value")
 
 _LENGTH = struct.Struct("<I")
-_KEY = 64
-"""Characters of a key: a hash."""
 
 
 def pack_record(record: PageRecord) -> bytes:
@@ -67,35 +63,14 @@ def _parted(data: bytes) -> tuple[bytes, tuple[bytes, bytes], bytes]:
 
 
 def pack_value(value: object) -> bytes:
-    """A value as bytes."""
-    return zlib.compress(pickle.dumps(value, pickle.HIGHEST_PROTOCOL), 1)
+    """A value as bytes; not compressed, which takes longer than all else that is done with them."""
+    return pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
 
 
 def unpack_value(data: bytes | None, kind: type[Value]) -> Value | None:
     """The value, where it is of this type; `None` where the bytes are none of such."""
     try:
-        found = None if data is None else pickle.loads(zlib.decompress(data))
+        found = None if data is None else pickle.loads(data)
     except Exception:  # whatever damaged bytes make of it
         return None
     return found if isinstance(found, kind) else None
-
-
-def bundle(records: Iterable[tuple[str, bytes]]) -> bytes:
-    """All of them with their keys."""
-    return b"".join(
-        piece
-        for key, record in records
-        for piece in (key.encode("ascii"), _LENGTH.pack(len(record)), record)
-    )
-
-
-def unbundle(data: bytes) -> dict[str, bytes]:
-    """The same by their keys; as many as there are whole ones."""
-    found: dict[str, bytes] = {}
-    at = 0
-    while at + _KEY + _LENGTH.size <= len(data):
-        start = at + _KEY + _LENGTH.size
-        end = start + _LENGTH.unpack_from(data, at + _KEY)[0]
-        found[data[at : at + _KEY].decode("ascii", "replace")] = data[start:end]
-        at = end
-    return found

@@ -34,6 +34,7 @@ from coursebuild.scripts.dependencies import (
     folded,
     forgotten,
     group_key,
+    inputs_by,
     inputs_of,
     is_perturbed,
     needs,
@@ -69,6 +70,7 @@ class States:
 
     def __init__(self, root: Path, store: Store, place: Place | None = None) -> None:
         self.root = root
+        self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, None if place is None else place.prefix)
         self.around = conditions(os.environ)
         self._digests = Digests(store)
@@ -89,7 +91,7 @@ class States:
         """The state of something at this moment."""
         match need.kind:
             case Kind.FILE:
-                return self._digests.file(str(self.root / need.name))
+                return self._digests.file(self._inside + need.name)  # of hundreds for each script
             case Kind.LISTING:
                 return self._digests.folder(str(self.root / need.name))
             case Kind.SOUGHT:
@@ -136,6 +138,10 @@ class Memory:
     def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
         """What is known of a script before it runs."""
         return inputs_of(job, text, self.states.around)
+
+    def inputs_by(self, job: ScriptJob, digest: str) -> Inputs:
+        """The same by the SHA-256 of its file."""
+        return inputs_by(job, digest, self.states.around)
 
     def recall(self, wanted: Sequence[Inputs]) -> dict[str, ScriptRun]:
         """The results, by path, that hold; none where everything is to run."""

@@ -5,11 +5,11 @@ Entry points: `Read`, `Draw`; `Later`, a page that is put together when it is se
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 from coursebuild.pipeline.outlines import Task
-from coursebuild.render.fonts import FontJob
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.values import Searched
 from coursebuild.render.sheet import Sheet
@@ -34,7 +34,8 @@ class Read:
 class Draw:
     """Draw a page."""
 
-    sheet: Sheet
+    packed: bytes
+    """Its sheet, as its key is made from it."""
     task: Task | None
     """The text of its document, if it has one."""
     language: str
@@ -43,19 +44,19 @@ class Draw:
     key: str
     """Under which it is kept."""
 
+    @property
+    def sheet(self) -> Sheet:
+        """The sheet, read anew."""
+        found = pickle.loads(self.packed)
+        assert isinstance(found, Sheet)
+        return found
+
 
 @dataclass(frozen=True, slots=True)
 class Ask:
     """Make the items of a page's quizzes; they are kept under the page's key."""
 
     page: Draw
-
-
-@dataclass(frozen=True, slots=True)
-class Cut:
-    """Cut a font."""
-
-    job: FontJob
 
 
 class Later:
@@ -89,7 +90,7 @@ class Drawn:
     """What it gives to the files beside it."""
 
 
-Request: TypeAlias = Read | Draw | Ask | Later | Cut
+Request: TypeAlias = Read | Draw | Ask | Later
 Answer: TypeAlias = bytes
 """The outline of what was read; the packed record of the page that was drawn; the packed
-items of its quizzes; the font."""
+items of its quizzes."""

@@ -19,25 +19,26 @@ import threading
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.leaving import leave
 from coursebuild.effects.packages import distributions, library_files
-from coursebuild.effects.prepared import prepared_cut
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
 from coursebuild.effects.watch import Watcher, watcher
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.kept import kept_font
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.preview.behind import Behind
 from coursebuild.pipeline.preview.follow import follow
 from coursebuild.pipeline.preview.live import LiveCourse
+from coursebuild.pipeline.preview.noted import Noted
 from coursebuild.pipeline.preview.told import accept, page_news
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.reading import cut_font
 from coursebuild.render.assets import Assets, page_script
-from coursebuild.render.fonts import FontJob
 from coursebuild.render.zips import Package, Surroundings, imported_modules
 from coursebuild.results import OutputFile
 
+_GARBAGE = 200_000
+"""Objects after which those in cycles are looked for: a preview lives long."""
 _SWITCH = 0.001
 """Seconds after which a thread that computes lets another one: a save should not wait for long."""
 
@@ -96,6 +97,7 @@ def serve(options: Options, port: int) -> None:
         print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
         _first_reading(live, options, progress)
         gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
+        gc.set_threshold(_GARBAGE, 50, 50)
         server.start()
         saves.start()
         _work(live, saves, options, progress, server.url)
@@ -105,21 +107,19 @@ def serve(options: Options, port: int) -> None:
         saves.stop()
         server.stop()
         live.close()
+        options.store.close()
         sys.setswitchinterval(before)
     leave(0)
 
 
 def live_course(options: Options) -> LiveCourse:
     """The course of these options, not read yet."""
-
-    def subset(job: FontJob) -> bytes:
-        cut = prepared_cut(job.key)
-        return cut or options.store.kept("fonts", job.key, lambda: cut_font(job))
-
     assets = Assets(template_texts(), bundled_files())
+    fonts = functools.partial(kept_font, options.store)
     around = functools.partial(_surroundings, options)
     # Later readings are few, and no copies are made of a process with threads.
-    return LiveCourse(options.root, assets, subset, around, Documents(options.store, 1))
+    documents, noted = Documents(options.store, 1), Noted(options.store)
+    return LiveCourse(options.root, assets, fonts, around, documents, noted)
 
 
 def _first_reading(live: LiveCourse, options: Options, progress: Progress) -> None:

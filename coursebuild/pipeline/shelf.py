@@ -13,14 +13,13 @@ from collections import OrderedDict
 from collections.abc import Callable
 
 from coursebuild.effects.aside import Aside, Kept
-from coursebuild.model import Document
-from coursebuild.pipeline.outlines import pack, unpack
+from coursebuild.model import Document, Script, document_blocks
+from coursebuild.pipeline.outlines import unpack
 from coursebuild.source import Excerpt, Source
+from coursebuild.values import dataclass
 
-ROOM = 4 << 20
+ROOM = 6 << 20
 """Bytes of packed documents that stay; in memory they take about three times as much."""
-CODE_ROOM = 1 << 20
-"""Characters of the code of scripts that stay; the code of a script is asked for many times."""
 _LAST = 4
 """Further ones that are remembered."""
 
@@ -32,32 +31,21 @@ class Shelf:
         """`room`: see `ROOM`."""
         self.aside = aside
         self._room = ROOM if room is None else room
-        self._code_room = CODE_ROOM
         self._held: dict[int, Document] = {}
         self._last: OrderedDict[int, Document] = OrderedDict()
         self._lock = threading.Lock()
 
-    def document(self, source: Source, data: bytes, again: Callable[[], Document]) -> Document:
+    def document(self, source: Source, kept: Kept, again: Callable[[Source], Document]) -> Document:
         """A document by what `pack` made of it; `again` makes it where that cannot be used."""
-        kept = self.aside.put(data)
+        place = _Place(self, kept, source, again)
+        return Document.away(source, place, place.code)
 
-        def keep(code: Excerpt) -> Callable[[], Excerpt]:
-            with self._lock:
-                self._code_room -= len(code.text)
-                stays = self._code_room >= 0
-            if stays:
-                return lambda: code
-            put = self.aside.put(pack((code.text, code.pieces)))
-            return lambda: Excerpt(source, *unpack(put(), source))
-
-        return Document.away(source, lambda: self._fetched(kept, source, again), keep)
-
-    def _fetched(self, kept: Kept, source: Source, again: Callable[[], Document]) -> Document:
+    def _fetched(self, kept: Kept, source: Source, again: Callable[[Source], Document]) -> Document:
         with self._lock:
             found = self._held.get(kept.start) or self._last.pop(kept.start, None)
             if found is None:
                 made = unpack(kept(), source)
-                found = made if isinstance(made, Document) else again()
+                found = made if isinstance(made, Document) else again(source)
                 if kept.size <= self._room and kept.data is None:
                     self._room -= kept.size
                     self._held[kept.start] = found
@@ -66,3 +54,37 @@ class Shelf:
                 if len(self._last) > _LAST:
                     self._last.popitem(last=False)
             return found
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Place:
+    """Where a document is.
+
+    There is one for each document, and a function would hold more than this does.
+    """
+
+    shelf: Shelf
+    kept: Kept
+    source: Source
+    again: Callable[[Source], Document]
+
+    def __call__(self) -> Document:
+        """The document."""
+        return self.shelf._fetched(self.kept, self.source, self.again)
+
+    def code(self, script: Script) -> Callable[[], Excerpt]:
+        """How to get the code of a script of it again, without holding it."""
+        return _Code(self, script.span.start)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Code:
+    """Where the code of a script is."""
+
+    place: _Place
+    start: int
+
+    def __call__(self) -> Excerpt:
+        """The code."""
+        blocks = document_blocks(self.place())
+        return next(b.code for b in blocks if isinstance(b, Script) and b.span.start == self.start)

@@ -11,24 +11,27 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.versions import engine_version
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.cases import CaseReport
-from coursebuild.measured.diet import DietReport
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.source import Source
+
+if TYPE_CHECKING:  # a course without reports needs none of it
+    from coursebuild.measured.bench import SceneReport
+    from coursebuild.measured.cases import CaseReport
+    from coursebuild.measured.diet import DietReport
+
+    _Scene = TypeVar("_Scene", SceneReport, DietReport)
 
 _FOLDER = "content/reports/"
 _CASES = f"{_FOLDER}stability.json"
 _BENCH, _DIET = ".bench.json", ".diet.json"
 _T = TypeVar("_T")
-_Scene = TypeVar("_Scene", SceneReport, DietReport)
 
 
 def shown_reports(root: Path, course: Course) -> Parsed[Reports]:

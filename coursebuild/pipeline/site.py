@@ -15,7 +15,8 @@ import json
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.aside import Aside
@@ -29,25 +30,32 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.kept import CompiledTemplates, words_for
+from coursebuild.pipeline.kept import CompiledTemplates, fonts_beside, kept_font, words_for
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import all_imports
 from coursebuild.pipeline.pages import Pages
 from coursebuild.render import meta, urls, zips
 from coursebuild.render.assets import Assets
+from coursebuild.render.compressed import COPIES, compressed_files, kept_copy
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
 from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.sheet import search_words
-from coursebuild.render.shared import PageFacts, common_characters
+from coursebuild.render.shared import PageFacts, common_characters, needed_fonts
 from coursebuild.render.templates import templates_of
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
-from coursebuild.source import Source
+from coursebuild.source import Excerpt, Source, key_of, text_digest
 from coursebuild.values import dataclass, replace
+
+if TYPE_CHECKING:
+    from coursebuild.render.exports.chapters import Note
+    from coursebuild.render.fonts import FontJob
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
+_CHAPTERS, _NOTED = "chapters", "chapters-noted"
+"""Kinds of the entries that hold chapters of the e-book, and what is known of all of them."""
 _CELLS = "search"
 """Kind of the entries that hold parts of the index of the search."""
 _DIGEST = hashlib.sha256().digest_size * 2
@@ -110,51 +118,76 @@ class _Site:
 
     def made(self) -> Site:
         pages = Pages(self.library, self.documents, self.store)
-        names, files = self._shared(pages.facts)
-        files += self._labs()
-        files += self._downloads()
-        files += offline_files(self.course, self.assets)
+        self.documents.rest()
+        with self._shared_data(pages.facts) as data:
+            files = [*self._labs(), *self._downloads()]
+            files += offline_files(self.course, self.assets)
+            files += self._search(pages)
+            names, shared = self._shared(data)
+        files += shared
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
-        files += self._search(pages)
         files += self._exports(pages, names, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        listed = file_list(names, _key(tool_digest(), repr(names)))
+        listed = file_list(names, key_of(tool_digest(), repr(names)))
         return Site(everything, listed, found, pages.drawn)
 
     # --- what all pages share
 
-    def _shared(self, facts: PageFacts) -> tuple[Names, list[SiteFile]]:
-        """The shared files, made only for characters and styles for which they were not made."""
-        together = replace(facts, text=facts.text | common_characters(self.library))
-        parts = (together.text, together.mathematics, together.declarations)
-        key = _key(tool_digest(), *("\0".join(sorted(part)) for part in parts))
-        data = _Data(self.store, key, functools.partial(self._make_shared, together))
+    @contextmanager
+    def _shared_data(self, facts: PageFacts) -> Iterator[_Data]:
+        """The shared files, made only for characters and styles for which they were not made.
+
+        Where they are to be made, a font is cut for them until they are asked for.
+        """
+        facts = replace(facts, text=facts.text | common_characters(self.library))
+        parts = (facts.text, facts.mathematics, facts.declarations)
+        key = key_of(tool_digest(), *("\0".join(sorted(part)) for part in parts))
+        make = functools.partial(self._make_shared, facts)
+        data = _Data(self.store, key, lambda: make(functools.partial(kept_font, self.store)))
+        if self.options.jobs > 1 and data.known is None:
+            with fonts_beside(self.store, needed_fonts(self.assets, facts)) as subset:
+                yield _Data(self.store, key, lambda: make(subset))
+            return
+        data.listing()  # at once, since making them takes memory: nothing else is held yet
+        yield data
+
+    def _shared(self, data: _Data) -> tuple[Names, list[SiteFile]]:
         names, paths = data.listing()
-        return names, [
-            KeptFile(path, _key(key, path), functools.partial(data.file, path)) for path in paths
-        ]
+        files = [KeptFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
+        # Those of the style sheet, which is another in every course, are made where files are made
+        # at the same time. They are smaller in any case: most of it is the same everywhere.
+        for suffix in COPIES:
+            path = f"{names.style}.{suffix}"
+            make = functools.partial(self._copy, data, names.style, suffix)
+            files.append(KeptFile(path, key_of(data.key, path), make))
+        return names, [*files]
 
-    def _make_shared(self, together: PageFacts) -> tuple[Names, dict[str, bytes]]:
-        from coursebuild.render.shared import needed_fonts, shared_files
+    def _make_shared(
+        self, facts: PageFacts, subset: Callable[[FontJob], bytes]
+    ) -> tuple[Names, dict[str, bytes]]:
+        from coursebuild.render.shared import shared_files
 
-        jobs = needed_fonts(self.assets, together)
-        made, names = shared_files(self.assets, self.documents.cut(jobs), together)
-        return names, {file.path: file.data for file in (*made, *self._copies(made))}
+        made, names = shared_files(self.assets, subset, facts)
+        copies = self._copies(file for file in made if file.path != names.style)
+        return names, {file.path: file.data for file in (*made, *copies)}
+
+    def _copy(self, data: _Data, path: str, suffix: str) -> bytes:
+        # In a pack: a copy of this process does not live until a shared cache has it.
+        keep = functools.partial(self._kept_copy, packed=True)
+        return kept_copy(data.file(path), suffix, keep)
 
     def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:
-        from coursebuild.render.compressed import compressed_files
+        return compressed_files(files, self._kept_copy)
 
-        def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_copy(key) or self.store.kept("compressed", key, make)
-
-        return compressed_files(files, keep)
+    def _kept_copy(self, key: str, make: Callable[[], bytes], *, packed: bool = False) -> bytes:
+        return prepared_copy(key) or self.store.kept("compressed", key, make, packed=packed)
 
     def _labs(self) -> list[SiteFile]:
         files = self.library.labs.files
@@ -175,8 +208,7 @@ class _Site:
     def _downloads(self) -> Iterator[SiteFile]:
         """Scripts, models, archives, and files of the course."""
         for path, (script, _) in self.library.scripts.items():
-            key = hashlib.sha256(script.code.text.encode()).hexdigest()
-            yield KeptFile(path, key, functools.partial(self._script, path))
+            yield KeptFile(path, script.code.digest.hex(), functools.partial(self._script, path))
         for model in self.course.models:
             path = urls.model_file_path(model.name)
             yield OutputFile(path, model.source.text.encode())
@@ -193,7 +225,7 @@ class _Site:
         for make in zips.archives(self.library, around):
             archive = make()
             if archive is not None:
-                key = _key(tool_digest(), archive.key)
+                key = key_of(tool_digest(), archive.key)
                 self._packed[archive.path] = key, make
                 yield KeptFile(archive.path, key, functools.partial(_packed, make))
 
@@ -214,21 +246,21 @@ class _Site:
             return zips.Surroundings()
         known = all_imports(self.documents.outlines)
         by_text = {
-            _digest(script.code.text): known[path]
+            script.code.digest: known[path]
             for path, (script, _) in self.library.scripts.items()
             if path in known
         }
         used = {name for modules in by_text.values() for name in modules}
         library = library_files() if "mjcourse" in used else ()
         imports = _Imports(self.store, by_text)
-        modules = zips.imported_modules(self.course, library, imports)
+        modules = zips.imported_modules(self.course, library, imports, imports.of)
         packages = tuple(zips.Package(*p) for p in kept_distributions(self.store, modules))
         meshes = tuple(
             OutputFile(path, read_bytes(self.options.root, path))
             for path in self.course.files
             if path.startswith("models/")
         )
-        return zips.Surroundings(packages, library, meshes, imports)
+        return zips.Surroundings(packages, library, meshes, imports, imports.of)
 
     # --- what the site gives away
 
@@ -244,9 +276,20 @@ class _Site:
             imports=self._imports,
             declarations=pages.facts.declarations,
             taken=taken,
-            keep=functools.partial(self.store.kept, "chapters", packed=True),
+            keep=functools.partial(self.store.kept, _CHAPTERS, packed=True),
+            note=self._note(),
         )
         return Exports(self.library, pages, around).files(names)
+
+    def _note(self) -> Note:
+        from coursebuild.render.exports.chapters import Note
+
+        name, store = key_of("chapters", tool_digest()), self.store
+
+        def get() -> bytes | None:
+            return None if store.fresh else store.peek(_NOTED, name)
+
+        return Note(get, functools.partial(store.keep, _NOTED, name, packed=True))
 
 
 class _Data:
@@ -256,17 +299,19 @@ class _Data:
         self, store: Store, key: str, make: Callable[[], tuple[Names, dict[str, bytes]]]
     ) -> None:
         self._store = store
-        self._key = key
+        self.key = key
         self._make = make
         self._files: dict[str, bytes] | None = None
 
+    @property
+    def known(self) -> tuple[Names, tuple[str, ...]] | None:
+        """Their names, where they were made before."""
+        found: tuple[Names, tuple[str, ...]] | None = self._load(_SHARED)
+        return found
+
     def listing(self) -> tuple[Names, tuple[str, ...]]:
         """Their names."""
-        known = self._load(_SHARED)
-        if known is not None:
-            names, paths = known
-            return names, paths
-        return self._made()
+        return self.known or self._made()
 
     def file(self, path: str) -> bytes:
         """The bytes of one."""
@@ -280,12 +325,12 @@ class _Data:
     def _made(self) -> tuple[Names, tuple[str, ...]]:
         names, self._files = self._make()
         listing = names, tuple(self._files)
-        self._store.keep(_SHARED_DATA, self._key, pickle.dumps(self._files), packed=True)
-        self._store.keep(_SHARED, self._key, pickle.dumps(listing), packed=True)
+        self._store.keep(_SHARED_DATA, self.key, pickle.dumps(self._files), packed=True)
+        self._store.keep(_SHARED, self.key, pickle.dumps(listing), packed=True)
         return listing
 
     def _load(self, kind: str) -> Any:
-        data = None if self._store.fresh else self._store.peek(kind, self._key)
+        data = None if self._store.fresh else self._store.peek(kind, self.key)
         try:
             return None if data is None else pickle.loads(data)
         except Exception:  # whatever damaged bytes make of it
@@ -317,12 +362,18 @@ class _Imports:
         self._store = store
         self._known = known
 
+    def of(self, code: Excerpt) -> frozenset[str]:
+        """What the code of a script imports; it is only read where that is not known."""
+        known = self._known.get(code.digest)
+        return self(code.text) if known is None else known
+
     def __call__(self, text: str) -> frozenset[str]:
-        digest = _digest(text)
+        """What a text imports."""
+        digest = text_digest(text)
         if digest not in self._known:
             data = self._store.kept(
                 "imports",
-                _key(sys.version, text),
+                key_of(sys.version, text),
                 lambda: json.dumps(sorted(zips.imports(text))).encode(),
             )
             self._known[digest] = frozenset(json.loads(data))
@@ -333,14 +384,6 @@ def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
     archive = make()
     assert archive is not None
     return archive.packed()
-
-
-def _digest(text: str) -> bytes:
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).digest()
-
-
-def _key(*parts: str) -> str:
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:

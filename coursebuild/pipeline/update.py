@@ -40,6 +40,7 @@ from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.findings import script_findings
 from coursebuild.source import Source
+from coursebuild.values import replace
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -77,7 +78,7 @@ def _update(
         found += _noise(now.course, chosen, changed, first, options, progress)
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks = ("every recorded output is up to date",)
-    lines = script_lines(scripts, first, ())
+    lines = script_lines(scripts, _told(first, again), ())
     seconds = time.monotonic() - began
     return judge(
         course,
@@ -111,6 +112,14 @@ def _again(
     second = run(left, options, progress, "running scripts again", memory, run_all)
     ran = {r.path: r for r in second}
     return tuple(ran.get(one.path, one) for one in first)
+
+
+def _told(first: Sequence[ScriptRun], again: Sequence[ScriptRun]) -> list[ScriptRun]:
+    """The runs as they are told of: one that was remembered, and had to run again, did run."""
+    return [
+        one if two.cached or not one.cached else replace(one, cached=False, seconds=two.seconds)
+        for one, two in zip(first, again, strict=True)
+    ]
 
 
 def _noise(

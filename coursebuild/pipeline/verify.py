@@ -24,7 +24,7 @@ from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.effects.write import remove_leftovers
-from coursebuild.model import Course, Lab, OutputQuestion, Quiz, document_blocks
+from coursebuild.model import Course, Lab, OutputQuestion, Quiz, document_blocks, document_has
 from coursebuild.pipeline.kept import KeptBindings
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -45,7 +45,7 @@ from coursebuild.scripts.dependencies import Inputs
 from coursebuild.scripts.divergence import is_lost
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, field
 
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
@@ -93,7 +93,15 @@ def verify(
         chosen = [e for e in chosen if e.path in only]
     models, compiled = compile_models(course, options, progress)
     memory = Memory(options.root, options.store)
-    scripts = functools.partial(run, chosen, options, progress, memory=memory, run_all=run_all)
+    scripts = functools.partial(
+        run,
+        chosen,
+        options,
+        progress,
+        memory=memory,
+        run_all=run_all,
+        digests=extracted.digests,
+    )
     labs: tuple[LabResult, ...] = ()
     lab_findings: tuple[Diagnostic, ...] = ()
     if _has_labs(course):
@@ -119,7 +127,7 @@ def verify(
 
 
 def _has_labs(course: Course) -> bool:
-    return any(isinstance(b, Lab) for d in course.documents for b in document_blocks(d))
+    return any(document_has(document, Lab) for document in course.documents)
 
 
 def _is_in(lab: Lab, documents: Collection[str] | None) -> bool:
@@ -153,6 +161,8 @@ class ExtractedScripts:
     written: tuple[str, ...]
     removed: tuple[str, ...]
     blocked: tuple[Blocked, ...]
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """The SHA-256 of the file of each, as far as it is known."""
 
 
 class _Files(Mapping[str, bytes]):
@@ -174,7 +184,8 @@ class _Files(Mapping[str, bytes]):
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     """Bring `examples/` up to date, as far as nobody's edits are lost."""
     parsed = extract(course)
-    remove_leftovers({(options.root / d.source.path).parent for d in course.documents})
+    folders = {document.source.path.rpartition("/")[0] for document in course.documents}
+    remove_leftovers(options.root / folder for folder in folders)
     try:
         report = write_examples(options.root, _Files({e.path: e for e in parsed.value}))
     except OutsideProjectError as error:
@@ -186,7 +197,13 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
     runnable = tuple(e for e in parsed.value if e.path not in blocked)
     return ExtractedScripts(
-        parsed.value, runnable, tuple(found), report.written, report.removed, report.blocked
+        parsed.value,
+        runnable,
+        tuple(found),
+        report.written,
+        report.removed,
+        report.blocked,
+        report.digests,
     )
 
 
@@ -229,19 +246,21 @@ def run(
     memory: Memory | None = None,
     run_all: RunAll | None = None,
     perturbation: int = 0,
+    digests: Mapping[str, str] | None = None,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
     What begins and ends is told. `memory` is what is remembered; another one than that of the
     options where everything is to run. `run_all` is what runs them, where it
     is not `run_scripts`.
-    `perturbation`: with initial states moved, in the direction that has this number.
+    `perturbation`: with initial states moved, in the direction that has this number. `digests`:
+    of files, by path, as far as they are known.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
     todo = jobs(chosen, perturbation)
     inputs = {
-        job.path: memory.inputs(job, extraction.data)
+        job.path: _inputs(memory, job, extraction, digests or {})
         for job, extraction in zip(todo, chosen, strict=True)
         if not job.norun
     }
@@ -250,6 +269,13 @@ def run(
     for finished in _run(left, inputs, options, progress, stage, memory, run_all):
         done[finished.path] = finished
     return tuple(done[job.path] for job in todo)
+
+
+def _inputs(
+    memory: Memory, job: ScriptJob, extraction: Extraction, digests: Mapping[str, str]
+) -> Inputs:
+    known = digests.get(job.path)
+    return memory.inputs(job, extraction.data) if known is None else memory.inputs_by(job, known)
 
 
 def _run(

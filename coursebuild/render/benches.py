@@ -1,7 +1,6 @@
 """A recorded report in a text: the plot of a scenario, its tables, and where it was measured.
 
-Entry points: `bench`, the block as HTML; `bench_text`, as what a Markdown file is made from;
-`shown_bench`, what its page must know of the reports.
+Entry points: `bench`, the block as HTML; `bench_text`, as what a Markdown file is made from.
 
 What is shown is what the page of the model shows. Where no report fits the course, the block says
 so, with the command that makes one.
@@ -13,16 +12,14 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from coursebuild.measured.bench import ScenarioReport
-from coursebuild.model import Bench, document_blocks, scenario_anchor
-from coursebuild.render import urls
+from coursebuild.model import Bench, document_blocks
 from coursebuild.render.figures import Grid, again, where
-from coursebuild.render.library import Library
 from coursebuild.render.scenarios import scenario_view
 from coursebuild.render.sheet import ShownBench
 from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
+    from coursebuild.measured.bench import ScenarioReport
     from coursebuild.render.context import PageContext
 
 
@@ -43,26 +40,6 @@ class BenchView:
     """The settings, where they stand below something else."""
     about: tuple[str, ...] = ()
     where: str = ""
-
-
-def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
-    """What the reports have for a block on a page."""
-    scene = library.reports.scenes.get(bench.model)
-    scenarios = () if scene is None else scene.scenarios
-    named = (one for one in scenarios if bench.scenario in (None, one.name))
-    report = next(named, None)
-    declared = {
-        one.name
-        for each in library.course.declarations
-        if each.model == bench.model
-        for one in each.scenarios
-    }
-    anchor = "measured"
-    if report is not None and report.name in declared:
-        anchor = scenario_anchor(report.name)
-    href = place.href(urls.model_page_path(bench.model), anchor)
-    machine = None if scene is None or report is None else scene.machine
-    return ShownBench(href, report, machine)
 
 
 def bench(page: PageContext, block: Bench) -> Markup:

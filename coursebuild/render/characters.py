@@ -11,8 +11,13 @@ import re
 
 from coursebuild.patterns import pattern
 
-_ALLOWED = pattern("[\t\n -~\u00a0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0001fffd]*+")
-"""Text in which none is, found out fast; characters past U+1FFFF are left to a closer look."""
+RARE = r"\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff"
+"""What a class of allowed characters leaves out, besides controls of ASCII; characters past U+1FFFD
+are left to a closer look. (To compile a class takes as long as what it lists is long: the few that
+are forbidden are a tenth of the work of the many that are not.)
+"""
+_ALLOWED = pattern(rf"(?:[\t\n -~]++|[^\x00-\x7e{RARE}]++)*+")
+"""Text in which none is forbidden, found out fast."""
 _FORBIDDEN = pattern("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
 
 

@@ -1,6 +1,6 @@
 """Smaller copies of a site's assets, which a server can send as they are.
 
-Entry point: `compressed_files(files, keep)`.
+Entry points: `compressed_files(files, keep)`; `kept_copy`, one copy, and `copy_of`, one made now.
 
 Beside each asset that shrinks stand `NAME.br` and `NAME.gz`; a server that is told to (nginx's
 `brotli_static` and `gzip_static`, Caddy's `precompressed`) chooses by what the browser takes. Pages
@@ -37,11 +37,17 @@ def _copies(file: OutputFile, keep: Keep) -> Iterator[OutputFile]:
     compressible = file.path.startswith("assets/") and file.path.endswith(SUFFIXES)
     if not compressible or len(file.data) < _SMALLEST:
         return
-    for suffix, make in (("br", _brotli), ("gz", _gzip)):
-        key = hashlib.sha256(f"{suffix}/{_quality(file.data)}\0".encode() + file.data)
-        data = keep(key.hexdigest(), lambda make=make: make(file.data))  # type: ignore[misc]
+    for suffix in COPIES:
+        data = kept_copy(file.data, suffix, keep)
         if len(data) < len(file.data):
             yield OutputFile(f"{file.path}.{suffix}", data)
+
+
+def kept_copy(data: bytes, suffix: str, keep: Keep) -> bytes:
+    """A copy of one of `COPIES`, whether or not it is smaller."""
+    quality = _quality(data)
+    key = hashlib.sha256(f"{suffix}/{quality}\0".encode() + data)
+    return keep(key.hexdigest(), lambda: copy_of(data, suffix, quality))
 
 
 def copy_of(data: bytes, suffix: str, quality: int) -> bytes:
@@ -54,10 +60,10 @@ def _quality(data: bytes) -> int:
     return 9 if len(data) >= _LARGE else 10
 
 
-def _brotli(data: bytes, quality: int | None = None) -> bytes:
+def _brotli(data: bytes, quality: int) -> bytes:
     import brotli
 
-    packed: bytes = brotli.compress(data, quality=quality or _quality(data))
+    packed: bytes = brotli.compress(data, quality=quality)
     return packed
 
 

@@ -34,10 +34,11 @@ from coursebuild.model import (
     child_blocks,
     document_blocks,
 )
-from coursebuild.render import benches, blocks, formulas, labs, markup, quizzes, urls
+from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
 from coursebuild.render.direction import direction
 from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
+from coursebuild.render.look import Look, OwnBlock, Words
 from coursebuild.render.sheet import Shown
 from coursebuild.render.shown import file_address, shown
 from coursebuild.render.strings import Strings
@@ -55,7 +56,7 @@ class PageContext:
     document: Document
     joined: Mapping[int, tuple[Recording, ...]]
     """The recordings drawn with a script, by the offset at which the script begins."""
-    look: markup.Look
+    look: Look
     """The words that Markdown's own elements need."""
     outputs: Mapping[int, int]
     """Which output of its script a recording is, from 1, by the offset at which it begins."""
@@ -70,9 +71,7 @@ class PageContext:
     @classmethod
     def made(cls, tools: Tools, shown: Shown, place: urls.Place, document: Document) -> PageContext:
         """The context, once it is known what the page shows of the course."""
-        look = markup.Look(
-            words=_markup_words(tools.words), quantities=direction(tools.words.language)
-        )
+        look = Look(words=_markup_words(tools.words), quantities=direction(tools.words.language))
         joined, outputs = dict(_joined(document)), _numbers(document)
         equations = numbered(document, lambda tex: tools.mathml(tex, True))
         return cls(tools, shown, place, document, joined, look, outputs, equations)
@@ -90,7 +89,7 @@ class PageContext:
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
         label = self.tools.words("markup.formula")
-        return Markup(formulas.contained(formulas.breakable(self.tools.mathml(tex, False)), label))
+        return Markup(formulas.in_line(str(self.tools.mathml(tex, False)), label))
 
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls inside itself where it is too wide."""
@@ -124,12 +123,12 @@ class PageContext:
         """A number that the build has compared with what a script printed."""
         return blocks.binding(self, binding)
 
-    def block(self, block: markup.OwnBlock) -> Markup:
+    def block(self, block: OwnBlock) -> Markup:
         """A block that is ours, with its line end."""
         html = self._block(block)
         return html + Markup("\n") if html else html
 
-    def _block(self, block: markup.OwnBlock) -> Markup:
+    def _block(self, block: OwnBlock) -> Markup:
         match block:
             case Callout():
                 return blocks.callout(self, block)
@@ -143,7 +142,7 @@ class PageContext:
             case Mjcf():
                 return blocks.mjcf(self, block)
             case Bench():
-                return benches.bench(self, block)
+                return _bench(self, block)
             case PlainCode():
                 return blocks.plain_code(self, block)
             case Lab():
@@ -157,7 +156,7 @@ class PageContext:
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
-        return Markup(markup.render_blocks(content, self, self.look).rstrip("\n"))
+        return Markup(str.rstrip(markup.render_blocks(content, self, self.look), "\n"))
 
     def inlines(self, content: tuple[Inline, ...]) -> Markup:
         """Inlines as HTML."""
@@ -176,8 +175,14 @@ class PageContext:
         return self.tools.render(name, **values)
 
 
-def _markup_words(words: Strings) -> markup.Words:
-    return markup.Words(
+def _bench(page: PageContext, block: Bench) -> Markup:
+    from coursebuild.render.benches import bench  # which few lessons show
+
+    return bench(page, block)
+
+
+def _markup_words(words: Strings) -> Words:
+    return Words(
         anchor=words("markup.anchor"),
         formula=words("markup.formula_anchor"),
         footnotes=words("markup.footnotes"),
@@ -217,7 +222,8 @@ def _joined_in(siblings: tuple[Block, ...]) -> Iterator[tuple[int, tuple[Recordi
                 following.append(sibling)
             yield block.span.start, tuple(following)
         for children in _sibling_groups(block):
-            yield from _joined_in(children)
+            if children:
+                yield from _joined_in(children)
 
 
 def _sibling_groups(block: Block) -> tuple[tuple[Block, ...], ...]:

@@ -2,11 +2,13 @@
 
 Entry points: `covered`, `measured`, what a font has; `cut`, a font with some of its characters.
 
-1. fontTools keeps the glyphs of the characters with all that they need, and cuts the weights.
-2. What was cut before without compression (a ready font) needs neither the weights nor the names
-   looked at again, and is read in a fraction of the time.
-3. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
+1. Of a whole font fontTools keeps the glyphs of the characters with all that they need, and cuts
+   the weights.
+2. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
    every root room for the widest of them, and leaves what is not needed as a gap behind the root.
+3. What was cut so before without compression (a ready font) needs only its characters chosen:
+   HarfBuzz does that in a millisecond, and `woff2` writes the result. The two take a fifth of the
+   time of fontTools, and its import is saved.
 4. fontTools compresses at the finest level of Brotli; where another one is wanted, it gets a
    stand-in for the module.
 """
@@ -20,10 +22,13 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+from coursebuild.render.woff2 import woff2
+
 _PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, _PER_MILLE.split()), strict=True))
 """How often characters stand in English text, per thousand."""
 
+_WOFF2 = b"wOF2"
 _FINEST = 11
 _RADICAL = 0x221A
 _WIDEST = 1.07
@@ -74,6 +79,37 @@ def cut(
         flavor: `woff2`, or nothing for a font to cut smaller ones from.
         quality: of compression, up to 11.
     """
+    if data[:4] == _WOFF2:
+        return _cut_whole(data, characters, weights, flavor, quality)
+    chosen = _chosen(data, characters)
+    return chosen if flavor is None else woff2(chosen, quality)
+
+
+def _chosen(data: bytes, characters: str) -> bytes:
+    """The part of a ready font that shows these characters."""
+    import uharfbuzz
+
+    wanted = uharfbuzz.SubsetInput()
+    wanted.flags = uharfbuzz.SubsetFlags.NO_HINTING | uharfbuzz.SubsetFlags.NOTDEF_OUTLINE
+    wanted.unicode_set.update(map(ord, characters))
+    for everything in (
+        wanted.layout_feature_tag_set,
+        wanted.name_id_set,
+        wanted.name_lang_id_set,
+    ):
+        everything.clear()
+        everything.invert()
+    part: bytes = wanted.subset(uharfbuzz.Face(data)).blob.data
+    return part
+
+
+def _cut_whole(
+    data: bytes,
+    characters: str,
+    weights: tuple[int, int] | None,
+    flavor: str | None,
+    quality: int,
+) -> bytes:
     from fontTools import subset
     from fontTools.ttLib import TTFont
 
@@ -84,16 +120,10 @@ def cut(
     options.name_IDs = [0, 1, 2, 3, 4, 5, 6, 13, 14]
     options.recalc_timestamp = False
     with TTFont(io.BytesIO(data), recalcTimestamp=False) as font:
-        is_ready = font.flavor is None
-        if is_ready:  # to find which names are in use would take longer than all else
-            names = font["name"]
-            del font["name"]
         subsetter = subset.Subsetter(options)
         subsetter.populate(text=characters)
         subsetter.subset(font)
-        if is_ready:
-            font["name"] = names
-        elif weights is not None and "fvar" in font:
+        if weights is not None and "fvar" in font:
             from fontTools.varLib import instancer
 
             instancer.instantiateVariableFont(font, {"wght": weights}, inplace=True)

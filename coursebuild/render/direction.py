@@ -12,6 +12,7 @@ Sources: the scripts of the Unicode Standard that run from the right (chapters 9
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import Literal
 
@@ -50,6 +51,7 @@ _REGIONS = {
 """Regions in which a language is written from the right, though elsewhere it is not."""
 
 
+@functools.lru_cache(maxsize=16)
 def direction(language: str) -> Literal["ltr", "rtl"]:
     """The direction of the text of a language, by its tag (`ar`, `uz-Arab-AF`)."""
     name, *rest = re.split(r"[-_]", language.lower())

@@ -5,9 +5,10 @@ Entry points: `draw(sheet, document, tools)`; `draw_whole`, with the document's 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from markupsafe import Markup
 
-from coursebuild.measured.bench import ScenarioReport
 from coursebuild.model import Document, Paragraph, plain_text
 from coursebuild.render import urls
 from coursebuild.render.article import article, contents
@@ -17,6 +18,9 @@ from coursebuild.render.graph import drawings
 from coursebuild.render.listings import numbered
 from coursebuild.render.sheet import Graphed, Highlighted, Plotted, Sheet
 from coursebuild.render.tools import Tools
+
+if TYPE_CHECKING:
+    from coursebuild.measured.bench import ScenarioReport
 
 
 def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:

@@ -17,6 +17,7 @@ from coursebuild.patterns import pattern
 from coursebuild.values import dataclass
 
 _COUNTED = 'class="tml-eqn"'
+_TAGGED = 'class="tml-tag"'
 _TAG = pattern(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
@@ -38,7 +39,7 @@ def numbered(document: Document, mathml: Callable[[str], str]) -> dict[int, Numb
     for formula in display_formulas(document):
         html = mathml(formula.tex)
         counted = html.count(_COUNTED)
-        tag = _TAG.search(html)
+        tag = _TAG.search(html) if _TAGGED in html else None
         number, shown = "", False
         if formula.label is not None and formula.id:
             shown = not counted and tag is None

@@ -13,8 +13,8 @@ both.
 from __future__ import annotations
 
 import ast
-import functools
 
+from coursebuild.python_text import text_key, top_level
 from coursebuild.values import dataclass
 
 LONG = 48
@@ -26,6 +26,8 @@ SHOWN = 44
 TAIL = 12
 """Lines; a `__main__` guard up to this length stays in sight, and a fold shorter than this is not
 made."""
+_MOST = 4096
+"""Texts of which parts and imports are known."""
 
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
@@ -48,12 +50,12 @@ class Part:
 def fold(code: str) -> tuple[Part, ...]:
     """The parts of a script; a short one, and one that does not parse, is one part in sight."""
     lines = code.count("\n") + (not code.endswith("\n"))
-    return (Part(1, lines, folded=False),) if lines <= LONG else _read(*_ended(code)).parts
+    return (Part(1, lines, folded=False),) if lines <= LONG else _read(code).parts
 
 
 def imported(code: str) -> frozenset[str]:
     """Top-level modules that a Python text imports by name; none where it does not parse."""
-    return _read(*_ended(code)).modules
+    return _read(code).modules
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,26 +64,23 @@ class _Outline:
     modules: frozenset[str]
 
 
-def _ended(code: str) -> tuple[str, int]:
-    """The code without its last line ends where they mean nothing, and how many lines it has."""
-    core = code.rstrip("\n")
-    if core.endswith("\\") or len(code) - len(core) > 1:
-        core = code
-    return core, code.count("\n") + (not code.endswith("\n"))
+_known: dict[bytes, _Outline] = {}
 
 
-@functools.lru_cache(maxsize=256)
-def _read(code: str, count: int) -> _Outline:
-    try:
-        body = ast.parse(code).body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return _Outline((Part(1, count, folded=False),), frozenset())
-    return _Outline(_cut(body, code.removesuffix("\n").split("\n")), _imported(body))
+def _read(code: str) -> _Outline:
+    key = text_key(code)
+    if key not in _known:
+        if len(_known) >= _MOST:
+            _known.pop(next(iter(_known)), None)
+        body = top_level(code)
+        parts = _cut(body or [], code.removesuffix("\n").split("\n"))
+        _known[key] = _Outline(parts, _imported(body or []))
+    return _known[key]
 
 
 def forget_folds() -> None:
     """Forget what was parsed, for whoever wants to know how long it takes."""
-    _read.cache_clear()
+    _known.clear()
 
 
 def _imported(body: list[ast.stmt]) -> frozenset[str]:

@@ -1,6 +1,7 @@
 """Formulas in a line of text: where the line may break, and where it must not.
 
-Entry points: `breakable(mathml)`, `contained(html, label)`, `glue(html)`.
+Entry points: `in_line(mathml, label)`, of which `breakable` and `contained` are the steps;
+`glue(html)`, which is done piece by piece by `cut`, `tight` and `held`.
 
 A browser takes a `math` element for one unbreakable box that the line may break on either side of.
 So
@@ -16,23 +17,30 @@ So
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape, unescape
 
 from coursebuild.patterns import pattern
+from coursebuild.values import dataclass
 
 LONG = 20
 """Characters; a shorter formula stays whole."""
 WIDE = 22
 """Characters; a shorter piece fits the narrowest window."""
 
+_REMEMBERED = 256
+"""Formulas: a text says the same ones again and again."""
+
 _ROW = pattern(r"<(/?)mrow\b[^>]*>")
 _WHOLE = pattern(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
 _ANNOTATION = pattern(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = pattern(r"<[^>]*>")
 _PIECE = pattern(r"<math>.*?</math>", re.DOTALL)
-_OPENING = frozenset("([“‘\"'")
+_OPENINGS = "([“‘\"'"
+_OPENING = frozenset(_OPENINGS)
+_HOLD, _LOOSE = '<span class="held">', "</span>"
 _TOUCHING = pattern(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
@@ -46,7 +54,19 @@ _LAST = pattern(
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
 _END = pattern(r"</math>(?=\s)")
+_FIRST_INSIDE = pattern(rf">(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
+_LAST_INSIDE = pattern(
+    rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
+    r"""(?:<annotation\b[^<]*</annotation></semantics>)?\Z)"""
+)
+_AFTER = pattern(r"""(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
+
+
+@functools.lru_cache(maxsize=_REMEMBERED)
+def in_line(mathml: str, label: str) -> str:
+    """An inline formula as it stands in its line: see 1 and 2."""
+    return contained(breakable(mathml), label)
 
 
 def breakable(mathml: str) -> str:
@@ -171,4 +191,80 @@ def _held(before: str, formula: str, after: str) -> str:
 
 
 def _hold(html: str) -> str:
-    return f'<span class="held">{html}</span>'
+    return f"{_HOLD}{html}{_LOOSE}"
+
+
+# --- piece by piece
+
+
+@dataclass(frozen=True, slots=True)
+class Woven:
+    """HTML, and where its formulas stand."""
+
+    texts: tuple[str, ...]
+    """What is around them: one more than there are formulas."""
+    formulas: tuple[str, ...] = ()
+    """Each from behind `<math` up to its end. Another may be in the texts."""
+
+    @property
+    def html(self) -> str:
+        """The whole."""
+        parts = [self.texts[0]]
+        for formula, text in zip(self.formulas, self.texts[1:], strict=True):
+            parts += ("<math", formula, "</math>", text)
+        return "".join(parts)
+
+
+def cut(html: str) -> tuple[list[str], list[str]] | None:
+    """The texts around the formulas of a page, and what each formula is after `<math`, to its end.
+
+    `None` where formulas do not stand one after the other, each with its own end.
+    """
+    *pieces, last = html.split("</math>")
+    texts, inside = list[str](), list[str]()
+    for piece in pieces:
+        text, _, formula = piece.partition("<math")
+        if formula[:1] not in (">", " ") or "<math" in formula:
+            return None
+        texts.append(text)
+        inside.append(formula)
+    return None if "<math" in last else ([*texts, last], inside)
+
+
+def tight(inside: str, *, before: bool, after: bool) -> str:
+    """A formula, without `<math` and its end, beside spaces of the text: see 4."""
+    if before and (first := _FIRST_INSIDE.match(inside)):
+        inside = f'{first[0]} lspace="0em"{inside[first.end() :]}'
+    if (
+        after
+        and (start := inside.rfind("<mo")) >= 0
+        and (last := _LAST_INSIDE.match(inside, start))
+    ):
+        inside = f'{inside[: last.end()]} rspace="0em"{inside[last.end() :]}'
+    return inside
+
+
+def held(texts: Sequence[str], inside: Sequence[str]) -> list[str]:
+    """The texts with what holds formulas together with what stands beside them: see 3."""
+    texts = list(texts)
+    last = -1
+    for first in range(len(inside)):
+        if first <= last or inside[first][0] != ">":
+            continue
+        last = first
+        while texts[last + 1] == "" and last + 1 < len(inside) and inside[last + 1][0] == ">":
+            last += 1
+        following = texts[last + 1]
+        touching = _AFTER.match(following)
+        after = touching.end() if touching is not None else 0
+        before = len(texts[first].rstrip(_OPENINGS))
+        opened = before < len(texts[first])
+        if opened:
+            texts[first] = f"{texts[first][:before]}{_HOLD}{texts[first][before:]}"
+            if first < last:
+                texts[first + 1] += _LOOSE
+        if after and (first < last or not opened):
+            texts[last] += _HOLD
+        if after or (opened and first == last):
+            texts[last + 1] = f"{following[:after]}{_LOOSE}{following[after:]}"
+    return texts

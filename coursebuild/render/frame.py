@@ -212,8 +212,9 @@ def _own_script(draft: Draft, names: Names) -> str:
             return ""
 
 
-_ALIKE = ("lesson", "stub", "level", "model")
-"""Kinds of pages that no menu has, so that their frames differ in their own values alone."""
+_ALIKE = ("lesson", "stub", "level", "model", "book")
+"""Kinds of pages that no menu has, so that their frames differ in their own values alone; one book
+is in it."""
 _SLOT = pattern("\ue000([a-z_]+[0-9]*)\ue001")
 
 
@@ -227,7 +228,7 @@ class Frames:
 
     def around(self, draft: Draft, parts: tuple[str, ...]) -> tuple[str, str]:
         """See `frame_around`."""
-        if draft.kind not in _ALIKE:
+        if draft.kind not in _ALIKE or draft.path == urls.COURSE_PAGE:
             return frame_around(self._library, draft, self._names, parts)
         own = _own_values(self._library, draft)
         slots, filled = _slots(own)
@@ -263,8 +264,9 @@ def _slots(own: Mapping[str, object]) -> tuple[dict[str, object], dict[str, str]
 
 
 def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
-    """Every second piece is the name of a slot."""
-    return "".join(filled[p] if number % 2 else p for number, p in enumerate(pieces))
+    """Every second piece is the name of a slot, or an author's between the same characters."""
+    texts = (p if n % 2 == 0 else filled.get(p, f"\ue000{p}\ue001") for n, p in enumerate(pieces))
+    return "".join(texts)
 
 
 def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:

@@ -2,45 +2,26 @@
 
 Entry points: `highlight(language, code)`, `highlight_lines`.
 
-1. Pygments tells tokens apart far finer than a page should show; they are folded into the few kinds
-   of `_CLASSES`, and what belongs to none gets no element at all.
+1. Pygments tells tokens apart far finer than a page should show; they are folded into few kinds,
+   and what belongs to none gets no element at all. Python, which most pages have, is read by
+   `python_lexer` instead.
 2. Characters that HTML forbids (control characters, non-characters) are shown as the symbols that
    stand for them.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator
+from collections.abc import Iterable
 from html import escape
 
 from markupsafe import Markup
-from pygments.lexer import Lexer
-from pygments.lexers import find_lexer_class_by_name
-from pygments.token import Comment, Keyword, Literal, Name, Operator, String, Token, _TokenType
-from pygments.util import ClassNotFound
 
+from coursebuild.patterns import pattern
 from coursebuild.render.characters import visible as visible
 
-_CLASSES: tuple[tuple[_TokenType, str], ...] = (
-    (Comment, "c"),
-    (String.Doc, "d"),
-    (String.Interpol, "i"),
-    (String, "s"),
-    (Literal.Number, "n"),
-    (Keyword, "k"),
-    (Operator.Word, "k"),
-    (Name.Function, "f"),
-    (Name.Class, "f"),
-    (Name.Decorator, "a"),
-    (Name.Attribute, "a"),
-    (Name.Tag, "t"),
-    (Token.Generic.Prompt, "p"),
-    (Token.Generic.Deleted, "x"),
-    (Token.Generic.Inserted, "y"),
-)
-"""Kinds of token and their class, the special before the general."""
-
+PYTHON = frozenset(("python", "py", "sage", "python3", "py3", "bazel", "starlark", "pyi"))
+"""All names under which Pygments knows Python."""
+_BEGIN = pattern("\x01(.)")
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
 
 
@@ -49,80 +30,57 @@ def highlight(language: str, code: str) -> Markup:
     return Markup("\n".join(highlight_lines(language, code)))
 
 
-@functools.lru_cache(maxsize=256)
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     """The code's lines, each marked by itself: no element reaches over the end of a line."""
-    lexer = _lexer(_ALIASES.get(language.lower(), language.lower()))
-    if lexer is None:
-        return tuple(Markup(escape(line, quote=False)) for line in visible(code).split("\n"))
-    lines: list[str] = []
-    line: list[str] = []
-    css, run = "", ""
-    for token, text in _tokens(lexer, visible(code)):
-        kind = _class_of(token)
-        first, *others = text.split("\n") if "\n" in text else (text,)
-        if kind == css or (run and (not first or first.isspace())):
-            run += first
-        else:
-            line.append(_span(css, run))
-            css, run = kind, first
-        for part in others:
-            line.append(_span(css, run))
-            lines.append("".join(line))
-            line = []
-            css, run = kind, part
-    line.append(_span(css, run))
-    lines.append("".join(line))
-    return tuple(map(Markup, lines))
+    text, language = visible(code), language.lower()
+    # Lexers drop a byte order mark at the start.
+    mark = "\ufeff" if text.startswith("\ufeff") else ""
+    runs = _runs(_ALIASES.get(language, language), text.removeprefix(mark))
+    html = escape(text, quote=False) if runs is None else marked([("", mark), *runs])
+    return tuple(map(Markup, html.split("\n")))
 
 
-def _tokens(lexer: Lexer, code: str) -> Iterator[tuple[_TokenType, str]]:
-    """The lexer's tokens; a byte order mark at the start, which it drops, stays.
+def _runs(language: str, text: str) -> list[tuple[str, str]] | None:
+    if language in PYTHON:
+        from coursebuild.render.python_lexer import python_runs
 
-    A lexer that leaves anything else out marks nothing.
+        return python_runs(text)
+    if language in ("", "text"):
+        return None
+    from coursebuild.render.lexers import runs
+
+    return runs(language, text)
+
+
+def marked(runs: Iterable[tuple[str, str]]) -> str:
+    """The HTML of runs of text, each with its class or none.
+
+    What is of one class and meets on a line gets one element.
     """
-    if code.startswith("\ufeff"):
-        yield Token.Text, "\ufeff"
-        code = code[1:]
-    # Those of sessions see lines that end only.
-    for end in ("", "\n"):
-        found = list(lexer.get_tokens(code + end))
-        if "".join(text for _, text in found) == code + end:
-            break
-    else:
-        found, end = [(Token.Text, code)], ""
-    if end:
-        token, text = found.pop()
-        found.append((token, text.removesuffix(end)))
-    yield from found
+    parts: list[str] = []
+    css, run = "", ""
+    for kind, text in runs:
+        if kind == css or not text or (text.isspace() and "\n" not in text):
+            run += text
+        else:
+            parts.append(_elements(css, run) if css else run)
+            css, run = kind, text
+    parts.append(_elements(css, run) if css else run)
+    html = "".join(parts).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    for css in sorted(set(_BEGIN.findall(html))):
+        html = html.replace(f"\x01{css}", f'<span class="{css}">')
+    return html.replace("\x02", "</span>")
 
 
-def _span(css: str, text: str) -> str:
-    """A run of tokens of one class; white space around it stays outside the element."""
-    html = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    if not css or not (core := html.strip()):
-        return html
-    if core == html:
-        return f'<span class="{css}">{html}</span>'
-    before, _, after = html.partition(core)
-    return f'{before}<span class="{css}">{core}</span>{after}'
+def _elements(css: str, text: str) -> str:
+    """An element on each line; white space around it stays outside.
 
-
-@functools.cache
-def _class_of(token: _TokenType) -> str:
-    return next((css for kind, css in _CLASSES if token in kind), "")
-
-
-@functools.cache
-def _lexer(language: str) -> Lexer | None:
-    if not language:
-        return None
-    try:
-        found = find_lexer_class_by_name(language)
-    except ClassNotFound:
-        return None
-    if found.name == "Python":
-        from coursebuild.render.python_lexer import FastPythonLexer
-
-        found = FastPythonLexer
-    return found(stripnl=False, ensurenl=False)
+    Elements are written as characters that no text has (see `visible`), until all is escaped.
+    """
+    if "\n" in text:
+        return "\n".join(_elements(css, line) for line in text.split("\n"))
+    core = text.strip()
+    if not core:
+        return text
+    before, _, after = text.partition(core)
+    return f"{before}\x01{css}{core}\x02{after}"

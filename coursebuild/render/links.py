@@ -1,7 +1,8 @@
 """Every internal link, anchor, image and script of the built pages leads somewhere.
 
 Entry points: `check_links(files, base_url)`, which gives what is broken, sorted by page and place;
-`page_references` and `all_lead_somewhere`, by which it is known beforehand that nothing is.
+`ids_and_addresses`, `references` and `all_lead_somewhere`, by which it is known beforehand that
+nothing is.
 
 1. Each page is read once by a real parser: its ids, and the addresses in it with their lines.
 2. Each address is resolved as a browser would, from the page that has it; those on other hosts are
@@ -11,6 +12,7 @@ Entry points: `check_links(files, base_url)`, which gives what is broken, sorted
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from html import unescape
 from typing import TypeAlias
@@ -90,12 +92,13 @@ class _Base:
     plain: bool
     """Whether nothing in the root has to be resolved."""
 
-    @classmethod
-    def of(cls, base_url: str) -> _Base:
+    @staticmethod
+    @functools.lru_cache(maxsize=8)
+    def of(base_url: str) -> _Base:
         base = urlsplit(base_url)
         own = f"{base.scheme}://{base.netloc}" if base.netloc else None
         folder = f"{base.path.rstrip('/')}/"
-        return cls(f"{_ORIGIN}{folder}", own, _STEPS.fullmatch(folder, 1) is not None)
+        return _Base(f"{_ORIGIN}{folder}", own, _STEPS.fullmatch(folder, 1) is not None)
 
 
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
@@ -116,26 +119,24 @@ def _is_page(path: str) -> bool:
     return path.endswith(".html")
 
 
-def page_references(
-    path: str, html: str, base_url: str, *, plain: bool = False
-) -> tuple[frozenset[str], frozenset[Reference]]:
-    """The ids in the text of a page, and where its addresses lead.
+def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
+    """The ids in the text of a page, and the addresses in it."""
+    page = _quickly_read(html) or _read(html)
+    return page.ids, frozenset(address.url for address in page.addresses)
 
-    `plain`: it is known that the page is written as `styles.is_plain` says.
-    """
-    page = _quickly_read(html, plain=plain)
-    if page is None:
-        page = _read(html)
+
+def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:
+    """Where the addresses of a page lead."""
     base = _Base.of(base_url)
     found: set[Reference] = set()
-    for url in {address.url for address in page.addresses}:
-        if url.startswith("#") and url.isascii() and "%" not in url and url == url.strip():
-            found.add((path, url[1:]))
+    for url in addresses:
+        if _PLAIN_ANCHOR.fullmatch(url):
+            found.add((path, unquote(url[1:])))
             continue
         target = _target(path, url, base)
         if target is not None:
             found.add(target if isinstance(target, tuple) else ("", target))
-    return page.ids, frozenset(found)
+    return frozenset(found)
 
 
 def all_lead_somewhere(
@@ -159,16 +160,13 @@ def has(ids: Collection[str], anchor: str) -> bool:
     return any(stem == lines[0] and lines[2] <= last for stem, _, last in others)
 
 
-_LINE = pattern("[1-9][0-9]{0,8}")
-
-
 def without_lines(ids: Iterable[str]) -> frozenset[str]:
     """Ids with the last line of each listing for all of its lines."""
     kept: set[str] = set()
     longest: dict[str, int] = {}
     for name in ids:
         stem, _, line = name.rpartition(".L")
-        if stem and stem.isprintable() and _LINE.fullmatch(line):  # as most are
+        if stem.isprintable() and stem and _is_number(line):  # as most are
             last = int(line)
         elif ".L" in name and (lines := linked_lines(name)) is not None:
             stem, _, last = lines
@@ -180,20 +178,44 @@ def without_lines(ids: Iterable[str]) -> frozenset[str]:
     return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
 
 
+def _is_number(text: str) -> bool:
+    return text.isdecimal() and text.isascii() and text[0] != "0" and len(text) < 10
+
+
 _STEP = r"[A-Za-z0-9_~@,+-][A-Za-z0-9_.~@,+-]*+"
 _STEPS = pattern(rf"(?:{_STEP}/)*+(?:{_STEP})?")
-_PLAIN_URL = pattern(rf"((?:\.\./)*+)((?:{_STEP}/)*+{_STEP})(?:#([A-Za-z0-9_.~@,+:-]*+))?")
-"""An address as nearly all are: in it nothing is encoded, and every step leads somewhere."""
+_PLAIN_URL = pattern(rf"((?:\.\./)*+)((?:{_STEP}/)*+{_STEP})(?:#([A-Za-z0-9_.~@,+:%-]*+))?")
+"""An address as nearly all are: nothing is encoded before its anchor, and every step leads
+somewhere."""
+_PLAIN_ANCHOR = pattern("#[!-~]*+")
+
+
+@functools.lru_cache(maxsize=8)
+def _folders(path: str) -> tuple[str, ...]:
+    """The folder of a plain path, and those around it, to the root; none of any other path."""
+    steps = path.split("/")[:-1] if _STEPS.fullmatch(path) else None
+    if steps is None:
+        return ()
+    return tuple("".join(f"{step}/" for step in steps[:end]) for end in range(len(steps), -1, -1))
+
+
+def plain_target(path: str, url: str) -> tuple[str, str] | None:
+    """Where an address on a page leads, if both are written as nearly all are; else `None`.
+
+    The site path, and the anchor as it is written: empty where there is none.
+    """
+    plain = _PLAIN_URL.fullmatch(url)
+    if plain is None:
+        return None
+    up, folders = plain.end(1) // 3, _folders(path)
+    return (folders[up] + plain[2], plain[3] or "") if up < len(folders) else None
 
 
 def _target(path: str, url: str, base: _Base) -> Reference | str | None:
     """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
-    plain = _PLAIN_URL.fullmatch(url)
-    if plain is not None and base.plain and _STEPS.fullmatch(path):
-        up, folders = len(plain[1]) // 3, path.count("/")
-        if up <= folders:
-            folder = "".join(f"{step}/" for step in path.split("/")[: folders - up])
-            return folder + plain[2], plain[3] or ""
+    plain = plain_target(path, url) if base.plain else None
+    if plain is not None:
+        return plain[0], unquote(plain[1])
     try:
         parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
     except ValueError:
@@ -239,22 +261,26 @@ def _srcset(value: str) -> Iterator[str]:
             yield part.split()[0]
 
 
+def noted(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The ids and the addresses in an attribute of an element."""
+    if name == "id" or (name == "name" and tag == "a"):
+        return (value,), ()
+    if name not in _ADDRESSES.get(tag, ()):
+        return (), ()
+    return (), (tuple(_srcset(value)) if name == "srcset" else (value,))
+
+
 def _read(html: str) -> _Page:
     from coursebuild.render.elements import StartTags  # few pages need it
 
     ids: set[str] = set()
     addresses: list[_Address] = []
     for tag, attributes, line in StartTags.of(html):
-        wanted = _ADDRESSES.get(tag, ())
         for name, value in attributes:
-            if value is None:
-                continue
-            if name == "id" or (name == "name" and tag == "a"):
-                ids.add(value)
-            elif name == "srcset" and name in wanted:
-                addresses += [_Address(url, line) for url in _srcset(value)]
-            elif name in wanted:
-                addresses.append(_Address(value, line))
+            if value is not None:
+                named, urls = noted(tag, name, value)
+                ids.update(named)
+                addresses += (_Address(url, line) for url in urls)
     return _Page(frozenset(ids), tuple(addresses))
 
 
@@ -264,62 +290,17 @@ _ATTRIBUTE = pattern(r"""\s([\w:-]+)="([^"<>]*)\"""")
 _RAW_TEXT = pattern(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
 
 
-def _quickly_read(html: str, *, plain: bool = False) -> _Page | None:
-    """The same as `_read` but for the lines, where all tags are written as we write them.
-
-    `plain`: it is known that they are.
-    """
-    if not (plain or _TAGS.fullmatch(html)) or _RAW_TEXT.search(html):
+def _quickly_read(html: str) -> _Page | None:
+    """The same as `_read` but for the lines, where all tags are written as we write them."""
+    if not _TAGS.fullmatch(html) or _RAW_TEXT.search(html):
         return None
-    if plain:
-        return _plainly_read(html)
     ids: set[str] = set()
     addresses: list[_Address] = []
     for tag, attributes in _WITH_ATTRIBUTES.findall(html):
-        wanted = _ADDRESSES.get(tag, ())
-        if not wanted and ' id="' not in attributes:
+        if tag not in _ADDRESSES and ' id="' not in attributes:
             continue
         for name, value in _ATTRIBUTE.findall(attributes):
-            if name == "id" or (name == "name" and tag == "a"):
-                ids.add(unescape(value))
-            elif name in wanted:
-                url = unescape(value)
-                found = _srcset(url) if name == "srcset" else (url,)
-                addresses += [_Address(one, 0) for one in found]
+            named, urls = noted(tag, name, unescape(value))
+            ids.update(named)
+            addresses += (_Address(url, 0) for url in urls)
     return _Page(frozenset(ids), tuple(addresses))
-
-
-_HOLDERS: dict[str, tuple[str, ...]] = {
-    name: tuple(tag for tag, names in _ADDRESSES.items() if name in names)
-    for name in sorted({name for names in _ADDRESSES.values() for name in names})
-}
-"""Elements by the attributes in which they hold addresses."""
-
-
-def _plainly_read(html: str) -> _Page:
-    """The same for a plain page, of which only the attributes that count are looked at."""
-    ids = {value for _, _, value in _values(html, "id")}
-    ids.update(value for _, tag, value in _values(html, "name") if tag == "a")
-    found = [
-        (at, _Address(one, 0))
-        for name, holders in _HOLDERS.items()
-        for at, tag, value in _values(html, name)
-        if tag in holders
-        for one in (_srcset(value) if name == "srcset" else (value,))
-    ]
-    found.sort(key=lambda one: one[0])
-    return _Page(frozenset(ids), tuple(address for _, address in found))
-
-
-def _values(html: str, name: str) -> Iterator[tuple[int, str, str]]:
-    """The values of an attribute in a plain page, with their places and their elements' names."""
-    wanted = f' {name}="'
-    at = html.find(wanted)
-    while at >= 0:
-        start, value = html.rfind("<", 0, at), at + len(wanted)
-        # Else it stands in a text, or in the value of another attribute.
-        if start >= 0 and html.find(">", start, at) < 0 and not html.count('"', start, at) % 2:
-            tag = html[start + 1 : html.find(" ", start, at + 1)]
-            text = html[value : html.find('"', value)]
-            yield value, tag, unescape(text) if "&" in text else text
-        at = html.find(wanted, value)

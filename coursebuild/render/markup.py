@@ -1,18 +1,17 @@
 """Blocks and inlines into HTML.
 
-Entry points: `render_blocks`, `render_inlines`, `render_footnotes`; `Context` (what a page
-decides), `Look` (details of the HTML).
+Entry points: `render_blocks`, `render_inlines`, `render_footnotes`, `render_table`.
 
 What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
-is asked of the context, which may call back for what its blocks hold. All else is Markdown, and is
-written here.
+is asked of the context (`look.py`), which may call back for what its blocks hold. All else is
+Markdown, and is written here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import zip_longest
-from typing import Literal, Protocol, TypeAlias, assert_never
+from typing import assert_never
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -53,91 +52,36 @@ from coursebuild.model import (
     Strikethrough,
     Strong,
     Table,
-    Target,
     Term,
     Text,
     ThematicBreak,
 )
+from coursebuild.patterns import pattern
+from coursebuild.render.look import Context, Look
 from coursebuild.render.quantities import in_order, joined, quantities, unit_length
-from coursebuild.values import dataclass, field
-
-OwnBlock: TypeAlias = Bench | Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
-"""The blocks that are more than Markdown."""
-
-
-class Context(Protocol):
-    """What a page decides. A `Markup` that it gives is HTML already, a string is not."""
-
-    def href(self, target: Target) -> str:
-        """The address of a link."""
-        ...
-
-    def reference(self, target: Target) -> str:
-        """What a link without a text says; empty where it says nothing."""
-        ...
-
-    def url(self, url: str) -> str:
-        """The address of an image that is written as `url`."""
-        ...
-
-    def math(self, tex: str) -> Markup:
-        """A formula in a line of text, set."""
-        ...
-
-    def display(self, tex: str, start: int) -> Markup:
-        """A formula on a line of its own, which begins at an offset of the document."""
-        ...
-
-    def code(self, language: str, text: str) -> Markup:
-        """A whole block of code that is only shown."""
-        ...
-
-    def binding(self, binding: NumberBinding) -> Markup:
-        """A number that is bound to an output."""
-        ...
-
-    def block(self, block: OwnBlock) -> Markup:
-        """A block of ours."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Words:
-    """The words that Markdown's own elements need; `{number}` and `{occurrence}` are filled in."""
-
-    anchor: str = "Link to this section"
-    formula: str = "Link to this formula"
-    footnotes: str = "Footnotes"
-    footnote: str = "Footnote {number}"
-    back: str = "Back to reference {number}"
-    back_again: str = "Back to reference {number}, place {occurrence}"
-    table: str = "Table"
-    done: str = "Done"
-    not_done: str = "Not done"
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """Details of the HTML."""
-
-    words: Words = field(default_factory=Words)
-    anchors: bool = True
-    """Whether headings have their ids, and links to themselves."""
-    frames: bool = True
-    """Whether tables stand in a box of their own, that can be scrolled."""
-    void_end: str = ">"
-    """How a tag without content ends."""
-    quantities: Literal["", "ltr", "rtl"] = ""
-    """Whether numbers are kept with their units, and in which direction the text runs."""
-
 
 _LOOK = Look()
-_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
 
 
 def escape(text: str) -> Markup:
     """Text as HTML, also for attributes in double quotes."""
-    return Markup(text.translate(_ESCAPES))
+    return Markup(_escaped(text))
+
+
+def _escaped(text: str) -> str:
+    """The same as a string; where there is nothing to escape, as is the rule, nothing is copied."""
+    text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
+    return text.replace(">", "&gt;").replace('"', "&quot;")
+
+
+_SIMPLE = pattern('[^0-9&<>"]*+')
+"""Text without quantities, and with nothing to escape."""
+_PLAIN_ANCHOR = pattern("[A-Za-z0-9_.~-]*+")
+
+
+def _quoted(anchor: str) -> str:
+    """An anchor in an address."""
+    return anchor if _PLAIN_ANCHOR.fullmatch(anchor) else quote(anchor)
 
 
 def render_blocks(blocks: Iterable[Block], context: Context, look: Look = _LOOK) -> Markup:
@@ -165,7 +109,8 @@ def reference_id(number: int, occurrence: int) -> str:
     return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
 
 
-def _is_tight(block: Block) -> bool:
+def is_tight(block: Block) -> bool:
+    """Whether a block is a paragraph of a tight list."""
     return isinstance(block, Paragraph) and block.tight
 
 
@@ -183,12 +128,13 @@ class _Writer:
             return "".join(map(self.inline, inlines))
         return "".join(self._with_units(tuple(inlines)))
 
-    def _with_units(self, inlines: tuple[Inline, ...]) -> Iterator[str]:
+    def _with_units(self, inlines: tuple[Inline, ...]) -> list[str]:
         """Inlines, of which formulas and bound numbers are held together with their units."""
+        written: list[str] = []
         taken = 0
         for inline, after in zip_longest(inlines, inlines[1:]):
             if isinstance(inline, Text):
-                yield self._text(inline.text[taken:])
+                written.append(self._text(inline.text[taken:]))
                 taken = 0
                 continue
             html = self.inline(inline)
@@ -196,18 +142,20 @@ class _Writer:
                 isinstance(inline, Math) and not inline.display
             )
             if number and isinstance(after, Text) and (taken := unit_length(after.text)):
-                unit = after.text[:taken].replace(" ", "\u00a0").translate(_ESCAPES)
-                html = (
-                    in_order(Markup(html + unit)) if self.look.quantities == "rtl" else html + unit
-                )
-            yield html
+                html += _escaped(after.text[:taken].replace(" ", "\u00a0"))
+                if self.look.quantities == "rtl":
+                    html = in_order(Markup(html))
+            written.append(html)
+        return written
 
     def _text(self, text: str) -> str:
         """Text whose quantities are in one line and in order."""
+        if _SIMPLE.fullmatch(text):  # as most are
+            return text
         text = joined(text)
         if self.look.quantities == "ltr":
-            return text.translate(_ESCAPES)
-        pieces = ((piece.translate(_ESCAPES), kept) for piece, kept in quantities(text))
+            return _escaped(text)
+        pieces = ((_escaped(piece), kept) for piece, kept in quantities(text))
         return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
 
     # -- blocks
@@ -247,10 +195,10 @@ class _Writer:
         inner, name = self.inlines(heading.children), f"h{heading.level}"
         if not self.look.anchors:
             return f"<{name}>{inner}</{name}>\n"
-        anchor = escape(heading.anchor)
-        kinds = f' class="{escape(" ".join(heading.classes))}"' if heading.classes else ""
-        label = escape(self.look.words.anchor)
-        link = f'<a class="anchor" href="#{quote(heading.anchor)}" aria-label="{label}">#</a>'
+        anchor = _escaped(heading.anchor)
+        kinds = f' class="{_escaped(" ".join(heading.classes))}"' if heading.classes else ""
+        label = _escaped(self.look.words.anchor)
+        link = f'<a class="anchor" href="#{_quoted(heading.anchor)}" aria-label="{label}">#</a>'
         return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
 
     def _list(self, block: ListBlock) -> str:
@@ -267,17 +215,15 @@ class _Writer:
             parts.append(self._box(item.checked))
         line_end = False
         for block in item.blocks:
-            if not (
-                line_end or (_is_tight(block) and len(parts) == 1 + (item.checked is not None))
-            ):
+            if not (line_end or (is_tight(block) and len(parts) == 1 + (item.checked is not None))):
                 parts.append("\n")
             parts.append(self.block(block))
-            line_end = not _is_tight(block)
+            line_end = not is_tight(block)
         return "".join([*parts, "</li>\n"])
 
     def _box(self, checked: bool) -> str:
         words = self.look.words
-        label = escape(words.done if checked else words.not_done)
+        label = _escaped(words.done if checked else words.not_done)
         state = " checked" if checked else ""
         return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.look.void_end} '
 
@@ -289,7 +235,7 @@ class _Writer:
         html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
         if not self.look.frames:
             return html
-        label = escape(self.look.words.table)
+        label = _escaped(self.look.words.table)
         return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
 
     def _row(self, cells: tuple[Cell, ...], table: Table, tag: str) -> str:
@@ -306,17 +252,17 @@ class _Writer:
         """One inline."""
         match inline:
             case Text():
-                return inline.text.translate(_ESCAPES)
+                return _escaped(inline.text)
             case SoftBreak():
                 return "\n"
             case CodeSpan():
-                return f"<code>{inline.text.translate(_ESCAPES)}</code>"
+                return f"<code>{_escaped(inline.text)}</code>"
             case Math():
                 if inline.display:
                     return self.context.display(inline.tex.text, inline.span.start)
                 return self.context.math(inline.tex.text)
             case Term():
-                name = f' id="{escape(inline.anchor)}"' if self.look.anchors else ""
+                name = f' id="{_escaped(inline.anchor)}"' if self.look.anchors else ""
                 return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
             case Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
@@ -340,23 +286,23 @@ class _Writer:
                 assert_never(inline)
 
     def _link(self, link: Link) -> str:
-        title = f' title="{escape(link.title)}"' if link.title else ""
-        href = escape(self.context.href(link.target))
-        inner = self.inlines(link.children) or escape(self.context.reference(link.target))
+        title = f' title="{_escaped(link.title)}"' if link.title else ""
+        href = _escaped(self.context.href(link.target))
+        inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
         bare = self.look.frames and inner == href  # an address that stands for itself
         own = ' class="url"' if bare else ""
         return f'<a href="{href}"{title}{own}>{inner}</a>'
 
     def _image(self, image: Image) -> str:
-        title = f' title="{escape(image.title)}"' if image.title else ""
-        url = escape(self.context.url(image.url))
-        return f'<img src="{url}" alt="{escape(image.alt)}"{title}{self.look.void_end}'
+        title = f' title="{_escaped(image.title)}"' if image.title else ""
+        url = _escaped(self.context.url(image.url))
+        return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.look.void_end}'
 
     # -- footnotes
 
     def _reference(self, reference: FootnoteRef) -> str:
         number = reference.number
-        label = escape(self.look.words.footnote.format(number=number))
+        label = _escaped(self.look.words.footnote.format(number=number))
         name = reference_id(number, reference.occurrence)
         return (
             f'<sup class="footnote-ref"><a href="#fn:{number}" id="{name}" role="doc-noteref"'
@@ -367,7 +313,7 @@ class _Writer:
         items = "".join(map(self._footnote, footnotes))
         if not items:
             return ""
-        label = escape(self.look.words.footnotes)
+        label = _escaped(self.look.words.footnotes)
         start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
         return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
 
@@ -384,7 +330,7 @@ class _Writer:
 
     def _back(self, number: int, occurrence: int) -> str:
         words = self.look.words.back if occurrence == 1 else self.look.words.back_again
-        label = escape(words.format(number=number, occurrence=occurrence))
+        label = _escaped(words.format(number=number, occurrence=occurrence))
         mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
         arrow = "↪" if self.look.quantities == "rtl" else "↩"
         return (

@@ -126,9 +126,16 @@ def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
         if group is not None:
             groups[group][file.path] = "" if _is_lasting(file) else file.digest[:_DIGITS]
             sizes[group] += file.size
-    found = {name: {"bytes": sizes[name], "files": files} for name, files in groups.items()}
-    text = json.dumps({"format": _FORMAT, **found}, ensure_ascii=False, indent=0, sort_keys=False)
-    return f"{text}\n".encode("utf-8", "surrogatepass")
+    parts = [f'"format": {_FORMAT}']
+    for name, found in groups.items():
+        parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {_lines(found)}\n}}')
+    return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8", "surrogatepass")
+
+
+def _lines(files: dict[str, str]) -> str:
+    """A line for each file, as `json` writes with an indent of 0, but at once."""
+    text = json.dumps(files, ensure_ascii=False, separators=(",\n", ": "))
+    return f"{{\n{text[1:-1]}\n}}" if files else "{}"
 
 
 def _group(shell: frozenset[str], file: FileFacts) -> str | None:

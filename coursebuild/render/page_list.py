@@ -15,6 +15,7 @@ from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
 from coursebuild.render.sheet import Sheet
+from coursebuild.render.tools import Tools
 from coursebuild.values import dataclass
 
 
@@ -38,14 +39,17 @@ class PageEntry:
         return self.kind.document(library, self.id)
 
     def draft(
-        self, library: Library, whole: Callable[[Document], Document] = lambda document: document
+        self,
+        library: Library,
+        whole: Callable[[Document], Document] = lambda document: document,
+        tools: Tools | None = None,
     ) -> Draft:
-        """The page drawn; `whole` gives a document with its text."""
+        """The page drawn; `whole` gives a document with its text, `tools` are the library's."""
         from coursebuild.render.draw import draw  # with all that it takes to draw
 
         document = self.document(library)
         shown = None if document is None else whole(document)
-        return draw(self.sheet(library), shown, library.tools)
+        return draw(self.sheet(library), shown, tools or library.tools)
 
 
 @dataclass(frozen=True, slots=True)

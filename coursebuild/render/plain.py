@@ -33,9 +33,8 @@ from coursebuild.model import (
     TermTarget,
     UrlTarget,
 )
+from coursebuild.render.look import Look, OwnBlock
 from coursebuild.render.markup import (
-    Look,
-    OwnBlock,
     escape,
     render_blocks,
     render_footnotes,

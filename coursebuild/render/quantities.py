@@ -39,7 +39,7 @@ _NUMBER = (
 )
 
 _ONE_UNIT = pattern(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
-_AFTER_DIGIT = pattern("(?<=[0-9]) ")
+_AFTER_DIGIT = pattern("[0-9] ")
 _QUANTITY = pattern(
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
@@ -62,12 +62,10 @@ def in_order(html: Markup) -> Markup:
 
 def joined(text: str) -> str:
     """The text with no line end between a number and its unit, nor inside the unit."""
-    if " " not in text:
-        return text
     parts: list[str] = []
     at = 0
     for space in _AFTER_DIGIT.finditer(text):
-        start = space.start()
+        start = space.start() + 1
         end = _units_end(text, start + 1) if start >= at else 0
         if end:
             parts += (text[at:start], text[start:end].replace(" ", "\u00a0"))

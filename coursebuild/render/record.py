@@ -1,18 +1,19 @@
 """A drawn page, ready for its frame, and what the rest of the site must know of it.
 
-Entry point: `record(draft, base_url)`.
+Entry point: `record(draft, article, base_url)`.
 """
 
 from __future__ import annotations
 
 from markupsafe import Markup
 
-from coursebuild.render import formulas, styles
-from coursebuild.render.characters import visible
+from coursebuild.render import fonts
 from coursebuild.render.draft import Draft
+from coursebuild.render.formulas import Woven
 from coursebuild.render.frame import parts_of
-from coursebuild.render.links import Reference, page_references, without_lines
-from coursebuild.render.shared import PageFacts, page_facts
+from coursebuild.render.links import Reference, references, without_lines
+from coursebuild.render.settling import settle_with
+from coursebuild.render.shared import PageFacts
 from coursebuild.values import dataclass, replace
 
 
@@ -44,21 +45,19 @@ class PageRecord:
         )
 
 
-def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
-    """The record of a page that was just drawn, and its body as it will be published."""
-    html = formulas.glue(str(draft.body))
-    plain = styles.is_plain(html)
-    html, declarations = styles.hoist(html, plain=plain)
-    facts = page_facts(replace(draft, body=Markup(html)), declarations)
-    body = visible(html)
-    ids, references = page_references(draft.path, body, base_url, plain=plain)
+def record(draft: Draft, article: str, base_url: str) -> tuple[PageRecord, str, Woven]:
+    """The record of a page that was just drawn, and its body as it will be published.
+
+    At last its document's part of that, which was drawn as `article`.
+    """
+    made, part = settle_with(str(draft.body), article)
     found = PageRecord(
         draft=replace(draft, body=Markup()),
-        parts=parts_of(body),
-        text="".join(sorted(facts.text)),
-        mathematics="".join(sorted(facts.mathematics)),
-        declarations=tuple(sorted(declarations)),
-        ids=tuple(sorted(without_lines(ids))),
-        references=tuple(sorted(references)),
+        parts=parts_of(made.html),
+        text="".join(sorted(made.text.union(draft.title) - fonts.BASE)),
+        mathematics="".join(sorted(made.mathematics)),
+        declarations=tuple(sorted(made.declarations)),
+        ids=tuple(sorted(without_lines(made.ids))),
+        references=tuple(sorted(references(draft.path, made.addresses, base_url))),
     )
-    return found, body
+    return found, made.html, part

@@ -1,7 +1,7 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
 Entry points: `page_facts(draft)` and `common_characters(library)`, by which they depend on the
-pages; `shared_files`, which makes them.
+pages; `shared_files`, which makes them, with `needed_fonts`.
 
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
 names and the styles that were written in single elements: a page that changes touches these files
@@ -55,12 +55,18 @@ A match goes on to the next of these, or to the end: no place is looked at twice
 
 def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
     """The facts of a settled page."""
-    parts = _FORMULA.split(draft.body)
-    text = _characters("".join(parts[::2])).union(draft.title)
+    text, mathematics = page_characters(draft.body)
+    return PageFacts(text.union(draft.title) - fonts.BASE, mathematics, declarations)
+
+
+def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
+    """The characters of a page's text, but most of those of ASCII, and those of its formulas."""
+    parts = _FORMULA.split(html)
+    text = _characters("".join(parts[::2]))
     mathematics = {c for c in _characters("\n".join(parts[1::2])) if not c.isascii()}
     if len(parts) > 1:
         mathematics.add(" ")
-    return PageFacts(frozenset(text - fonts.BASE), frozenset(mathematics), declarations)
+    return frozenset(text), frozenset(mathematics)
 
 
 def _characters(html: str) -> set[str]:
@@ -80,7 +86,7 @@ def common_characters(library: Library) -> frozenset[str]:
 
 
 def needed_fonts(assets: Assets, facts: PageFacts) -> tuple[fonts.FontJob, ...]:
-    """The fonts to cut for pages with these facts, taken together."""
+    """The fonts that pages with these facts, taken together, need, to be cut."""
     faces = fonts.read_faces(assets.file("fonts/fonts.json"))
     given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
     text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))

@@ -1,6 +1,7 @@
 """A page that is to be drawn, as a value: everything that it shows but the text of its document.
 
-Entry points: `Sheet`; `fingerprint(value)`, by which two of them are known to show the same.
+Entry points: `Sheet`; `sheet_bytes(value)`, by which two of them are known to show the same, and
+`fingerprint(value)`, a hash of these.
 
 A page is drawn from its sheet, its document, and the tool's templates and words, and from nothing
 else: so it need be drawn again only when one of these is another. What a sheet is made of are plain
@@ -14,14 +15,16 @@ import hashlib
 import io
 import pickle
 from collections.abc import Mapping
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from markupsafe import Markup
 
-from coursebuild.measured.bench import Machine, ScenarioReport
 from coursebuild.model import Comparison, Target
 from coursebuild.results import Outcome
 from coursebuild.values import dataclass, field
+
+if TYPE_CHECKING:
+    from coursebuild.measured.bench import Machine, ScenarioReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,10 +185,18 @@ class Sheet:
     shown: Shown | None = None
 
 
-def fingerprint(value: object) -> str:
-    """The same for equal values of the same types; the order of a mapping counts."""
+def sheet_bytes(value: object) -> bytes:
+    """The same for equal values of the same types; the order of a mapping counts.
+
+    `pickle` reads the value out of it.
+    """
     out = io.BytesIO()
     pickler = pickle.Pickler(out, 5)
     pickler.fast = True  # what is written depends on what is equal, not on what is one object
     pickler.dump(value)
-    return hashlib.sha256(out.getbuffer()).hexdigest()
+    return out.getvalue()
+
+
+def fingerprint(value: object) -> str:
+    """A hash of what `sheet_bytes` gives."""
+    return hashlib.sha256(sheet_bytes(value)).hexdigest()

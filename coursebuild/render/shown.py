@@ -31,10 +31,10 @@ from coursebuild.model import (
     document_blocks,
     local_file,
     resolve,
+    scenario_anchor,
     walk_inlines,
 )
 from coursebuild.render import urls
-from coursebuild.render.benches import shown_bench
 from coursebuild.render.characters import visible
 from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
@@ -101,7 +101,7 @@ class _Page:
             case Lab():
                 self._lab(block)
             case Bench():
-                self.benches[block.span.start] = shown_bench(self.library, self.place, block)
+                self.benches[block.span.start] = _shown_bench(self.library, self.place, block)
             case Quiz():
                 for question in block.questions:
                     if isinstance(question, OutputQuestion):
@@ -175,6 +175,26 @@ def _shown_lab(files: LabFiles) -> ShownLab:
             parity=result.parity,
         )
     return ShownLab(result.name, files.config, files.script, record)
+
+
+def _shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
+    """What the reports have for a block on a page."""
+    scene = library.reports.scenes.get(bench.model)
+    scenarios = () if scene is None else scene.scenarios
+    named = (one for one in scenarios if bench.scenario in (None, one.name))
+    report = next(named, None)
+    declared = {
+        one.name
+        for each in library.course.declarations
+        if each.model == bench.model
+        for one in each.scenarios
+    }
+    anchor = "measured"
+    if report is not None and report.name in declared:
+        anchor = scenario_anchor(report.name)
+    href = place.href(urls.model_page_path(bench.model), anchor)
+    machine = None if scene is None or report is None else scene.machine
+    return ShownBench(href, report, machine)
 
 
 def address(library: Library, place: urls.Place, path: str, target: Target) -> str:

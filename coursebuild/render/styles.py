@@ -83,6 +83,8 @@ def _hoist_plain(html: str) -> tuple[str, frozenset[str]]:
     style = html.find(' style="')
     while style >= 0:
         start, end = html.rfind("<", at, style), html.find(">", style)
+        if end < 0:  # what seems to be a tag has no end, nor does anything after it
+            break
         if start < 0 or html.find(">", start, style) >= 0:  # it stands in a text
             style = html.find(' style="', style + 1)
             continue

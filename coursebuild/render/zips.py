@@ -19,6 +19,7 @@ from coursebuild.model import Course, Lesson, Script
 from coursebuild.render import urls
 from coursebuild.render.library import Library, document_scripts, models_named, owners
 from coursebuild.results import OutputFile
+from coursebuild.source import Excerpt
 from coursebuild.values import dataclass
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
@@ -43,6 +44,14 @@ def imports(text: str) -> frozenset[str]:
     return imported(text)
 
 
+def _imports_of(code: Excerpt) -> frozenset[str]:
+    return imports(code.text)
+
+
+def _path(part: tuple[str, object]) -> str:
+    return part[0]
+
+
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """What scripts need around them, besides the course itself."""
@@ -55,6 +64,8 @@ class Surroundings:
     root."""
     imports: Callable[[str], frozenset[str]] = imports
     """What a Python text imports: whoever calls may know it already."""
+    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of
+    """What the code of a script imports, likewise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +74,24 @@ class Archive:
 
     path: str
     """Site path."""
-    files: Mapping[str, bytes]
+    parts: Mapping[str, bytes | Excerpt]
+    """What is in it by path: code, which may be away, or bytes."""
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What is in it, all as bytes."""
+        return {
+            path: part if isinstance(part, bytes) else part.text.encode()
+            for path, part in self.parts.items()
+        }
 
     @property
     def key(self) -> str:
         """A hash of all that is in it."""
         digest = hashlib.sha256()
-        for path, data in sorted(self.files.items()):
-            digest.update(f"{path}\0{len(data)}\0".encode() + data)
+        for path, part in sorted(self.parts.items(), key=_path):
+            own = hashlib.sha256(part).digest() if isinstance(part, bytes) else part.digest
+            digest.update(f"{path}\0".encode() + own)
         return digest.hexdigest()
 
     def packed(self) -> bytes:
@@ -145,6 +166,7 @@ def imported_modules(
     course: Course,
     library: Iterable[OutputFile] = (),
     imports: Callable[[str], frozenset[str]] = imports,
+    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of,
 ) -> tuple[str, ...]:
     """Top-level modules of others that the scripts, and the package they come with, import."""
     documents = (owner.document for owner in owners(course))
@@ -155,7 +177,7 @@ def imported_modules(
         for script in document_scripts(document)
     ]
     own = {_module(script.path) for script in scripts} | {"mjcourse"}
-    found = {name for script in scripts for name in imports(script.code.text)}
+    found = {name for script in scripts for name in imports_of(script.code)}
     texts = (file.data.decode() for file in library if file.path.endswith(".py"))
     found |= {name for text in texts for name in imports(text)}
     return tuple(sorted(found - own - sys.stdlib_module_names))
@@ -178,7 +200,7 @@ def _with_siblings(
         script = waiting.pop()
         if script.path not in found:
             found[script.path] = script
-            named = around.imports(script.code.text)
+            named = around.imports_of(script.code)
             waiting += [by_module[name] for name in named if name in by_module]
     return tuple(found[path] for path in sorted(found))
 
@@ -189,13 +211,13 @@ def _files(
     scripts: tuple[Script, ...],
     folder: str,
     own: Mapping[str, Script],
-) -> dict[str, bytes]:
+) -> dict[str, bytes | Excerpt]:
     """What is in an archive of one folder.
 
     `mjcourse` lies beside the scripts, where Python looks first.
     """
-    files: dict[str, bytes] = {script.path: script.code.text.encode() for script in scripts}
-    modules = [around.imports(script.code.text) for script in scripts]
+    files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
+    modules = [around.imports_of(script.code) for script in scripts]
     if any("mjcourse" in names for names in modules):
         files |= {f"examples/{file.path}": file.data for file in around.library}
         modules += [
@@ -241,8 +263,10 @@ def _requirements(
     """One line for each package that is imported, with its exact version where it is known."""
     known = {package.module: f"{package.name}=={package.version}" for package in packages}
     known.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    used = {name for names in modules for name in names} - own.keys() - _NEVER_REQUIRED
-    return "".join(f"{line}\n" for line in sorted(known.get(name, name) for name in used)).encode()
+    named = {name for names in modules for name in names} - _NEVER_REQUIRED
+    # To subtract the keys would look at every script of the course.
+    used = (known.get(name, name) for name in named if name not in own)
+    return "".join(f"{line}\n" for line in sorted(used)).encode()
 
 
 def _slug(title: str) -> str:

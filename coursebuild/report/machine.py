@@ -31,66 +31,68 @@ def _place(span: Span | None) -> dict[str, Any]:
 
 
 def to_json(report: Report) -> str:
-    """The report as one JSON object: `diagnostics`, `scripts`, `summary`."""
-    diagnostics = [
-        {
-            "rule": d.rule,
-            "severity": d.severity.value,
-            **_place(d.span),
-            "message": d.message,
-            "label": d.label,
-            "help": d.help,
-            "notes": [{"message": note.message, **_place(note.span)} for note in d.notes],
-        }
-        for d in report.diagnostics
-    ]
-    scripts = [
-        {
-            "path": s.path,
-            "lesson": s.lesson,
-            "status": s.status,
-            "seconds": round(s.seconds, 3),
-            "cached": s.cached,
-        }
-        for s in report.scripts
-    ]
-    labs = [
-        {
-            "name": lab.name,
-            "title": lab.title,
-            "lesson": lab.lesson,
-            "status": lab.status,
-            "seconds": round(lab.seconds, 3),
-            "steps_per_second": lab.steps_per_second,
-            "tried": lab.tried,
-            "parity": lab.parity,
-            "cached": lab.cached,
-            "no_python_export": lab.unexported,
-        }
-        for lab in report.labs
-    ]
+    """The report as one JSON object: `diagnostics`, `scripts`, `labs`, `summary`.
+
+    Of the scripts, `ran` were run just now and `cached` have a remembered result.
+    """
     s = report.summary
-    summary = {
-        "ok": report.ok,
-        "lessons": s.lessons,
-        "scripts": s.scripts,
-        "ran": s.ran,
-        "cached": s.cached,
-        "skipped": s.skipped,
-        "errors": s.errors,
-        "warnings": s.warnings,
-        "silenced": s.silenced,
-        "seconds": round(s.seconds, 3),
-    }
     value: dict[str, Any] = {
-        "diagnostics": diagnostics,
-        "scripts": scripts,
-        "labs": labs,
-        "summary": summary,
+        "diagnostics": [_diagnostic_value(d) for d in report.diagnostics],
+        "scripts": [_script_value(line) for line in report.scripts],
+        "labs": [_lab_value(line) for line in report.labs],
+        "summary": {
+            "ok": report.ok,
+            "lessons": s.lessons,
+            "scripts": s.scripts,
+            "ran": s.ran - s.cached,
+            "cached": s.cached,
+            "skipped": s.skipped,
+            "errors": s.errors,
+            "warnings": s.warnings,
+            "silenced": s.silenced,
+            "seconds": round(s.seconds, 3),
+        },
     }
     if report.sensitivity is not None:
         value["sensitivity"] = sensitivity_value(report.sensitivity)
     return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+
+
+def _diagnostic_value(d: Diagnostic) -> dict[str, Any]:
+    return {
+        "rule": d.rule,
+        "severity": d.severity.value,
+        **_place(d.span),
+        "message": d.message,
+        "label": d.label,
+        "help": d.help,
+        "notes": [{"message": note.message, **_place(note.span)} for note in d.notes],
+    }
+
+
+def _script_value(line: ScriptLine) -> dict[str, Any]:
+    return {
+        "path": line.path,
+        "lesson": line.lesson,
+        "status": line.status,
+        "seconds": round(line.seconds, 3),
+        "cached": line.cached,
+    }
+
+
+def _lab_value(line: LabLine) -> dict[str, Any]:
+    return {
+        "name": line.name,
+        "title": line.title,
+        "lesson": line.lesson,
+        "status": line.status,
+        "seconds": round(line.seconds, 3),
+        "steps_per_second": line.steps_per_second,
+        "tried": line.tried,
+        "parity": line.parity,
+        "cached": line.cached,
+        "no_python_export": line.unexported,
+    }
 
 
 # --- JUnit

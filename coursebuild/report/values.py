@@ -57,6 +57,7 @@ class Summary:
     lessons: int
     scripts: int
     ran: int
+    """Scripts with a result, of now or of before."""
     skipped: int
     errors: int
     warnings: int

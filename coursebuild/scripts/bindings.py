@@ -156,7 +156,9 @@ def _leans_on(binding: NumberBinding, printed: Printed) -> str:
             parts += [recording.prefix, recording.body_span.text]
         else:
             parts.append(body.text)
-        parts += [repr(verdict.comparison), str(isinstance(body, Table)), verdict.status]
+        how = verdict.comparison
+        parts += [how.mode.value, str(how.rtol), str(how.atol), str(how.ellipsis)]
+        parts += [str(isinstance(body, Table)), verdict.status]
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -221,7 +223,7 @@ def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
     shown = Shown.of(binding.text)
     if not shown.numbers:
         return bool(shown.before) and any(True for _ in text_places(shown.before, lines))
-    return any(shown.shows(window) for window in shown.windows(lines))
+    return shown.is_in(lines)
 
 
 def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:

@@ -11,10 +11,11 @@ Entry points: `group_key`, `needs`, `input_changes`, `state_changes`, `forgotten
 from __future__ import annotations
 
 import enum
+import functools
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import assert_never
 
 from coursebuild.patterns import pattern
@@ -53,6 +54,8 @@ class Kind(enum.Enum):
     """An installed one, by its name; its state is which versions of what provide it."""
     PLACE = "place"
     """Where something lies on this machine, for a script that printed it."""
+
+    __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -94,7 +97,11 @@ class Inputs:
 
 def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
     """What is known of a job whose file holds this text."""
-    digest = hashlib.sha256(text).hexdigest()
+    return inputs_by(job, hashlib.sha256(text).hexdigest(), around)
+
+
+def inputs_by(job: ScriptJob, digest: str, around: tuple[tuple[str, str], ...]) -> Inputs:
+    """The same by the SHA-256 of the file, in hexadecimal digits."""
     if job.perturbation:
         around = tuple(sorted((*around, (_PERTURBATION, str(job.perturbation)))))
     return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
@@ -149,22 +156,25 @@ def needs(
     return tuple(sorted(found, key=lambda need: (need.kind.value, need.name)))
 
 
-def folded(needed: Iterable[Need], state: Callable[[Need], str]) -> tuple[Need, ...]:
+def folded(needed: Sequence[Need], state: Callable[[Need], str]) -> tuple[Need, ...]:
     """The same needs, sorted, with modules that were looked for in vain as one for each folder.
 
     An import of `json` looks for `json.py` and `json/__init__.py` beside the script, and so do all
     the imports that this one makes: hundreds of files that are not there.
     """
-    rest = set(needed)
+    files = {need.name: need for need in needed if need.kind is Kind.FILE}
+    rest = {need for need in needed if need.kind is not Kind.FILE}
     modules: dict[str, list[str]] = {}
-    for need in list(rest):
-        package = need.name.removesuffix(".py")
-        pair = {need, Need(Kind.FILE, f"{package}/__init__.py")}
+    vain: set[str] = set()
+    for name in sorted(files):  # a module comes before what would be in it as a package
+        package = name.removesuffix(".py")
+        pair = name, f"{package}/__init__.py"
         folder, _, module = package.rpartition("/")
-        is_module = need.kind is Kind.FILE and need.name != package and module.isidentifier()
-        if is_module and pair <= rest and all(state(one) == ABSENT for one in pair):
+        is_module = package != name and pair[1] in files and module.isidentifier()
+        if is_module and name not in vain and all(state(files[one]) == ABSENT for one in pair):
             modules.setdefault(folder, []).append(module)
-            rest -= pair
+            vain.update(pair)
+    rest.update(need for name, need in files.items() if name not in vain)
     for folder, names in modules.items():
         rest.add(Need(Kind.SOUGHT, f"{folder}/{{{','.join(sorted(names))}}}"))
     return tuple(sorted(rest, key=lambda need: (need.kind.value, need.name)))
@@ -176,10 +186,12 @@ def sought(name: str) -> tuple[str, tuple[str, ...]]:
     return folder, tuple(modules.removesuffix("}").split(","))
 
 
+@functools.lru_cache(maxsize=64)
 def sought_files(name: str) -> tuple[str, ...]:
     """The files that were looked for, of a need of the kind `SOUGHT`."""
     folder, modules = sought(name)
-    return tuple(f"{folder}/{module}{end}" for module in modules for end in (".py", "/__init__.py"))
+    before = f"{folder}/" if folder else ""  # the project's own folder has no name
+    return tuple(f"{before}{module}{end}" for module in modules for end in (".py", "/__init__.py"))
 
 
 def _modules(trace: Trace, requires: Iterable[str]) -> Iterator[str]:

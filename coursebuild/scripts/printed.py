@@ -5,6 +5,7 @@ Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of
 
 from __future__ import annotations
 
+import functools
 from bisect import bisect_right
 from collections.abc import Callable
 
@@ -23,14 +24,23 @@ class PrintedLine:
     """A line of output, or a row of a recorded table with its cells joined."""
 
     text: str
-    numbers: tuple[Number, ...]
     locate: Locate | None
     """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
+
+    @property
+    def numbers(self) -> tuple[Number, ...]:
+        """Its numbers: of most lines nobody asks for them."""
+        return _numbers(self.text)
+
+
+@functools.lru_cache(maxsize=512)
+def _numbers(text: str) -> tuple[Number, ...]:
+    return scan(text)
 
 
 def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
     """The lines of an output that is not recorded."""
-    return tuple(PrintedLine(text, scan(text), None) for text in Side.of(stdout).texts)
+    return tuple(PrintedLine(text, None) for text in Side.of(stdout).texts)
 
 
 def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
@@ -39,7 +49,7 @@ def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
         return tuple(_row_line(row) for row in table_rows(recording.body) if row)
     side = Side.of(recording.body.text)
     return tuple(
-        PrintedLine(line.text, scan(line.text), _in_fence(recording.body, side, index))
+        PrintedLine(line.text, _in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)
     )
 
@@ -63,4 +73,4 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
         _, high = row[last].traced.origin(0, min(end - starts[last], len(row[last].traced.text)))
         return Span(row[first].cell.span.source, low, max(low, high))
 
-    return PrintedLine(text, scan(text), locate)
+    return PrintedLine(text, locate)

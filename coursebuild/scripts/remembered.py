@@ -44,6 +44,11 @@ class Record:
 
     def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
         """The run as if it had been made here; see `to_bytes` for the places."""
+        names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
+        for one in self.dependencies:
+            names[one.kind].append(one.name)
+        for name in names[Kind.SOUGHT]:
+            names[Kind.FILE] += sought_files(name)
         return ScriptRun(
             self.inputs.path,
             self.outcome,
@@ -53,25 +58,16 @@ class Record:
             self.seconds,
             cached=True,
             trace=Trace(
-                files=self._files(),
-                folders=self._names(Kind.LISTING),
-                outside=self._names(Kind.OUTSIDE),
-                modules=self._names(Kind.MODULE),
+                files=tuple(sorted(names[Kind.FILE])),
+                folders=tuple(sorted(names[Kind.LISTING])),
+                outside=tuple(sorted(names[Kind.OUTSIDE])),
+                modules=tuple(sorted(names[Kind.MODULE])),
                 opaque="",
                 divergences=self.divergences,
                 moved=self.moved,
                 states=self.states,
             ),
         )
-
-    def _files(self) -> tuple[str, ...]:
-        found = list(self._names(Kind.FILE))
-        for name in self._names(Kind.SOUGHT):
-            found += sought_files(name)
-        return tuple(sorted(found))
-
-    def _names(self, kind: Kind) -> tuple[str, ...]:
-        return tuple(sorted(d.name for d in self.dependencies if d.kind is kind))
 
 
 def to_bytes(record: Record, places: Iterable[tuple[str, str]]) -> bytes:
@@ -165,6 +161,6 @@ def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:
 
 
 def _put_in(text: str, places: Iterable[tuple[str, str]]) -> str:
-    for name, folder in places:
+    for name, folder in places if _MARK in text else ():
         text = text.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
     return text

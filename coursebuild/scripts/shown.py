@@ -6,7 +6,7 @@ Entry points: `Shown.of`, `shows`, `text_places`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from coursebuild.scripts.celltext import plain
 from coursebuild.scripts.numbers import (
@@ -77,14 +77,23 @@ class Shown:
             at = number.end
         return "".join((*parts, text[at:]))
 
+    def is_in(self, lines: Sequence[PrintedLine]) -> bool:
+        """Whether printed numbers that may be meant are those shown, rounded."""
+        if self.before or self.after:
+            return any(map(self.shows, self.windows(lines)))
+        # Any number may be meant. Most stand in a line as they are shown, which comes first here.
+        first = self.numbers[0].text
+        likeliest = sorted(lines, key=lambda line: first not in line.text)
+        return any(self.shows(window) for line in likeliest for window in self._in(line))
+
+    def _in(self, line: PrintedLine) -> Iterator[Window]:
+        count, numbers = len(self.numbers), line.numbers
+        for first in range(len(numbers) - count + 1):
+            yield Window(line, numbers[first : first + count])
+
     def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
         """The printed numbers that may be meant, by number and by the text around them."""
-        count = len(self.numbers)
-        windows = [
-            Window(line, line.numbers[first : first + count])
-            for line in lines
-            for first in range(len(line.numbers) - count + 1)
-        ]
+        windows = [window for line in lines for window in self._in(line)]
         for pattern, side in ((self.after, _followed), (self.before, _preceded)):
             if pattern:
                 windows = [w for w in windows if side(w, pattern)] or windows

@@ -106,7 +106,20 @@ def _located_reference(state: StateBlock, start: int, end: int, silent: bool) ->
     return True
 
 
-_ANY: tuple[BlockRule, ...] = (lheading, paragraph)
+def _paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """markdown-it's rule; most paragraphs are one line, whose end need not be looked for."""
+    below = start + 1
+    if below < state.lineMax and not state.isEmpty(below):
+        return paragraph(state, start, end, silent)
+    state.getLines(start, below, state.blkIndent, False)
+    state.line = below
+    state.push("paragraph_open", "p", 1).map = [start, below]
+    state.push("inline", "", 0)
+    state.push("paragraph_close", "p", -1)
+    return True
+
+
+_ANY: tuple[BlockRule, ...] = (lheading, _paragraph)
 _MARKER = "*-_+0123456789"
 _STARTS: dict[str, tuple[BlockRule, ...]] = {
     ">": (blockquote,),
@@ -184,9 +197,11 @@ class Blocks(ParserBlock):
             self._block(state, line, endLine)
             state.tight = not seen_empty
             line = state.line
-            if line - 1 < endLine and state.isEmpty(line - 1):
+            starts, shifts, ends = state.bMarks, state.tShift, state.eMarks
+            last = line - 1
+            if last < endLine and starts[last] + shifts[last] >= ends[last]:
                 seen_empty = True
-            if line < endLine and state.isEmpty(line):
+            if line < endLine and starts[line] + shifts[line] >= ends[line]:
                 seen_empty = True
                 line += 1
                 state.line = line
@@ -195,7 +210,7 @@ class Blocks(ParserBlock):
         before = len(state.tokens)
         begin = state.bMarks[line] + state.tShift[line]
         if state.level >= MAX_NESTING:
-            paragraph(state, line, end, False)
+            _paragraph(state, line, end, False)
         elif state.is_code_block(line):
             code(state, line, end, False)
         elif not (_table_may_start(state, line, end) and table(state, line, end, False)):

@@ -13,7 +13,7 @@ from markdown_it.common.utils import unescapeAll
 from coursebuild.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
-from coursebuild.syntax.info import kind_of, parse_info
+from coursebuild.syntax.info import first_word, kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
 from coursebuild.values import dataclass
 
@@ -49,7 +49,7 @@ class Fence:
     @property
     def kind(self) -> str:
         """The first word of the info string."""
-        return kind_of(self.info).text
+        return first_word(self.info.text)
 
     def code(self) -> CodeBlock:
         """It as a code block of no special kind."""
@@ -77,6 +77,8 @@ def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
 
 def _inner(body: Excerpt, marks: str) -> Span | None:
     """The first line that would begin a fence of these marks, were it not inside one."""
+    if marks not in body.text:
+        return None
     opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
     found = opening.search(body.text)
     return None if found is None else body.span(found.start(1), found.end(1))
@@ -89,7 +91,8 @@ def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
     start = _line_start(source, first + 1)
     end = _line_start(source, last if closed else last + 1)
     prefix = source.text[_line_start(source, first) : head.start]
-    prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
+    if prefix:
+        prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
     return Span(source, start, max(start, end)), prefix + " " if prefix.endswith(">") else prefix
 
 

@@ -39,7 +39,7 @@ class Attributes:
 
 def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     """Split a heading's content into its text and its attributes."""
-    found = _CANDIDATE.search(content.text)
+    found = _CANDIDATE.search(content.text) if "{" in content.text else None
     if found is None:
         return Parsed(Attributes(content))
     start = found.start()

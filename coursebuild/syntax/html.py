@@ -96,7 +96,9 @@ class Balance:
 
     def leave(self) -> None:
         """End it."""
-        self._unwind(self._scopes.pop())
+        base = self._scopes.pop()
+        if len(self._open) > base:
+            self._unwind(base)
 
     def finish(self) -> None:
         """The text is over."""

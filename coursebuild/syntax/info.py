@@ -52,11 +52,17 @@ class Info:
     words: tuple[Word, ...]
 
 
+def first_word(info: str) -> str:
+    """The first word of a text; empty where there is none."""
+    words = info.split(None, 1)
+    return words[0] if words else ""
+
+
 def kind_of(info: Excerpt) -> Excerpt:
     """The first word of an info string."""
-    found = re.compile(r"\s*(\S*)").match(info.text)
-    assert found is not None
-    return info.slice(found.start(1), found.end(1))
+    word, text = first_word(info.text), info.text
+    start = len(text) - len(text.lstrip())
+    return info.slice(start, start + len(word))
 
 
 def parse_info(info: Excerpt) -> Parsed[Info]:

@@ -139,12 +139,15 @@ def _link(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
-_STOP = pattern(r"[\n\\`*_~\[\]<&$]|!\[")
+_STOP = pattern(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
+"""A `!` is nothing without a bracket. One set of characters at the beginning is searched for many
+times as fast as several choices."""
 
 
-def may_be_marked(text: str) -> bool:
-    """Whether a text may be more than one token."""
-    return _STOP.search(text) is not None
+def next_mark(text: str, at: int) -> int:
+    """Where the first character from `at` on stands that may be more than text; -1 for none."""
+    found = _STOP.search(text, at)
+    return -1 if found is None else found.start()
 
 
 _INLINE: dict[str, tuple[InlineRule, ...]] = {
@@ -163,41 +166,36 @@ _INLINE: dict[str, tuple[InlineRule, ...]] = {
 }
 
 
-def _matches(state: InlineState, char: str) -> bool:
-    """Let the rules of a character make their token."""
-    for rule in _INLINE[char]:  # noqa: SIM110 (any() with a generator takes twice the time)
-        if rule(state, False):
-            return True
-    return False
-
-
 class Inlines(ParserInline):
     """The inline parser."""
 
     def tokenize(self, state: StateInline) -> None:
         """Add the tokens up to `state.posMax`; links call it again for their text."""
         assert isinstance(state, InlineState)
-        src, end = state.src, state.posMax
+        src, end, tokens = state.src, state.posMax, state.tokens
         state.mark = state.pos
-        while state.pos < end:
-            stop = _STOP.search(src, state.pos, end)
+        while (pos := state.pos) < end:
+            stop = _STOP.search(src, pos, end)
             if stop is None:
-                state.append_pending(src[state.pos : end])
+                state.append_pending(src[pos:end])
                 state.pos = end
                 break
             at = stop.start()
-            if at > state.pos:
-                state.append_pending(src[state.pos : at])
+            if at > pos:
+                state.append_pending(src[pos:at])
                 state.pos = at
-            before = len(state.tokens)
-            if state.level < MAX_NESTING and _matches(state, src[at]):
-                if len(state.tokens) > before:
-                    _place_inline(state, before, at)
+            before = len(tokens)
+            for rule in _INLINE[src[at]] if state.level < MAX_NESTING else ():
+                if rule(state, False):
+                    if len(tokens) > before:
+                        _place_inline(state, before, at)
+                    break
             else:
                 state.append_pending(src[at])
                 state.pos = at + 1
-        if state.pending:
-            state.pushPending()
+        text = state.pending
+        if text:
+            state.push_text(text)
 
     def skipToken(self, state: StateInline) -> None:  # noqa: N802
         """Move past one token without making it."""
@@ -230,9 +228,10 @@ class Inlines(ParserInline):
         """Add the tokens of a whole text."""
         state = InlineState(src, md, env)
         self.tokenize(state)
-        for rule in self.ruler2.getRules(""):
-            rule(state)
-        _order_lone_tildes(state.tokens)
+        if state.delimiters or any(state.tokens_meta):  # there are marks to be paired
+            for rule in self.ruler2.getRules(""):
+                rule(state)
+            _order_lone_tildes(state.tokens)
         tokens.extend(state.tokens)
         return tokens
 

@@ -1,7 +1,7 @@
 """Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
 
-Entry point: `InlineReader.read`. One pass over the flat tokens with a stack of open emphasis,
-strong, strikethrough, links and terms:
+Entry point: `InlineReader.read`. What `simple` can read has no tokens; of all else there is one
+pass over the flat tokens, with a stack of open emphasis, strong, strikethrough, links and terms:
 
 1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
    and mentions (`mention`).
@@ -17,6 +17,7 @@ import re
 
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
+from markdown_it.utils import EnvType
 
 from coursebuild.diagnostics import diagnose
 from coursebuild.model import (
@@ -42,10 +43,10 @@ from coursebuild.syntax.attributes import Braces, folded, read_label, read_meani
 from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.headings import term_id
 from coursebuild.syntax.html import Balance, tags
-from coursebuild.syntax.inline_parser import may_be_marked
 from coursebuild.syntax.markdown import definition_label, inline_tokens
 from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
 from coursebuild.syntax.session import Session
+from coursebuild.syntax.simple import simple_inlines
 from coursebuild.syntax.spans import Placed, Placer, locate
 from coursebuild.syntax.targets import check_scheme, classify
 from coursebuild.syntax.unread_math import unread_formula
@@ -82,7 +83,8 @@ class InlineReader:
     ) -> None:
         self.base = base
         self.definitions = definitions
-        self.environment = definitions.environment()
+        self.environment: EnvType | None = None
+        """What markdown-it knows of the link definitions, once it was asked for."""
         self.notes = session.notes
         self.anchors = session.anchors
         self.balance = balance
@@ -90,14 +92,14 @@ class InlineReader:
 
     def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
         """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
-        text = content.text
-        if may_be_marked(text):
-            return _Pass(self, content, mentions).read()
-        if not text:
-            return ()
-        if mentions and may_mention(text):
-            return tuple(with_mentions([Item(text, 0, len(text))], Placer(content)))
-        return (Text(content.span(), text),)
+        found = simple_inlines(content, mentions=mentions)
+        return _Pass(self, content, mentions).read() if found is None else found
+
+    def tokens(self, text: str) -> list[Placed]:
+        """The inline tokens of a block's content."""
+        if self.environment is None:
+            self.environment = self.definitions.environment()
+        return inline_tokens(text, self.environment)
 
 
 class _Pass:
@@ -115,14 +117,15 @@ class _Pass:
 
     def read(self) -> tuple[Inline, ...]:
         self.reader.balance.enter()
-        for token in inline_tokens(self.content.text, self.reader.environment):
+        for token in self.reader.tokens(self.content.text):
             kind = token.type
             if kind == "text" or kind == "text_special":
-                if token.content:
-                    literal = kind == "text" or token.content == token.markup
-                    self.run.append(Item(token.content, token.start, token.end, literal))
+                text = token.content
+                if text:
+                    literal = kind == "text" or text == token.markup
+                    self.run.append(Item(text, token.start, token.end, literal))
                     if literal:
-                        self.texts.append((token.start, token.content))
+                        self.texts.append((token.start, text))
             elif kind == "softbreak":
                 self.run.append(Item("\n", token.start, token.end, False))
             elif kind == "math_unclosed":
@@ -266,16 +269,17 @@ class _Pass:
     # -- leaves
 
     def _leaf(self, token: Placed) -> None:
-        self._flush()
+        if self.run:
+            self._flush()
         span = self.placer.span(token.start, token.end)
         node: Inline | None = None
         match token.type:
+            case "math":
+                node = self._math(token, span)
             case "code_inline":
                 node = CodeSpan(span, token.content)
             case "number_binding" | "number_unbound":
                 node = self._number(token, span)
-            case "math":
-                node = self._math(token, span)
             case "html_inline":
                 node = self._html(token, span)
             case "image":

@@ -40,6 +40,10 @@ interpreter's stack."""
 
 _SPACE = pattern(r"[ \t\n\r]*")
 _NUMBER = pattern(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?(?![\w.+-])")
+_PLAIN_KEY = pattern(r'"([^"\\\x00-\x1f\ud800-\udfff]*)"[ \t\n\r]*:[ \t\n\r]*(?=["{\[\-0-9tfn])')
+"""A key with its colon, in which nothing is unusual; a value follows."""
+_PLAIN_NEXT = pattern(r'[ \t\n\r]*(?:,[ \t\n\r]*(?=["{\[\-0-9tfn])|([\]}]))')
+"""What stands between two values or after the last one, where nothing is unusual."""
 _NUMBER_LIKE = pattern(r"[-+.\w]+")
 _WORD = pattern(r"[^\W\d][\w$]*")
 _KEY = pattern(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
@@ -154,18 +158,27 @@ class _Reader:
         here = self.skip(at + 1)
         done = text[here : here + 1] == "}"
         while not done:
-            if text[here : here + 1] != '"':
-                self.expected("a key in double quotes", here, opened=at)
-            key = self.string(here)
+            key, place = self.key(here, at)
             first = known.setdefault(key.value, key)
             if first is not key:
                 notes = (Note("the first one is here", first.span),)
                 message = f"`{short(key.value)}` is given twice"
                 self.fault(key.start, key.end, message, rule="field-repeated", notes=notes)
-            value = self.value(self.colon(key), depth + 1)
+            value = self.value(self.colon(key) if place is None else place, depth + 1)
             members.append(Member(key, value))
             here, done = self.separator(value.end, at, "}")
         return ObjectNode(self.body, at, here + 1, at, at + 1, tuple(members))
+
+    def key(self, here: int, opened: int) -> tuple[StringNode, int | None]:
+        """The key at a place, and the place of its value where nothing is unusual before that."""
+        text = self.body.text
+        plain = _PLAIN_KEY.match(text, here)
+        if plain is not None:
+            node = StringNode(self.body, here, plain.end(1) + 1, plain[1], ((0, here + 1),))
+            return node, plain.end()
+        if text[here : here + 1] != '"':
+            self.expected("a key in double quotes", here, opened=opened)
+        return self.string(here), None
 
     def array(self, at: int, depth: int) -> ArrayNode:
         items: list[Node] = []
@@ -193,6 +206,9 @@ class _Reader:
     def separator(self, end: int, opened: int, closer: str) -> tuple[int, bool]:
         """After a value: the place of the next one, or that of the closing bracket and `True`."""
         text = self.body.text
+        plain = _PLAIN_NEXT.match(text, end)
+        if plain is not None and (plain[1] is None or plain[1] == closer):
+            return (plain.end(), False) if plain[1] is None else (plain.start(1), True)
         here = self.skip(end)
         char = text[here : here + 1]
         if char == closer:

@@ -203,11 +203,9 @@ def _control(node: ObjectNode, fields: Struct) -> LabControl:
                 step=f.step,
                 value=f.value,
                 digits=f.digits,
-                options=(),
                 set=f.set,
                 apply=f.apply,
                 param=f.param,
-                run=None,
                 init=f.init,
                 reset=f.reset,
             )
@@ -217,38 +215,16 @@ def _control(node: ObjectNode, fields: Struct) -> LabControl:
                 kind="select",
                 label=f.label,
                 unit=f.unit,
-                minimum=None,
-                maximum=None,
-                step=None,
                 value=f.options[0][1] if f.value is None else f.value,
-                digits=None,
                 options=f.options,
                 set=f.set,
                 apply=f.apply,
                 param=f.param,
-                run=None,
                 init=f.init,
                 reset=f.reset,
             )
         case Button() as f:
-            return LabControl(
-                span=node.span,
-                kind="button",
-                label=f.label,
-                unit="",
-                minimum=None,
-                maximum=None,
-                step=None,
-                value=None,
-                digits=None,
-                options=(),
-                set=None,
-                apply=None,
-                param=None,
-                run=f.run,
-                init=False,
-                reset=False,
-            )
+            return LabControl(span=node.span, kind="button", label=f.label, run=f.run)
         case _:
             raise AssertionError(f"{fields} is no control")
 

@@ -38,7 +38,9 @@ def block_tokens(base: Excerpt, definitions: Definitions) -> list[Placed]:
     Its link definitions are added to `definitions`.
     """
     env: EnvType = {**definitions.environment(), "definitions": definitions, "base": base}
-    state = BlockState(base.text, _MARKDOWN, env)
+    # Whoever asks for a line of a file needs these as well.
+    known = base.source.line_starts if base.text is base.source.text else None
+    state = BlockState(base.text, _MARKDOWN, env, known)
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
     return cast(list[Placed], state.tokens)
 

@@ -21,13 +21,13 @@ from coursebuild.patterns import pattern
 from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.spans import BlockState, InlineState, Placed
 
-_STOP = pattern(r"\\[\s\S]|`+|\$+")
-_BLOCK_STOP = pattern(r"\\[\s\S]|\$+")
+_TEX = pattern(r"(?:[^\\`$]++|\\[\s\S])*+")
+_BLOCK_TEX = pattern(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
 _BACKTICKS = pattern(r"`+")
 _DOLLARS = pattern(r"\$+")
 _LABEL = pattern(r"\{#[^{}$]*\}?")
 _SPACE = " \t\n"
-_DIGITS = "0123456789"
+_DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
 class Formula(NamedTuple):
@@ -51,22 +51,24 @@ def find_formula(
     start = at + width
     if start >= limit or (width == 1 and text[start] in _SPACE):
         return None
-    for stop in _STOP.finditer(text, start, limit):
-        mark = stop[0]
-        if mark[0] == "\\":
-            continue
-        if mark[0] == "`":
-            if last_runs is not None and last_runs.get(len(mark), -1) > stop.start():
+    end = start
+    while True:
+        end = _TEX.match(text, end, limit).end()  # type: ignore[union-attr]  # it matches nothing too
+        if text.startswith("`", end, limit):
+            run = _BACKTICKS.match(text, end, limit)
+            assert run is not None
+            if last_runs is not None and last_runs.get(len(run[0]), -1) > end:
                 return None
-        elif width == 2:
-            if len(mark) >= 2:
-                return Formula(start, stop.start(), stop.start() + 2, True)
-        else:
-            end = stop.start()
-            after = text[end + 1] if end + 1 < len(text) else ""
-            closes = text[end - 1] not in _SPACE and not (after and after in _DIGITS)
+            end = run.end()
+        elif not text.startswith("$", end, limit):  # a backslash may stand before the limit
+            return None
+        elif width == 1:
+            closes = text[end - 1] not in _SPACE and text[end + 1 : end + 2] not in _DIGITS
             return Formula(start, end, end + 1, False) if closes else None
-    return None
+        elif text.startswith("$$", end, limit):
+            return Formula(start, end, end + 2, True)
+        else:
+            end += 1
 
 
 def math_inline(state: StateInline, silent: bool) -> bool:
@@ -84,7 +86,8 @@ def math_inline(state: StateInline, silent: bool) -> bool:
         state.pos = run.end()
         return True
     if state.last_runs is None:
-        state.last_runs = {len(m[0]): m.start() for m in _BACKTICKS.finditer(state.src)}
+        runs = _BACKTICKS.finditer(state.src) if "`" in state.src else ()
+        state.last_runs = {len(m[0]): m.start() for m in runs}
     formula = find_formula(state.src, at, state.posMax, state.last_runs)
     if formula is None:
         if len(run[0]) == 2:
@@ -145,7 +148,7 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
 
 def _closing(src: str, at: int, end: int) -> int | None:
     """Where the first `$$` between two offsets stands that no backslash escapes."""
-    for stop in _BLOCK_STOP.finditer(src, at, end):
-        if stop[0][0] == "$" and len(stop[0]) >= 2:
-            return stop.start()
-    return None
+    if src.find("$$", at, end) < 0:
+        return None
+    found = _BLOCK_TEX.match(src, at, end).end()  # type: ignore[union-attr]  # it matches nothing too
+    return found if src.startswith("$$", found, end) else None

@@ -11,7 +11,6 @@ Entry points: `Item` (a stretch of text between other inlines), `may_mention`, `
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
@@ -26,8 +25,8 @@ _LEVEL = r"[0-9]+(?:\.[0-9]+)*"
 _FIRST = pattern(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
 _BETWEEN = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
 _NEXT = {
-    "Lessons": re.compile(rf"{_BETWEEN}({_LESSON})(?!\w)"),
-    "Levels": re.compile(rf"{_BETWEEN}({_LEVEL})(?!\w)"),
+    "Lessons": pattern(rf"{_BETWEEN}({_LESSON})(?!\w)"),
+    "Levels": pattern(rf"{_BETWEEN}({_LEVEL})(?!\w)"),
 }
 
 

@@ -53,11 +53,14 @@ class StringNode(_Placed):
     @property
     def excerpt(self) -> Excerpt:
         """The value, each character with its place in the source: an escape's is its backslash."""
+        inner, offset = self.body.pieces, self.body.offset
+        if len(inner) == 1:  # nearly always
+            places = tuple([(at, offset(place)) for at, place in self.runs])
+            return Excerpt(self.body.source, self.value, places)
         pieces: list[tuple[int, int]] = []
-        inner = self.body.pieces
         stops = [*(at for at, _ in self.runs[1:]), len(self.value)]
         for (at, place), stop in zip(self.runs, stops, strict=True):
-            pieces.append((at, self.body.offset(place)))
+            pieces.append((at, offset(place)))
             i = bisect_right(inner, place, key=lambda piece: piece[0])
             while i < len(inner) and inner[i][0] < place + (stop - at):
                 pieces.append((at + inner[i][0] - place, inner[i][1]))
@@ -126,7 +129,10 @@ class ObjectNode(_Placed):
 
     def member(self, name: str) -> Member | None:
         """The first member of that name."""
-        return next((m for m in self.members if m.key.value == name), None)
+        for member in self.members:
+            if member.key.value == name:
+                return member
+        return None
 
     def get(self, name: str) -> Node | None:
         """The value of the first member of that name."""

@@ -9,13 +9,11 @@ from __future__ import annotations
 import re
 import shlex
 import sys
-import warnings
-from functools import lru_cache
-from typing import NamedTuple
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.model import PlainCode, Script
 from coursebuild.patterns import pattern
+from coursebuild.python_text import python_mistake
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
@@ -194,19 +192,9 @@ def path_mistake(path: str) -> str:
     return ""
 
 
-class _Mistake(NamedTuple):
-    line: int
-    """From 1."""
-    column: int
-    """From 0."""
-    end_line: int
-    end_column: int
-    message: str
-
-
 def syntax_mistake(code: Excerpt) -> tuple[Span, str, str] | None:
     """Where and why a piece of Python does not parse, and a hint; `None` when it does."""
-    mistake = _compile(code.text)
+    mistake = python_mistake(code.text)
     if mistake is None:
         return None
     rows = code.lines()
@@ -232,26 +220,3 @@ def _lower(sentence: str) -> str:
     if sentence[1:2].islower():
         return sentence[:1].lower() + sentence[1:]
     return sentence
-
-
-@lru_cache(maxsize=512)
-def _compile(code: str) -> _Mistake | None:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            compile(code, "<lesson>", "exec", dont_inherit=True)
-    except SyntaxError as error:
-        line, column = error.lineno or 1, max((error.offset or 1) - 1, 0)
-        end_column = max((error.end_offset or 0) - 1, 0)
-        return _Mistake(line, column, error.end_lineno or line, end_column, error.msg)
-    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
-        return _Mistake(
-            1,
-            0,
-            1,
-            0,
-            f"the code cannot be compiled: {error}"
-            if str(error)
-            else "the code is nested too deeply",
-        )
-    return None

@@ -27,6 +27,8 @@ from markdown_it.utils import EnvType
 
 from coursebuild.source import Excerpt, Source, Span
 
+_INDENT = (" ", "\t")
+
 
 class Row(NamedTuple):
     """A stretch of the parsed text that became part of a block's content."""
@@ -89,27 +91,34 @@ class Placed(Token):
 class BlockState(StateBlock):
     """The state of the block rules; notes the rows that the last rule cut out."""
 
-    def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
-        """The same as markdown-it's own, which looks at each line by itself."""
+    def __init__(
+        self, src: str, md: MarkdownIt, env: EnvType, line_starts: Sequence[int] | None = None
+    ) -> None:
+        """The same as markdown-it's own, which looks at each line by itself.
+
+        `line_starts` are where the lines of the text begin, if somebody knows that already.
+        """
         self.src, self.md, self.env = src, md, env
         self.tokens: list[Token] = []
         lines = src.split("\n")
+        starts = line_starts
+        if starts is None:
+            starts = list(accumulate([len(line) + 1 for line in lines[:-1]], initial=0))
+        ends = [start - 1 for start in starts[1:]]
         if not lines[-1].strip(" \t"):  # which is no line where no line end follows
             lines.pop()
-        sizes = [len(line) for line in lines]
-        shifts = [len(line) - len(line.lstrip(" \t")) for line in lines]
-        starts = list(accumulate([size + 1 for size in sizes], initial=0))
-        starts[-1] = len(src)
-        self.bMarks = starts
-        self.eMarks = [start + size for start, size in zip(starts, sizes, strict=False)]
-        self.eMarks.append(len(src))
+        else:
+            ends.append(len(src))
+        shifts = [len(x) - len(x.lstrip(" \t")) if x[:1] in _INDENT else 0 for x in lines]
+        self.bMarks = [*starts[: len(lines)], len(src)]
+        self.eMarks = [*ends, len(src)]
         self.tShift = [*shifts, 0]
         self.sCount = [*shifts, 0]
         if "\t" in src:
             for number, shift in enumerate(shifts):
                 if shift:
                     self.sCount[number] = len(lines[number][:shift].expandtabs(4))
-        self.bsCount = [0] * len(starts)
+        self.bsCount = [0] * len(self.bMarks)
         self.lineMax = len(lines)
         self.blkIndent = self.line = self.level = 0
         self.ddIndent = self.listIndent = -1
@@ -136,8 +145,8 @@ class BlockState(StateBlock):
     def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:  # noqa: N802
         """The lines from `begin` to `end` without `indent` columns of their indentation."""
         self.count = max(end - begin, 0)
-        self.rows = self._rows(begin, end, indent, keepLastLF)
-        return "".join([row.text for row in self.rows])
+        self.rows = rows = self._rows(begin, end, indent, keepLastLF)
+        return rows[0].text if len(rows) == 1 else "".join([row.text for row in rows])
 
     def _rows(self, begin: int, end: int, indent: int, line_end: bool) -> Sequence[Row]:
         if indent <= 0 and begin < end:
@@ -185,25 +194,22 @@ class InlineState(StateInline):
 
     def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
-        content = self.pending
+        return self.push_text(self.pending)
+
+    def push_text(self, content: str) -> Token:
+        """Make this, which is all of the pending text, a token."""
         start = self.mark
-        token = Placed(
-            "text",
-            "",
-            0,
-            content=content,
-            level=self.pendingLevel,
-            start=start,
-            end=start + len(content),
-        )
+        token = Placed("text", "", 0, level=self.pendingLevel, content=content, start=start)
+        token.end = start + len(content)
         self.tokens.append(token)
         self.pending = ""
         return token
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
         """Add a token that begins here; the tokenizer sets its end when the rule is through."""
-        if self.pending:
-            self.pushPending()
+        text = self.pending
+        if text:
+            self.push_text(text)
         meta = None
         if nesting < 0:
             self.level -= 1
@@ -222,12 +228,14 @@ class InlineState(StateInline):
 
 def locate(base: Excerpt, rows: Sequence[Row]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
+    single = len(base.pieces) == 1
+    if single and len(rows) == 1:
+        text, offset, padding = rows[0]
+        if not padding:
+            return Excerpt(base.source, text, ((0, base.pieces[0][1] + offset),))
     texts: list[str] = []
     pieces: list[tuple[int, int]] = []
     at, shift = 0, None
-    single = len(base.pieces) == 1
-    if single and len(rows) == 1 and not rows[0].padding:
-        return Excerpt(base.source, rows[0].text, ((0, base.pieces[0][1] + rows[0].at),))
     for text, offset, padding in rows:
         for i in range(padding):
             pieces.append((at + i, base.offset(offset - 1)))
@@ -267,10 +275,11 @@ def joined(parts: Iterable[Excerpt], between: str = "") -> Excerpt | None:
 
 def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
     """The excerpt without white space at its ends."""
-    text = excerpt.text.lstrip(chars)
-    if len(text.rstrip(chars)) == len(excerpt.text):
+    given = excerpt.text
+    if not given or (given[0] not in chars and given[-1] not in chars):
         return excerpt
-    lead = len(excerpt.text) - len(text)
+    text = given.lstrip(chars)
+    lead = len(given) - len(text)
     return excerpt.slice(lead, lead + len(text.rstrip(chars)))
 
 
@@ -281,11 +290,13 @@ class Placer:
 
     def __init__(self, excerpt: Excerpt) -> None:
         self.source: Source = excerpt.source
-        self._single = (
-            excerpt.pieces[0][1] - excerpt.pieces[0][0] if len(excerpt.pieces) == 1 else None
-        )
-        self._ats = [at for at, _ in excerpt.pieces]
-        self._deltas = [to - at for at, to in excerpt.pieces]
+        pieces = excerpt.pieces
+        self._single = None
+        if len(pieces) == 1:  # nearly always
+            self._single = pieces[0][1] - pieces[0][0]
+            return
+        self._ats = [at for at, _ in pieces]
+        self._deltas = [to - at for at, to in pieces]
 
     def span(self, start: int, end: int) -> Span:
         """The span of the text from `start` to `end`."""

@@ -9,13 +9,13 @@ meant for is missing is not said again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from msgspec import Struct
 
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.syntax.nodes import Node, ObjectNode, StringNode
-from coursebuild.syntax.shapes import FAILED, Run, Shape
+from coursebuild.syntax.shapes import FAILED, Run, Shape, failed
 from coursebuild.syntax.wording import STRING, named, quoted
 from coursebuild.values import dataclass
 
@@ -41,10 +41,14 @@ class StructShape(Shape):
 
     def _value(self, node: Node, name: str, run: Run) -> object:
         assert isinstance(node, ObjectNode)
-        return self.build(node, run, None, {})
+        return self.build(node, run, None, dict)
 
     def build(
-        self, node: ObjectNode, run: Run, tag: str | None, elsewhere: dict[str, str]
+        self,
+        node: ObjectNode,
+        run: Run,
+        tag: str | None,
+        elsewhere: Callable[[], dict[str, str]],
     ) -> object:
         """The struct.
 
@@ -61,12 +65,14 @@ class StructShape(Shape):
             elif known is not None and key not in values:
                 values[key] = known.shape.decode(member.value, key, run)
         missing = [f for f in self.fields.values() if f.required and f.name not in values]
-        meant = self._unknown(unknown.values(), values, elsewhere, run) if self.closed else set()
+        meant: set[str] = set()
+        if self.closed and unknown:
+            meant = self._unknown(unknown.values(), values, elsewhere(), run)
         for lacking in missing:
             if lacking.name not in meant:
                 help = lacking.description and f"`{lacking.name}`: {lacking.description}"
                 run.fault("field-missing", node.mark, f"`{lacking.name}` is missing", help)
-        if missing or any(value is FAILED for value in values.values()):
+        if missing or failed(values.values()):
             return FAILED
         struct = self.cls(**values)
         run.structs[node] = struct
@@ -120,11 +126,13 @@ class TaggedShape(Shape):
         return run.fault("field-value", given.mark, message, help)
 
     def _variant(self, tag: str, node: ObjectNode, run: Run) -> object:
-        elsewhere = {
-            key: " and ".join(f'`"{self.tag}": "{other}"`' for other in tags)
-            for key, tags in self.owners.items()
-            if tag not in tags
-        }
+        def elsewhere() -> dict[str, str]:
+            return {
+                key: " and ".join(f'`"{self.tag}": "{other}"`' for other in tags)
+                for key, tags in self.owners.items()
+                if tag not in tags
+            }
+
         return self.variants[tag].build(node, run, self.tag, elsewhere)
 
     def _untagged(self, node: ObjectNode, run: Run) -> object:

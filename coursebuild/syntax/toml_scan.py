@@ -26,6 +26,7 @@ MAX_DEPTH = 64
 _BLANK = re.compile(r"(?:[ \t\n]+|#[^\n]*)*")
 _INLINE_SPACE = re.compile(r"[ \t]*")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_PLAIN_KEY = re.compile(r"([A-Za-z0-9_-]+)[ \t]*=")
 _SCALAR = re.compile(r"[^\n,\]}#]*")
 
 
@@ -139,7 +140,12 @@ class Scanner:
 
     def _pair(self, table: Table, at: int, depth: int) -> int:
         """`key = value` in a table that is `depth` deep; its end."""
-        keys, here = self._keys(at)
+        plain = _PLAIN_KEY.match(self.text, at)
+        if plain is not None:
+            keys = [StringNode(self.body, at, plain.end(1), plain[1], ((0, at),))]
+            here = plain.end() - 1
+        else:
+            keys, here = self._keys(at)
         if self.text[here : here + 1] != "=":
             raise self._expected(f"`=` after the key `{keys[-1].value}`", here)
         inner = self._walk([table], keys[:-1], "dotted")
@@ -276,7 +282,7 @@ class Scanner:
 
     def _line_end(self, at: int) -> int:
         """After a statement: the place of the next one."""
-        here = self._space(at)
+        here = at if self.text.startswith("\n", at) else self._space(at)
         if self.text[here : here + 1] not in ("", "\n", "#"):
             raise self._expected("the end of the line", here)
         return self._blank(here)

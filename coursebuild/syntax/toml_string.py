@@ -40,6 +40,9 @@ def read_string(body: Excerpt, at: int, faults: list[Diagnostic], *, multiline: 
     long = multiline and text.startswith(quote * 3, at)
     if quote == "'":
         return _literal(body, at, long)
+    plain = None if long else _PLAIN.match(text, at + 1)
+    if plain is not None and text.startswith('"', plain.end()):  # as nearly all are
+        return StringNode(body, at, plain.end() + 1, plain[0], ((0, at + 1),))
     return _Basic(body, at, long, faults).read()
 
 

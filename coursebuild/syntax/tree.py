@@ -57,6 +57,7 @@ from coursebuild.syntax.recording import (
     record_table,
 )
 from coursebuild.syntax.session import Session
+from coursebuild.syntax.simple import simple_inlines
 from coursebuild.syntax.spans import Placed, Placer, Row, locate, normalized, trimmed
 from coursebuild.syntax.tables import read_table
 
@@ -339,24 +340,29 @@ class Texts:
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalized(excerpt)
-        read = self._line if _is_line(base.text) else self._text
-        return self._session.apart(lambda: read(base))
+        if not _is_line(base.text):
+            return self._session.apart(lambda: self._text(base))
+        # A line that can only be a paragraph: nothing else is looked for.
+        content = trimmed(locate(base, [Row(base.text, 0)]))
+        inlines = self._inlines(base, content)
+        paragraph = Paragraph(content.span(), inlines.value)
+        return Parsed((paragraph,), inlines.diagnostics)
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trimmed(normalized(excerpt))
-
-        return self._session.apart(lambda: self._inlines(content, content))
+        return self._inlines(content, content)
 
     def _text(self, base: Excerpt) -> tuple[Block, ...]:
         return TextReader(base, self._session, self._definitions(), nested=True).read()
 
-    def _line(self, base: Excerpt) -> tuple[Block, ...]:
-        """The same for a line that can only be a paragraph, without looking for anything else."""
-        content = trimmed(locate(base, [Row(base.text, 0)]))
-        return (Paragraph(content.span(), self._inlines(base, content)),)
+    def _inlines(self, base: Excerpt, content: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        found = simple_inlines(content)
+        if found is not None:
+            return Parsed(found)
+        return self._session.apart(lambda: self._marked(base, content))
 
-    def _inlines(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
+    def _marked(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
         balance = Balance(self._session.report)
         inlines = InlineReader(base, self._definitions(), self._session, balance).read(content)
         balance.finish()

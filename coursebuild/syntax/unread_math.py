@@ -23,7 +23,8 @@ def unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
     `texts` are the texts of a block that are neither code nor formulas nor escaped, each with its
     place in the block's content, in order.
     """
-    if not any(_MEANT.search(text) for _, text in texts):
+    dollars = [text for _, text in texts if "$" in text]
+    if not any(_MEANT.search(text) for text in dollars):
         return None
     parts, end = list[str](), 0
     for at, text in texts:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 import json
+import urllib.request
 import zlib
 from collections.abc import Callable
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 from chromium import SLOW
-from playwright.sync_api import BrowserContext, Locator, Page, Request
+from playwright.sync_api import BrowserContext, Locator, Page, Request, Route
 
 SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
 """The labs of the page, by number."""
@@ -44,6 +45,12 @@ def watched(context: BrowserContext) -> tuple[Page, list[str]]:
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("requestfailed", failed)
     return page, said
+
+
+def served(route: Route) -> str:
+    """What the server has where a request goes to; also when its page is closed meanwhile."""
+    with urllib.request.urlopen(route.request.url, timeout=SLOW / 1000) as answer:
+        return bytes(answer.read()).decode()
 
 
 def until(page: Page, true: str, argument: object = None) -> None:
@@ -101,18 +108,28 @@ def changed(page: Page, view: Locator, before: bytes) -> bytes:
     raise AssertionError("the picture stays as it is")
 
 
+def still(page: Page, view: Locator) -> bytes:
+    """The picture once it changes no more."""
+    before = view.screenshot()
+    for _ in range(SLOW // 300):
+        page.wait_for_timeout(300)
+        now = view.screenshot()
+        if now == before:
+            return now
+        before = now
+    raise AssertionError("the picture never stays as it is")
+
+
 def time_of(found: Locator) -> float:
     return float(found.locator(".lab-time").inner_text().removesuffix("s").strip())
 
 
 def state_of(page: Page, found: Locator) -> dict[str, object]:
     """What the link of a lab's state holds."""
+    page.evaluate("() => history.replaceState(null, '', location.pathname)")  # so that it is news
     before = page.evaluate("() => location.href")
     found.get_by_role("button", name="Copy link").click()
-    for _ in range(100):
-        if page.evaluate("() => location.href") != before:
-            break
-        page.wait_for_timeout(20)
+    until(page, "before => location.href !== before", before)
     return parsed(page.evaluate("() => location.href"))
 
 

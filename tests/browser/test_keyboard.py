@@ -126,6 +126,7 @@ def test_colours_search_and_a_question_by_key(sites: dict[str, Site], page: Page
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Tab")
     assert page.evaluate("document.documentElement.dataset.theme") in ("light", "dark")
+    page.locator(".search-open").wait_for(state="attached")
     page.keyboard.press("Control+k")
     dialog = page.locator("dialog[open]")
     dialog.wait_for()

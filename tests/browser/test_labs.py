@@ -24,8 +24,10 @@ from labpage import (
     parsed,
     reach,
     readout,
+    served,
     shows,
     state_of,
+    still,
     time_of,
     until,
     watched,
@@ -71,7 +73,7 @@ def test_the_state_is_that_of_native_mujoco(
     page.goto(base + PAGE)
     swing = lab(page)
     swing.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(1500)
+    comes(page, lambda: time_of(swing) > 1.0)
     swing.get_by_role("button", name="Pause").click()
     reach(page, SWING, "paused")
     state = state_of(page, swing)
@@ -209,14 +211,13 @@ def test_keys_on_the_picture(context: BrowserContext, base: str) -> None:
     view.focus()
     page.keyboard.press(".")
     until(page, "() => document.querySelector('.lab-time').textContent.startsWith('0.00')")
-    page.wait_for_timeout(500)
-    first = view.screenshot()
+    first = still(page, view)
     page.keyboard.press("ArrowLeft")
     turned = changed(page, view, first)
     page.keyboard.press("+")
-    nearer = changed(page, view, turned)
+    changed(page, view, turned)
     page.keyboard.press("0")
-    assert changed(page, view, nearer) == first
+    comes(page, lambda: view.screenshot() == first)
     page.keyboard.press(" ")
     reach(page, SWING, "playing")
     page.keyboard.press(" ")
@@ -256,12 +257,16 @@ def test_out_of_sight_it_waits(context: BrowserContext, base: str) -> None:
     page.goto(base + PAGE)
     swing = lab(page)
     swing.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(500)
+    comes(page, lambda: time_of(swing) > 0.3)
     page.evaluate("() => window.scrollTo(0, 0)")
-    page.wait_for_timeout(1500)
+
+    def waits() -> bool:
+        before = time_of(swing)
+        page.wait_for_timeout(2000)
+        return time_of(swing) == before
+
+    comes(page, waits)
     away = time_of(swing)
-    page.wait_for_timeout(2000)
-    assert time_of(swing) == away
     begun = time.monotonic()
     swing.scroll_into_view_if_needed()
     comes(page, lambda: time_of(swing) > away)
@@ -288,15 +293,13 @@ def test_every_kind_of_geom_and_overlay_is_drawn(context: BrowserContext, base: 
     page, said = watched(context)
     page.goto(base + PAGE)
     found = lab(page, ALL)
-    page.wait_for_timeout(300)
-    pictures = [found.locator(".lab-view").screenshot()]
+    pictures = [still(page, found.locator(".lab-view"))]
     for box in found.locator(".lab-check input").all():
         box.check()
     found.get_by_role("button", name="Play").click()
     reach(page, ALL, "playing")
     page.wait_for_timeout(1500)
-    pictures.append(found.locator(".lab-view").screenshot())
-    assert pictures[0] != pictures[1]
+    changed(page, found.locator(".lab-view"), pictures[0])
     assert said == []
 
 
@@ -305,14 +308,13 @@ def test_a_kind_of_the_course_runs_two_simulations(context: BrowserContext, base
     page.goto(base + PAGE)
     twins = lab(page, TWINS, None)
     twins.locator(".lab-play").wait_for()
-    page.wait_for_timeout(500)
-    shots = {"at first": [view.screenshot() for view in twins.locator(".lab-view").all()]}
+    views = twins.locator(".lab-view").all()
+    first = [still(page, view) for view in views]
     twins.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(2000)
+    comes(page, lambda: time_of(twins) > 1)
     twins.get_by_role("button", name="Pause").click()
-    shots["later"] = [view.screenshot() for view in twins.locator(".lab-view").all()]
-    assert all(a != b for a, b in zip(shots["at first"], shots["later"], strict=True))
-    assert time_of(twins) > 1
+    for view, before in zip(views, first, strict=True):
+        changed(page, view, before)
     assert twins.locator(".lab-plot canvas").screenshot()
     assert twins.locator(".lab-message:visible").count() == 0
     assert said == []
@@ -339,8 +341,7 @@ def replace_module(page: Page, code: str) -> None:
     """Serve other code for the first lab's module."""
 
     def answer(route: Route) -> None:
-        text = route.fetch().text() + code
-        route.fulfill(body=text, headers={"content-type": "text/javascript"})
+        route.fulfill(body=served(route) + code, headers={"content-type": "text/javascript"})
 
     page.context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.js$"), answer)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 from labcourse import PAGE
-from labpage import SWING, watched
+from labpage import SWING, served, watched
 from playwright.sync_api import BrowserContext, CDPSession, Page, Route
 
 pytestmark = pytest.mark.browser
@@ -83,8 +83,7 @@ def kept(page: Page, session: CDPSession) -> Kept:
 
 
 def reveal(route: Route) -> None:
-    text = route.fetch().text()
-    route.fulfill(body=REVEAL + text, headers={"content-type": "text/javascript"})
+    route.fulfill(body=REVEAL + served(route), headers={"content-type": "text/javascript"})
 
 
 def test_two_hundred_labs_that_come_and_go_leave_nothing(

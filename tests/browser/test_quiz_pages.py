@@ -35,7 +35,7 @@ from quizpage import (
     verdict,
     visit,
 )
-from test_serving import serving
+from servekit import serving
 
 pytestmark = pytest.mark.browser
 

@@ -105,6 +105,9 @@ def focused(page: Page) -> str:
 
 
 def open_by_key(page: Page, key: str = "/") -> None:
+    # A dialog that was open has taken keys until it was closed, a moment after what closed it.
+    until(page, "() => document.activeElement?.closest('dialog') == null")
+    until(page, "() => document.querySelector('.search-dialog')?.open !== true")
     page.keyboard.press(key)
     until(page, "() => document.querySelector('.search-dialog')?.open === true")
     until(page, "() => document.querySelectorAll('.search-option').length > 0")

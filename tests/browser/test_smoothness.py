@@ -88,7 +88,11 @@ def test_a_page_that_works_on_each_picture_is_found_out(
     page, session, _ = run(context, base)
     page.evaluate(BURDEN, burden)
     page.wait_for_timeout(500)
-    tasks, busy = window(page, session)
-    assert busy > BUSY
-    assert not long or len(tasks) > 5
-    assert all(ms >= LONG for ms in tasks)
+    # A machine under load may draw so few pictures that even this is little work.
+    for _ in range(WINDOWS):
+        tasks, busy = window(page, session)
+        assert all(ms >= LONG for ms in tasks)
+        if busy > BUSY and (len(tasks) > 5 or not long):
+            break
+    else:
+        raise AssertionError((busy, tasks))

@@ -199,6 +199,7 @@ def test_axe_finds_nothing_in_what_scripts_add(
     ) as context:
         page = context.new_page()
         page.goto(sites["full"].url(sites["full"].kinds()["lesson"]))
+        page.locator(".search-open").wait_for(state="attached")
         page.keyboard.press("Control+k")
         dialog = page.locator("dialog[open]")
         dialog.wait_for()

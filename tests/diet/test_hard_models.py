@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -191,7 +192,10 @@ def test_tendons_equalities_and_excluded_pairs() -> None:
     assert "<equality>" in left and left.count("<site") == 4
 
 
-def test_composites_and_flexes_stay_as_they_are() -> None:
+def test_composites_and_flexes_stay_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes what it warns of
     text = f"""<mujoco>
   {COMMON}
   <size memory="20M"/>

@@ -152,7 +152,7 @@ def test_the_picture_can_be_taken_again(tmp_path: Path) -> None:
     assert main(["-C", str(course), "build", "--quiet"]) == 0
     script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(course / "public")]
     done = subprocess.run(
-        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=120
+        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr
     taken = {path.name for path in tmp_path.glob("*.png")}
@@ -162,7 +162,7 @@ def test_the_picture_can_be_taken_again(tmp_path: Path) -> None:
 def test_a_picture_of_a_site_that_is_not_there(tmp_path: Path) -> None:
     script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(tmp_path)]
     done = subprocess.run(
-        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=120
+        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 1
     assert "run `make site` first" in done.stderr

@@ -29,7 +29,7 @@ from coursebuild.effects.examples import write_examples
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.site_swap import MARKER, publish, recover
 from coursebuild.effects.write import write_atomic
-from coursebuild.results import OutputFile
+from coursebuild.results import KeptFile, OutputFile, SiteFile
 
 CALLS = (
     "open",
@@ -141,6 +141,40 @@ class PublishByRenames(Publish):
     def whole(self, root: Path) -> None:
         recover(root / "public")
         super().whole(root)
+
+
+class PublishAgain(Publish):
+    """Publish a site that has most files of the old one, and of the one before it."""
+
+    same = tuple(KeptFile(f"a/{k}.html", "same", lambda: b"same") for k in range(5))
+
+    def site(self, text: str) -> list[SiteFile]:
+        changed = text.encode() * 50
+        own = [KeptFile(n, text, lambda: changed) for n in ("b.html", "c/d.html")]
+        return [*self.same, *own]
+
+    def prepare(self, root: Path) -> None:
+        (root / "content").mkdir()
+        (root / "content/course.toml").write_text("[course]\n")
+        for text in ("older", "old"):
+            publish(root, root / "public", self.site(text))
+        assert (root / ".coursebuild/published/spare").is_dir()
+
+    def run(self, root: Path) -> None:
+        with project_lock(root):
+            publish(root, root / "public", self.site("new"))
+
+    def as_tree(self, text: str) -> dict[str, bytes]:
+        return {f.path: f.make() for f in self.site(text) if isinstance(f, KeptFile)}
+
+    def whole(self, root: Path) -> None:
+        assert tree(root / "public") in (self.as_tree("old"), self.as_tree("new"))
+
+    def done(self, root: Path) -> None:
+        assert tree(root / "public") == self.as_tree("new")
+        assert sorted(p.name for p in root.iterdir()) == [".coursebuild", "content", "public"]
+        publish(root, root / "public", self.site("newer"))
+        assert tree(root / "public") == self.as_tree("newer")
 
 
 class PublishFirst(Publish):
@@ -265,7 +299,16 @@ class ExtractAndChange(Extract):
         super().again(root)
 
 
-KINDS = (Publish, PublishByRenames, PublishFirst, Update, Create, Extract, ExtractAndChange)
+KINDS = (
+    Publish,
+    PublishByRenames,
+    PublishAgain,
+    PublishFirst,
+    Update,
+    Create,
+    Extract,
+    ExtractAndChange,
+)
 SCENARIOS = {kind.__name__: kind for kind in KINDS}
 
 

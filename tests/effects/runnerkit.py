@@ -38,7 +38,7 @@ def job(
     path: str = "examples/x.py",
     *,
     args: Sequence[str] = (),
-    timeout: float = 30.0,
+    timeout: float = 120.0,
     requires: Sequence[str] = (),
     norun: bool = False,
 ) -> ScriptJob:
@@ -67,7 +67,7 @@ def wait_for(path: Path) -> int:
     raise AssertionError(f"{path} was never written")
 
 
-def gone(pid: int, seconds: float = 10.0) -> bool:
+def gone(pid: int, seconds: float = 120.0) -> bool:
     until = time.monotonic() + seconds
     while alive(pid) and time.monotonic() < until:
         time.sleep(0.005)

@@ -104,7 +104,11 @@ def test_the_map_is_kept_until_something_is_installed(
     assert len(scans) == 2
 
 
-def test_right_after_an_installation_nothing_is_kept(tmp_path: Path, site: Path) -> None:
+def test_right_after_an_installation_nothing_is_kept(
+    tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = time.time_ns()
+    monkeypatch.setattr(installed.time, "time_ns", lambda: now)
     ask(tmp_path, site).version("tool")
     install(site, "fresh", "1", ["fresh.py"])
     assert ask(tmp_path, site).version("fresh") == "fresh 1"

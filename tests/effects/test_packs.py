@@ -2,43 +2,21 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from packkit import KEY, ROOT, files, heard, key
 
 from coursebuild.effects import pack_files, packs
 from coursebuild.effects.packs import Packs
-from coursebuild.effects.prune import prune
 from coursebuild.effects.store import Store
-
-ROOT = Path(__file__).parents[2]
-KEY = hashlib.sha256(b"a key").hexdigest()
-
-
-def key(number: int) -> str:
-    return hashlib.sha256(str(number).encode()).hexdigest()
-
-
-def files(folder: Path) -> list[Path]:
-    """The packs, from the first to the last."""
-    return sorted((folder / packs.FOLDER).iterdir())
-
-
-def heard(store: Store) -> list[str]:
-    lines: list[str] = []
-    store.listen(lines.append)
-    return lines
-
 
 ACTS = st.lists(
     st.one_of(
@@ -250,6 +228,96 @@ def test_many_small_packs_become_one(tmp_path: Path) -> None:
     assert old.get("of 3") == b"own"
 
 
+def test_what_a_copy_or_a_killed_process_left_is_closed(tmp_path: Path) -> None:
+    """So that it need not be walked through each time."""
+    child = os.fork()
+    if child == 0:
+        left = Packs(tmp_path)
+        for number in range(100):
+            left.put(str(number), b"%d" % number)
+        assert left._mine is not None
+        os.pwrite(left._fd, b"half an entry" * 100, left._mine.end)
+        os._exit(0)
+    os.waitpid(child, 0)
+    mine, living = Packs(tmp_path), Packs(tmp_path)
+    living.put("living", b"is written")
+    mine.put("7", b"seven")
+    mine.close()
+    states = [pack_files.Pack(str(path), 0.0) for path in files(tmp_path)]
+    for state in states:
+        pack_files.open_pack(state)
+    assert [state.is_closed for state in states] == [True, False, True]
+    living.put("living", b"again")
+    for reader in (mine, Packs(tmp_path)):
+        assert all(reader.get(str(n)) == b"%d" % n for n in range(100) if n != 7)
+        assert reader.get("7") == b"seven"
+    assert reader.get("living") == b"again"
+
+
+def test_one_that_may_not_be_closed_keeps_no_others_apart(held_back: Path) -> None:
+    """A pack that another user left, such as root in a container."""
+    child = os.fork()
+    if child == 0:
+        Packs(held_back).put("left", b"1")
+        os._exit(0)
+    os.waitpid(child, 0)
+    (left,) = files(held_back)
+    left.chmod(0o444)
+    for number in range(3 * packs._MANY):
+        one = Packs(held_back)
+        one.put(str(number), b"%d" % number)
+        one.close()
+    assert len(files(held_back)) <= packs._MANY + 2
+    reader = Packs(held_back)
+    assert reader.get("left") == b"1"
+    assert all(reader.get(str(n)) == b"%d" % n for n in range(3 * packs._MANY))
+
+
+def test_a_pack_that_was_taken_for_left_before_it_was_locked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, names = packs.try_lock, list[str]()
+
+    def lock(fd: int) -> bool | None:
+        names.append(str(Path(f"/proc/self/fd/{fd}").readlink()))
+        return False if len(names) == 1 else real(fd)
+
+    monkeypatch.setattr(packs, "try_lock", lock)
+    mine = Packs(tmp_path)
+    mine.put("mine", b"1")
+    assert mine._mine is not None
+    assert (len(names), mine._mine.path) == (2, names[1])
+    other = Packs(tmp_path)
+    other.put("other", b"2")
+    other.close()
+    mine.put("more", b"3")
+    mine.close()
+    reader = Packs(tmp_path)
+    assert [reader.get(name) for name in ("mine", "other", "more")] == [b"1", b"2", b"3"]
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 300), st.integers(0, 1 << 40)), max_size=200),
+    st.lists(st.tuples(st.integers(0, 300), st.integers(0, 1 << 40)), max_size=200),
+)
+def test_entries_that_are_noted_at_once(
+    first: list[tuple[int, int]], more: list[tuple[int, int]]
+) -> None:
+    one, all = pack_files.Pack("p", 0.0), pack_files.Pack("p", 0.0)
+    keyed = [
+        [(hashlib.sha256(b"%d" % n).digest()[:16], (start, n)) for n, start in part]
+        for part in (first, more)
+    ]
+    for part in keyed:
+        for name, place in part:
+            one.add(name, *place)
+        all.add_all(dict(part))
+    assert list(all) == list(one)
+    assert [all.find(name) for part in keyed for name, _ in part] == [
+        one.find(name) for part in keyed for name, _ in part
+    ]
+
+
 def test_a_pack_is_closed_where_it_is_large(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -271,102 +339,14 @@ def test_many_entries_are_found_in_rows(tmp_path: Path) -> None:
         assert reader.get("3000") is None
 
 
-# --- places that take nothing, and what is taken away
-
-
-def test_a_disk_that_fills_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was written half is gone, and what comes later is whole."""
-    store = Store(tmp_path)
-    told = heard(store)
-    store.keep("kind", key(0), b"0" * 100, packed=True)
-    real = os.pwritev
-
-    def full(fd: int, parts: tuple[bytes, ...], at: int) -> int:
-        return real(fd, [b"".join(parts)[:70]], at)
-
-    def fuller(fd: int, data: bytes, at: int) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "pwritev", full)
-        patch.setattr(os, "pwrite", fuller)
-        store.keep("kind", key(1), b"1" * 100, packed=True)
-    assert told == ["results cannot be kept in .coursebuild: no space left on device"]
-    store.keep("kind", key(2), b"2" * 100, packed=True)
-    for reader in (store, Store(tmp_path)):
-        found = [reader.load("kind", key(number)) for number in range(3)]
-        assert found == [b"0" * 100, None, b"2" * 100]
-
-
-def test_what_is_written_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(os, "pwritev")
-    real = os.pwrite
-    monkeypatch.setattr(os, "pwrite", lambda fd, data, at: real(fd, data[:7], at))
-    mine = Packs(tmp_path)
-    mine.put("a", b"text of some length")
-    mine.close()
-    assert Packs(tmp_path).get("a") == b"text of some length"
-
-
-@pytest.mark.parametrize("where", [".coursebuild", ".coursebuild/packs"])
-def test_a_file_in_the_place_of_the_folder(tmp_path: Path, where: str) -> None:
-    (tmp_path / where).parent.mkdir(exist_ok=True)
-    (tmp_path / where).write_text("in the way")
-    store = Store(tmp_path)
-    told = heard(store)
-    assert store.kept("kind", KEY, lambda: b"a", packed=True) == b"a"
-    assert store.kept("kind", KEY, lambda: b"b", packed=True) == b"b"
-    assert len(told) == 1 and told[0].startswith("results cannot be kept in .coursebuild: ")
-    store.close()
-
-
-def test_a_folder_that_is_removed_meanwhile(tmp_path: Path) -> None:
-    """As with `serve`, which lives long."""
-    store = Store(tmp_path)
-    store.keep("kind", KEY, b"a", packed=True)
-    shutil.rmtree(tmp_path / ".coursebuild")
-    assert store.load("kind", KEY) is None
-    store.keep("kind", KEY, b"b", packed=True)
-    assert store.load("kind", KEY) == Store(tmp_path).load("kind", KEY) == b"b"
-
-
-def test_strange_things_among_the_packs(tmp_path: Path) -> None:
-    folder = tmp_path / packs.FOLDER
-    folder.mkdir()
-    (folder / key(1)).mkdir()
-    (folder / key(2)).write_bytes(b"")
-    (folder / key(3)).write_bytes(b"nonsense" * 100)
-    (folder / "notes").write_text("mine")
-    mine = Packs(tmp_path)
-    mine.put("a", b"1")
-    mine.close()
-    assert Packs(tmp_path).get("a") == b"1"
-
-
-def test_packs_that_were_not_used_for_longest_go_first(tmp_path: Path) -> None:
-    folder = tmp_path / ".coursebuild"
-    for number in range(4):
-        store = Store(tmp_path)
-        store.keep("kind", key(number), bytes([number]) * 1000, packed=True)
-        store._packs.close()
-    long_ago = time.time() - 10_000
-    for number, path in enumerate(files(folder)):
-        os.utime(path, (long_ago + number, long_ago + number))
-    used = Store(tmp_path)
-    assert used.load("kind", key(0)) is not None
-    assert prune(folder, 2700) == 2
-    found = [Store(tmp_path).load("kind", key(number)) is not None for number in range(4)]
-    assert found == [True, False, False, True]
-    assert used.load("kind", key(1)) is None, "where it was, there is nothing any more"
-
-
-def test_a_store_with_little_room_keeps_what_was_made_last(tmp_path: Path) -> None:
-    store = Store(tmp_path, size=1 << 20)
-    for number in range(200):
-        store.keep("kind", key(number), bytes(10_000), packed=True)
-        (path, *_) = reversed(files(tmp_path / ".coursebuild"))
-        os.utime(path, (1000 + number, 1000 + number))
-    store.close()
-    left = [n for n in range(200) if Store(tmp_path).load("kind", key(n)) is not None]
-    assert left == list(range(200 - len(left), 200))
-    assert 80 < len(left) < 105
+@given(st.lists(st.tuples(st.integers(0, 300), st.integers(0, 1 << 40)), max_size=400))
+def test_a_pack_knows_the_latest_place_of_each_entry(added: list[tuple[int, int]]) -> None:
+    pack = pack_files.Pack("p", 0.0)
+    places: dict[bytes, tuple[int, int]] = {}
+    for number, start in added:
+        name = hashlib.sha256(b"%d" % number).digest()[:16]
+        pack.add(name, start, number)
+        places[name] = start, number
+    assert list(pack) == [(name, *place) for name, place in sorted(places.items())]
+    assert all(pack.find(name) == place for name, place in places.items())
+    assert pack.find(b"\xff" * 16) is pack.find(b"\0" * 16) is None

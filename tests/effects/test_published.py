@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from stagingkit import root as root
+from stagingkit import texts
 
 from coursebuild.effects.published import Published
 from coursebuild.effects.site_swap import MARKER, publish
@@ -31,20 +33,6 @@ class Pages:
             return f"{path} {key}".encode()
 
         return make
-
-
-def texts(folder: Path) -> dict[str, str]:
-    return {
-        p.relative_to(folder).as_posix(): p.read_text()
-        for p in folder.rglob("*")
-        if p.is_file() and p.name != MARKER
-    }
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    (tmp_path / "course").mkdir()
-    return tmp_path / "course"
 
 
 @pytest.fixture
@@ -210,6 +198,38 @@ def test_a_file_changed_while_it_is_linked_is_made_again(
     monkeypatch.setattr(os, "link", late)
     assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
     assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
+
+
+def other_file(path: Path) -> None:
+    path.with_name("other").write_text(path.read_text())
+    path.with_name("other").replace(path)
+
+
+def symbolic_link(path: Path) -> None:
+    path.rename(path.with_name("moved"))
+    path.symlink_to("moved")
+
+
+def new_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize("change", [other_file, symbolic_link, new_folder, Path.unlink])
+def test_a_file_that_gives_way_to_another_before_it_is_linked_is_made_again(
+    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch, change: Callable[[Path], None]
+) -> None:
+    publish(root, root / "public", pages(a="1", b="1"))
+    really = os.link
+
+    def early(source: str, target: str, *, follow_symlinks: bool = True) -> None:
+        change(Path(source))
+        really(source, target, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(os, "link", early)
+    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
+    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
+    assert not (root / "public/a/index.html").is_symlink()
 
 
 def test_a_failure_while_a_page_is_made_leaves_the_old_site(root: Path, pages: Pages) -> None:

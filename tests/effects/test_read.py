@@ -105,7 +105,10 @@ class TestListing:
         root = course(
             {
                 f"content/lessons/{name}": b"\xff"
-                for name in ("1.1-a.md~", ".1.1-a.md.swp", "#1.1-a.md#", ".hidden.md", "4913~")
+                for name in (
+                    *("1.1-a.md~", ".1.1-a.md.swp", "#1.1-a.md#", ".hidden.md", "4913~"),
+                    "__pycache__/made.cpython-311.pyc",
+                )
             }
         )
         (root / "content/lessons/.#1.1-a.md").symlink_to("author@host.1234:5678")

@@ -50,6 +50,22 @@ def test_everything_is_read_by_its_path(tmp_path: Path, monkeypatch: pytest.Monk
     assert resources.template_texts() == (("page.html", "é\n"),)
 
 
+def test_the_bundle_is_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
+    for path in ("js/b.js", "js-a/a.js", "stamp.json", "a.css"):
+        (tmp_path / "assets" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "assets" / path).write_bytes(path.encode())
+    bundle = resources.Bundle()
+    assert bundle["js/b.js"] == b"js/b.js"
+    for missing in ("js/c.js", "js", "a.css/b", "none/a.js"):
+        with pytest.raises(KeyError):
+            bundle[missing]
+    # By the names of folders, as paths are sorted.
+    assert tuple(bundle.items()) == resources.bundled_files()
+    assert list(bundle) == ["a.css", "js/b.js", "js-a/a.js"]
+    assert len(bundle) == 3
+
+
 def test_versions() -> None:
     assert versions.python_version() == ".".join(map(str, sys.version_info[:3]))
     import mujoco
@@ -73,6 +89,8 @@ def test_importing_effects_loads_nothing_heavy() -> None:
         "from coursebuild.effects import (examples, mjcf, read, resources, runner, site_swap, v8,"
         " versions, write)\n"
         "versions.engine_version()\n"
+        "from coursebuild.effects.v8_library import library\n"
+        "assert library.cache_info().currsize == 0\n"
         "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"
     )
     done = subprocess.run(

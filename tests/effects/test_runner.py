@@ -30,7 +30,7 @@ class TestOutcomes:
         result = run("import sys\nprint('out')\nprint('err', file=sys.stderr)\n")
         assert (result.outcome, result.status) == (Outcome.OK, 0)
         assert (result.stdout, result.stderr) == ("out\n", "err\n")
-        assert 0.0 < result.seconds < 20.0
+        assert 0.0 < result.seconds < 120.0
         assert not result.cached
 
     @pytest.mark.parametrize(
@@ -68,12 +68,12 @@ class TestOutcomes:
         assert [path.name for path in root.iterdir()] == ["examples"]
 
     def test_timeout_says_where(self, run: Run) -> None:
-        code = "import time\nprint('so far', flush=True)\ndef hang(): time.sleep(60)\nhang()\n"
-        result = run(code, timeout=1.0)
+        code = "import time\nprint('so far', flush=True)\ndef hang(): time.sleep(600)\nhang()\n"
+        result = run(code, timeout=3.0)
         assert result.outcome is Outcome.TIMEOUT
         assert result.stdout == "so far\n"
         assert "line 3 in hang" in result.stderr
-        assert 1.0 <= result.seconds < 10.0
+        assert 3.0 <= result.seconds < 120.0
 
     @pytest.mark.parametrize(
         "code",
@@ -83,13 +83,13 @@ class TestOutcomes:
             "import os, signal\nprint(1, flush=True)\nos.kill(os.getpid(), signal.SIGSTOP)",
             "import os\nprint(1, flush=True)\nos.close(1); os.close(2)\nwhile True: pass",
             "import threading\nprint(1, flush=True)\nthreading.Event().wait()",
-            "import os, time\nprint(1, flush=True)\nos.fork()\ntime.sleep(60)",
+            "import os, time\nprint(1, flush=True)\nos.fork()\ntime.sleep(600)",
         ],
     )
     def test_timeout_of_the_stubborn(self, run: Run, code: str) -> None:
-        result = run(code, timeout=1.0)
+        result = run(code, timeout=3.0)
         assert (result.outcome, result.stdout) == (Outcome.TIMEOUT, "1\n")
-        assert result.seconds < 10.0
+        assert result.seconds < 120.0
 
     def test_skipped_and_norun(self, root: Path) -> None:
         (root / "examples/x.py").write_text("print(1)")

@@ -10,11 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import site_files
+from coursebuild.effects import pool, site_files
 from coursebuild.effects.aside import Aside
 from coursebuild.effects.published import Entry
 from coursebuild.effects.site_files import writing
 from coursebuild.results import KeptFile, OutputFile, SiteFile
+
+
+@pytest.fixture(autouse=True)
+def forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever other tests have imported into this process."""
+    monkeypatch.setattr(pool, "can_fork", lambda: True)
 
 
 def kept(path: str, make: Callable[[], bytes]) -> tuple[SiteFile, str]:
@@ -71,6 +77,42 @@ def test_copies_write_what_one_process_does(tmp_path: Path) -> None:
     together = write(tmp_path / "together", files, 3)
     check(tmp_path / "together", files, together)
     assert tree(tmp_path / "alone") == tree(tmp_path / "together")
+
+
+@pytest.mark.parametrize("count", [1, 5, 128, 1000, 4321])
+def test_every_file_is_in_one_share(count: int) -> None:
+    shares = [range(count)[share] for share in site_files._shares(count, 3)]
+    assert [number for share in shares for number in share] == list(range(count))
+    assert max(map(len, shares)) <= max(count // 12, site_files._FEWEST)
+    long = count // 3
+    after = [range(count)[share] for share in site_files._shares(count, 3, long)]
+    assert [number for share in after for number in share] == list(range(count))
+    assert [len(share) for share in after[:long]] == [1] * long
+
+
+def test_what_is_put_together_of_all_lessons_comes_first(tmp_path: Path) -> None:
+    """Else a copy may be at it when the others have no more to do."""
+    made: list[str] = []
+
+    def noted(name: str) -> Callable[[], bytes]:
+        def make() -> bytes:
+            made.append(name)
+            (tmp_path / name).write_text(f"{os.getpid()} {len(made)}")
+            return b"-"
+
+        return make
+
+    def long() -> Iterator[bytes]:
+        yield noted("long")()
+
+    (tmp_path / "site").mkdir()
+    files = [kept(f"{n:03}", noted(f"{n:03}")) for n in range(200)]
+    files.append((KeptFile("z", "z", lambda: b"", long), "z"))
+    with writing(tmp_path / "site", files, 2) as written:
+        check(tmp_path / "site", files, written())
+    process, number = (tmp_path / "long").read_text().split()
+    assert int(process) != os.getpid()
+    assert number == "1"  # of all that this copy has made
 
 
 def test_copies_that_are_killed(tmp_path: Path) -> None:

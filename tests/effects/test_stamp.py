@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coursebuild.effects import stamp
-from coursebuild.effects.stamp import Watcher, unchanged
+from coursebuild.effects.stamp import State, Watcher, unchanged
 
 COMMAND = ("build", "public")
 AGO = 3_600_000_000_000
@@ -193,6 +195,77 @@ def test_what_the_work_writes_may_be_new(root: Path) -> None:
     assert said(root) == "all is well\n"
 
 
+def states(folder: Path) -> list[State]:
+    """What a command that wrote these files knows of them."""
+    found = [(p, p.lstat()) for p in folder.rglob("*") if not p.is_dir()]
+    return [
+        (p.relative_to(folder).as_posix(), s.st_mode, s.st_size, s.st_mtime_ns, s.st_ino)
+        for p, s in reversed(found)
+    ]
+
+
+NAMES = st.text("ab.~é -\U00010400", min_size=1, max_size=3).filter(lambda n: n not in (".", ".."))
+
+
+@given(paths=st.sets(st.lists(NAMES, min_size=1, max_size=4).map("/".join), max_size=12))
+def test_what_is_known_of_a_folder_is_what_is_seen_there(paths: set[str]) -> None:
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        for path in [*paths, "__pycache__/a", "a/__pycache__/b/c"]:
+            file = folder / path
+            if not any(p.is_file() for p in file.parents) and not file.exists():
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(path)
+        for given_as in (made, f"{made}/"):
+            assert [*stamp._known(given_as, states(folder))] == [*stamp._found(given_as, None)]
+
+
+@pytest.mark.parametrize("out", ["public", "public/", "a/b", "../elsewhere"])
+def test_what_the_work_knows_of_its_files_need_not_be_looked_at(
+    root: Path, monkeypatch: pytest.MonkeyPatch, out: str
+) -> None:
+    for path in ("a.html", "a/b.html", "a-b/c.html", ".hidden", "z/.hidden/d"):
+        (root / out / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / out / path).write_text(path)
+    assert keep_all(root, out)
+    [file] = (root / ".coursebuild/unchanged").iterdir()
+    looked = file.read_bytes()
+    file.unlink()
+    with monkeypatch.context() as patch:
+        known, really = {out: states(root / out)}, stamp._found
+        patch.setattr(
+            stamp,
+            "_found",
+            lambda path, began, **how: (
+                pytest.fail(path) if path.endswith(out) else really(path, began, **how)
+            ),
+        )
+        assert Watcher(str(root), COMMAND).keep("all is well\n", [], [out], known)
+    assert file.read_bytes() == looked
+    assert said(root) == "all is well\n"
+
+
+def keep_all(root: Path, out: str) -> bool:
+    return Watcher(str(root), COMMAND).keep("all is well\n", [], [out])
+
+
+@pytest.mark.parametrize("change", ["rewrite", "add", "remove", "chmod"])
+def test_what_is_changed_once_it_was_written_is_seen(root: Path, change: str) -> None:
+    """Even before there is a stamp."""
+    watcher, known = Watcher(str(root), COMMAND), {"public": states(root / "public")}
+    file = root / "public/index.html"
+    if change == "rewrite":
+        file.write_text("other")
+    elif change == "add":
+        (root / "public/more.html").write_text("more")
+    elif change == "remove":
+        file.unlink()
+    else:
+        file.chmod(0o600)
+    assert watcher.keep("all is well\n", [], ["public"], known)
+    assert said(root) is None
+
+
 @pytest.mark.parametrize(
     ("before", "coarse", "kept"),
     [
@@ -260,7 +333,8 @@ def test_looking_imports_next_to_nothing() -> None:
     code = (
         "import sys; import coursebuild.cli, coursebuild.effects.stamp, coursebuild.effects.place\n"
         "print(sorted(m for m in sys.modules if m.startswith('coursebuild.')))\n"
-        "print(sorted({'pathlib', 'dataclasses', 'json', 'subprocess'} & set(sys.modules)))\n"
+        "large = {'argparse', 'collections', 'contextlib', 'hashlib', 'pathlib', 're', 'typing'}\n"
+        "print(sorted(large & set(sys.modules)))\n"
     )
     done = subprocess.run(
         [sys.executable, "-S", "-c", code],
@@ -270,8 +344,8 @@ def test_looking_imports_next_to_nothing() -> None:
         env={**os.environ, "PYTHONPATH": str(Path(stamp.__file__).parents[2])},
     )
     assert done.stdout.splitlines() == [
-        "['coursebuild.cli', 'coursebuild.cli.arguments', 'coursebuild.cli.commands', "
-        "'coursebuild.cli.output', 'coursebuild.effects', 'coursebuild.effects.errors', "
+        "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
+        "'coursebuild.effects', "
         "'coursebuild.effects.place', 'coursebuild.effects.stamp']",
         "[]",
     ]
@@ -280,7 +354,7 @@ def test_looking_imports_next_to_nothing() -> None:
 def test_a_stamp_of_another_format_is_none(root: Path) -> None:
     assert keep(root)
     (path,) = (root / ".coursebuild/unchanged").iterdir()
-    body = path.read_bytes().partition(b"\n")[2].replace(b"coursebuild stamp 2", b"other", 1)
+    body = path.read_bytes().partition(b"\n")[2].replace(b"coursebuild stamp 3", b"other", 1)
     for text in (body, b"coursebuild stamp 1\nabc\n\nsaid"):
-        path.write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text)
+        path.write_bytes(stamp._digest(text) + b"\n" + text)
         assert unchanged(str(root), COMMAND) is None

@@ -15,7 +15,8 @@ from xml.etree import ElementTree
 import pytest
 
 from coursebuild.effects import v8
-from coursebuild.effects.v8 import Isolate, LimitError, MathEngine, readable
+from coursebuild.effects.v8 import Isolate, MathEngine, readable
+from coursebuild.effects.v8_library import LimitError
 from coursebuild.results import Formula, MathError
 
 GLOBAL = {"class", "style", "mathbackground", "mathcolor"}
@@ -299,7 +300,7 @@ class TestHostile:
         before, bad, after = engine.typeset(
             [Formula("a", False), Formula(HOSTILE[name], True), Formula("b", False)]
         )
-        assert time.monotonic() - start < 30.0
+        assert time.monotonic() - start < 300.0
         assert isinstance(before, str) and isinstance(after, str)
         assert isinstance(bad, MathError)
         assert len(bad.message) <= 160
@@ -307,13 +308,12 @@ class TestHostile:
     def test_a_script_that_never_ends(self) -> None:
         isolate = Isolate("function spin(x) { for (;;) {} }; function same(x) { return x }")
         try:
-            assert (
-                isolate.call("same", "é\u2028'\"\\\0\U0001d4b3", 5.0) == "é\u2028'\"\\\0\U0001d4b3"
-            )
+            text = "é\u2028'\"\\\0\U0001d4b3"
+            assert isolate.call("same", text, 120.0) == text
             start = time.monotonic()
             with pytest.raises(LimitError, match=r"ran for more than 0\.2 s"):
                 isolate.call("spin", "", 0.2)
-            assert time.monotonic() - start < 10.0
+            assert time.monotonic() - start < 120.0
         finally:
             isolate.close()
 
@@ -335,9 +335,14 @@ class TestHostile:
             " for (const f of JSON.parse(json)) while (f.tex === 'slow');"
             " return JSON.stringify(JSON.parse(json).map(f => f.tex)) }"
         )
+        really = Isolate.call
+
+        def call(isolate: Isolate, function: str, argument: str, seconds: float) -> str:
+            """With little patience for what never ends, and much for the others."""
+            return really(isolate, function, argument, 0.3 if "slow" in argument else 120.0)
+
         monkeypatch.setattr(v8, "_scripts", lambda: (slow,))
-        monkeypatch.setattr(v8, "_BATCH_SECONDS", 0.3)
-        monkeypatch.setattr(v8, "_SINGLE_SECONDS", 0.3)
+        monkeypatch.setattr(Isolate, "call", call)
         with MathEngine() as engine:
             results = engine.typeset([Formula(t, False) for t in ("a", "slow", "b", "slow")])
         late = MathError("the formula ran for more than 0.3 s", None)
@@ -373,8 +378,9 @@ class TestLife:
         code = (
             "from coursebuild.effects.v8 import Isolate\n"
             "isolate = Isolate('function spin(x) { for (;;) {} }')\n"
-            "print('ready', flush=True)\n"
-            "try: isolate.call('spin', '', 60.0)\n"
+            "try:\n"
+            "    print('ready', flush=True)\n"
+            "    isolate.call('spin', '', 600.0)\n"
             "except KeyboardInterrupt: print('interrupted')\n"
         )
         process = subprocess.Popen(
@@ -404,6 +410,6 @@ class TestLife:
                 capture_output=True,
                 text=True,
                 cwd=Path(v8.__file__).parents[2],
-                timeout=30,
+                timeout=300,
             )
             assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)

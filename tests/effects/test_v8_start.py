@@ -42,7 +42,7 @@ with MathEngine() as engine:
     made = [x if isinstance(x, str) else [x.message, x.position] for x in engine.typeset(formulas)]
 number = "(1234.5).toLocaleString('de')"
 isolate = Isolate("function intl(x) { try { return " + number + " } catch { return '' } }")
-intl = isolate.call("intl", "", 5.0)
+intl = isolate.call("intl", "", 120.0)
 isolate.close()
 rollup = Path("/proc/self/smaps_rollup")
 lines = rollup.read_text().splitlines() if rollup.exists() else []
@@ -65,7 +65,7 @@ def _run(kind: str) -> dict[str, object]:
         capture_output=True,
         text=True,
         cwd=ROOT,
-        timeout=60,
+        timeout=300,
         check=True,
     )
     assert done.stderr == ""

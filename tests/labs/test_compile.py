@@ -140,7 +140,7 @@ def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine) -> None:
     assert mistake(engine, "ctx[globalThis.ran = true]", "target") is None
     isolate = engine._isolate
     assert isolate is not None and isolate.call("String", "x", 5.0) == "x"
-    assert isolate._evaluate("typeof globalThis.ran", 5.0) == "undefined"
+    assert isolate.call("(() => typeof globalThis.ran)", "", 5.0) == "undefined"
 
 
 def test_value_is_only_what_setters_see(engine: LabEngine) -> None:

@@ -15,9 +15,29 @@ from coursebuild.measured.bench import (
     Verdict,
     WorkPrecisionRow,
 )
+from coursebuild.measured.cases import (
+    BoundaryLine,
+    CaseReport,
+    ErrorLine,
+    FigureLine,
+    OrderLine,
+    ReferenceLine,
+)
 
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
 VERDICT = Verdict(True, None, None, None, False, "The scene’s own setting is on the front.")
+CASE = CaseReport(
+    name="spring",
+    title="A spring",
+    case=5,
+    engine="3.14.0",
+    note="",
+    reference=ReferenceLine("closed", "a textbook", 1e-13, "", None),
+    boundaries=(BoundaryLine("Euler", 0.2, 0.2, "hω = 2", 0.0, True, (), "", None, (1e-3, 1.0)),),
+    figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
+    orders=(OrderLine("Euler", 1.0, None, None),),
+    errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
+)
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from benchkit import MACHINE, lost, row, scenario, scene, swing
+from benchkit import CASE, MACHINE, lost, row, scenario, scene, swing
 from hypothesis import given
 from hypothesis import strategies as st
-from test_records import CASE
 
 from coursebuild.measured.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
 from coursebuild.measured.cases import BoundaryLine, FigureLine

@@ -5,16 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from benchkit import lost, row, scenario, scene, swing
+from benchkit import CASE, lost, row, scenario, scene, swing
 
-from coursebuild.measured.cases import (
-    BoundaryLine,
-    CaseReport,
-    ErrorLine,
-    FigureLine,
-    OrderLine,
-    ReferenceLine,
-)
 from coursebuild.measured.records import (
     RecordError,
     bench_path,
@@ -34,18 +26,6 @@ def line(at: int) -> int:
 
 
 COST = line(GOOD.index(b'"cost": 0.1,'))
-CASE = CaseReport(
-    name="spring",
-    title="A spring",
-    case=5,
-    engine="3.14.0",
-    note="",
-    reference=ReferenceLine("closed", "a textbook", 1e-13, "", None),
-    boundaries=(BoundaryLine("Euler", 0.2, 0.2, "hω = 2", 0.0, True, (), "", None, (1e-3, 1.0)),),
-    figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
-    orders=(OrderLine("Euler", 1.0, None, None),),
-    errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
-)
 
 
 def test_what_is_written_is_read() -> None:

@@ -51,7 +51,7 @@ def run(script: Path | str, *arguments: str, cwd: Path, code: str | None = None)
         input=code,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr

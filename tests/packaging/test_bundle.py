@@ -155,7 +155,7 @@ def test_several_at_once_do_the_work_once(project: Path) -> None:
     started = [
         subprocess.Popen(COMMAND, cwd=project, stdout=subprocess.PIPE, text=True) for _ in range(4)
     ]
-    said = sorted(process.communicate(timeout=120)[0] for process in started)
+    said = sorted(process.communicate(timeout=600)[0] for process in started)
     assert said == ["bundle: done\n"] + ["bundle: up to date\n"] * 3
     assert leftovers(project) == []
 

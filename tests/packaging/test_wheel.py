@@ -185,3 +185,8 @@ def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
     unpacked = tmp_path / full_name
     (unpacked / "site" / "node_modules").symlink_to(packages)
     assert build(unpacked, "wheel").read_bytes() == wheel.read_bytes()
+
+
+def test_what_the_tool_runs_in_its_engines_is_there(root: Path, wheel: Path) -> None:
+    for path in (root / "coursebuild" / "effects").glob("*.js"):
+        assert read(wheel, f"coursebuild/effects/{path.name}") == path.read_bytes()

@@ -9,12 +9,25 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from coursekit import Folder, ended, wait_until_alone
 
 from coursebuild.effects.server import PREFIX
+
+PATIENT = """
+import sys
+from coursebuild.cli import main
+from coursebuild.pipeline.preview import follow
+follow.QUIET_MANY = follow.QUIET_GONE = 3.0
+follow.LONGEST = 120.0
+sys.exit(main(sys.argv[1:]))
+"""
+"""The command, which waits so long for the rest of a save that this comes in time on any machine.
+
+Its own patience is for what a program does in a few milliseconds while nothing else runs.
+"""
 
 
 class Preview:
@@ -35,7 +48,7 @@ class Preview:
             for line in self.process.stderr:
                 self.said.append(line.decode().rstrip("\n"))
 
-    def heard(self, text: str, after: int = 0, seconds: float = 30.0) -> str:
+    def heard(self, text: str, after: int = 0, seconds: float = 300.0) -> str:
         """The first line said that holds a text."""
         until = time.monotonic() + seconds
         while True:
@@ -68,7 +81,7 @@ class Preview:
     @contextlib.contextmanager
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
         """What an open page is told."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=30) as link:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=120) as link:
             asked = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
             link.sendall(f"{asked}\r\n\r\n".encode())
             with link.makefile("rb") as stream:
@@ -94,7 +107,7 @@ class Events:
         """Read on until something holds."""
         while not (self.hello and self.news and good(self)):
             name, data = next(self.stream, ("", ""))
-            assert name, f"nothing was told for 15 s; the last was {self.state} {self.news}"
+            assert name, f"nothing is told any more; the last was {self.state} {self.news}"
             match name:
                 case "hello":
                     self.hello = json.loads(data)
@@ -117,22 +130,25 @@ class Events:
 
 
 def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:
-    name = ""
+    name, silent = "", 0
     for raw in stream:
         line = raw.decode().rstrip("\r\n")
-        if line == ": still here":  # nothing was told for 15 s
-            return
-        if line.startswith("event: "):
+        if line == ": still here":  # nothing was told for some seconds
+            silent += 1
+            assert silent < 20, "nothing was told for minutes"
+        elif line.startswith("event: "):
             name = line.removeprefix("event: ")
         elif line.startswith("data: "):
+            silent = 0
             yield name, line.removeprefix("data: ")
 
 
 @contextlib.contextmanager
-def serving(folder: Folder, *arguments: str) -> Iterator[Preview]:
-    process = folder.start(
-        "serve", "--port", "0", *arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+def serving(
+    folder: Folder, *arguments: str, env: Mapping[str, str] | None = None, code: str = ""
+) -> Iterator[Preview]:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = folder.start("serve", "--port", "0", *arguments, env=env, code=code, **pipes)
     with ended(process):
         yield Preview(folder, process)
     wait_until_alone(folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 from collections.abc import Callable
@@ -27,6 +28,21 @@ def test_a_mistake_in_the_course_gives_1(make: Make, command: str) -> None:
     done = make(GOOD + "> [!nosuch]\n> Text.\n").main(command)
     assert done.status == 1
     assert done.out.startswith("error[callout-unknown]: ")
+
+
+def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> None:
+    """The collector is set as before, and no file stays open that only garbage holds."""
+    course = make(GOOD)
+    folder = Path("/proc/self/fd") if Path("/proc/self/fd").exists() else Path("/dev/fd")
+    before = gc.get_threshold(), gc.get_freeze_count()
+    course.main("check")
+    gc.collect()
+    opened = len(list(folder.iterdir()))
+    for _ in range(5):
+        course.main("check")
+    gc.collect()
+    assert len(list(folder.iterdir())) == opened
+    assert (gc.get_threshold(), gc.get_freeze_count()) == before
 
 
 @pytest.mark.parametrize("command", ["build", "check", "update", "extract"])

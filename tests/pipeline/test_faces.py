@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_skeleton import MAP, PARTS, assets, document, with_documents
+from skeletonkit import MAP, PARTS, document, library_of, with_documents
 
 from coursebuild.checks.course import check_course
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course, Document
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.faces import course_face, outline_face, results_face
-from coursebuild.render.lab_files import PublishedLabs
-from coursebuild.render.library import Library, document_scripts, lexicon_of, named_models, place
 from coursebuild.render.lookup.lexicon import lexicon
-from coursebuild.render.lookup.references import mentions
 from coursebuild.render.page_list import page_list
 from coursebuild.render.sheet import fingerprint
 from coursebuild.results import Outcome, Results, ScriptRun
@@ -50,18 +50,7 @@ def results_of(course: Course) -> Results:
 
 def seen_elsewhere(course: Course) -> list[object]:
     """What is seen of the first lesson by others: other pages, and whether anything is wrong."""
-    results = results_of(course)
-    library = Library.made(
-        course,
-        results,
-        assets(),
-        scripts_of=document_scripts,
-        models_of=named_models,
-        mentions_of=lambda document: mentions(document, course, lexicon_of(document, {})),
-        labs=PublishedLabs({}, ()),
-        formulas={},
-        verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
-    )
+    library = library_of(course, results_of(course))
     found: list[object] = [bool(check_course(course))]
     for page in page_list(library):
         if page.id != "1.1":
@@ -142,3 +131,29 @@ def test_the_face_of_results() -> None:
     assert results_face(replace(results, verdicts=verdicts), Reports()) != face
     models = (("box", None),)
     assert results_face(replace(results, models=models), Reports()) != face  # type: ignore[arg-type]
+
+
+_PRINTED = """
+import sys
+{first}
+from coursebuild.pipeline.faces import results_face
+from coursebuild.measured.shown import Reports
+from coursebuild.results import Outcome, Results, ScriptRun
+run = ScriptRun("a.py", Outcome.OK, 0, "one", "", 0.0)
+print(results_face(Results((run,), (), (), (), "3", "3"), Reports()))
+"""
+
+
+def test_a_face_does_not_depend_on_what_else_is_imported() -> None:
+    """It is compared with that of an earlier process."""
+    faces = set()
+    for seed, first in enumerate(("", "import coursebuild.pipeline.build", "import decimal")):
+        done = subprocess.run(
+            [sys.executable, "-c", _PRINTED.format(first=first)],
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+            capture_output=True,
+            check=True,
+            text=True,
+        )
+        faces.add(done.stdout)
+    assert len(faces) == 1

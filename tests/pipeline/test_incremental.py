@@ -1,128 +1,19 @@
-"""An incremental build gives what a clean one gives, and draws only what has changed."""
+"""An incremental build draws only what has changed."""
 
 from __future__ import annotations
 
-import re
 import shutil
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-from coursekit import Folder, block
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from editkit import LESSON, NORUN, QUIZ, Course, drawn
+from editkit import course as course
+from editkit import nothing_is_held as nothing_is_held
 
 from coursebuild.effects.store import Store
-from coursebuild.pipeline.build import prepare
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
-
-HEAD = """
-[course]
-title = "Tested"
-summary = "A course."
-base_url = "https://example.org/c/"
-
-[[page]]
-id = "about"
-title = "About"
-file = "content/pages/about.md"
-"""
-NORUN = block("s{n}.py", "import s1\nprint({n})\n", info="norun")
-LESSON = """## First
-
-Prose of {n} with $x_{n}$ and [the next](lesson:{next}).[^n]
-
-{script}
-> [!note] Remark
-> ![dot](../images/dot.png) and ==more==.
-
-$$
-E = {n}
-$$
-
-[^n]: A note.
-"""
-
-
-class Course:
-    """A course that is edited."""
-
-    def __init__(self, folder: Folder) -> None:
-        self.folder = folder
-        self.ids = ["1.1", "1.2", "1.3", "2.1", "2.2"]
-        self.titles = {id: f"Title {id}" for id in self.ids}
-        self.levels = {"1": "One", "2": "Two"}
-        self.needs = {"1.3": ["1.1"], "2.1": ["1.2"]}
-        self.planned = {"2.2"}
-        self.extra = ""
-        for n, id in enumerate(self.ids, 1):
-            following = self.ids[n % len(self.ids)]
-            if id not in self.planned:
-                self.write(id, LESSON.format(n=n, next=following, script=NORUN.format(n=n)))
-        folder.write("content/pages/about.md", "About *it*.\n\n## Part\n\nSee [m](model:box).\n")
-        folder.write("content/images/dot.png", b"\x89PNG")
-        folder.write("models/box.xml", "<mujoco/>\n")
-        self.save()
-
-    def path(self, id: str) -> str:
-        return f"content/lessons/{id}-l{id.replace('.', '')}.md"
-
-    def write(self, id: str, text: str) -> None:
-        self.folder.write(self.path(id), text)
-
-    def edit(self, id: str, old: str, new: str) -> None:
-        """An edit in a lesson, as far as there is something to edit."""
-        text = self.folder.text(self.path(id))
-        self.write(id, text.replace(old, new, 1))
-
-    def save(self) -> None:
-        """Write the map."""
-        parts = [HEAD, self.extra]
-        for level, title in self.levels.items():
-            parts.append(f'[[level]]\nid = "{level}"\ntitle = "{title}"\n')
-            for id in (id for id in self.ids if id.startswith(f"{level}.")):
-                needs = [need for need in self.needs.get(id, []) if need in self.ids]
-                parts.append(
-                    f'[[level.lesson]]\nid = "{id}"\nslug = "l{id.replace(".", "")}"\n'
-                    f'title = "{self.titles[id]}"\nprerequisites = {needs!r}\n'.replace("'", '"')
-                    + f'status = "{"planned" if id in self.planned else "complete"}"\n'
-                )
-        self.folder.write("content/course.toml", "\n".join(parts))
-
-
-def options(folder: Folder) -> Options:
-    return Options(folder.root.resolve(), 1, True)
-
-
-def drawn(folder: Folder) -> set[str]:
-    """The pages that a build draws anew, in words of their own."""
-    with prepare(options(folder), Progress(quiet=True)) as prepared:
-        assert prepared.report.ok, prepared.report.diagnostics
-        assert len(set(prepared.drawn)) == len(prepared.drawn)
-        return set(prepared.drawn)
 
 
 def lesson(id: str) -> str:
     return f"lessons/{id}-l{id.replace('.', '')}.html"
-
-
-@pytest.fixture(autouse=True)
-def nothing_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Documents are fetched anew each time, as they are in a long course."""
-    monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
-    monkeypatch.setattr("coursebuild.pipeline.shelf._LAST", 0)
-    monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
-
-
-@pytest.fixture
-def course(tmp_path: Path, stores: Path) -> Course:
-    folder = Folder(tmp_path / "course")
-    made = Course(folder)
-    folder.borrow(stores)
-    drawn(folder)
-    return made
 
 
 def test_nothing_changed_draws_nothing(course: Course) -> None:
@@ -200,14 +91,6 @@ def test_the_number_of_a_formula_draws_who_refers_to_it(course: Course) -> None:
     assert drawn(course.folder) == {lesson("1.1"), lesson("1.2")}
     course.edit("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}")
     assert drawn(course.folder) == {lesson("1.1")}
-
-
-QUIZ = """```quiz
-{"id": "asked", "title": "Check", "questions": [
-  {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}]}
-```
-
-"""
 
 
 def test_a_question_draws_the_lists_of_lessons(course: Course) -> None:
@@ -311,157 +194,3 @@ def test_a_broken_link_of_an_unchanged_page_is_found(course: Course) -> None:
     assert "`lessons/1.2-l12.html` has no anchor `#first`" in done.out
     course.edit("1.2", "## Last", "## First")
     assert course.folder.main("build", "--quiet").status == 0
-
-
-# --- any edits
-
-
-def prose(course: Course, id: str, text: str) -> None:
-    course.edit(id, "Prose", f"{text} Prose")
-
-
-def heading(course: Course, id: str, text: str) -> None:
-    course.edit(id, "## First", f"## {re.sub('[^a-z]', '', text) or 'h'}\n\n## First")
-
-
-def retitle(course: Course, id: str, text: str) -> None:
-    course.titles[id] = f"{re.sub('[^a-z é]', '', text)} {id}"
-
-
-def script(course: Course, id: str, text: str) -> None:
-    course.edit(id, "print(", f"print({text!a}, ")
-
-
-def plan(course: Course, id: str, text: str) -> None:
-    """A lesson is taken back, or written."""
-    if id in course.planned:
-        course.planned.discard(id)
-        n = course.ids.index(id) + 1 if id in course.ids else 9
-        course.write(id, LESSON.format(n=n, next="1.1", script=""))
-    else:
-        course.planned.add(id)
-        (course.folder.root / course.path(id)).unlink(missing_ok=True)
-
-
-def remove(course: Course, id: str, text: str) -> None:
-    """A lesson goes, or comes back at the end of its level."""
-    if id in course.ids:
-        course.ids.remove(id)
-        (course.folder.root / course.path(id)).unlink(missing_ok=True)
-    else:
-        course.ids.append(id)
-        if id not in course.planned:
-            course.write(id, LESSON.format(n=7, next="1.1", script=""))
-
-
-def turn(course: Course, id: str, text: str) -> None:
-    course.ids.reverse()
-
-
-def term(course: Course, id: str, text: str) -> None:
-    """A term is defined in a lesson, or no more; others link to the lesson where it was."""
-    path = course.folder.root / course.path(id)
-    name = f"[w{id}]{{term}}"
-    if name in path.read_text(encoding="utf-8"):
-        course.edit(id, name, f"[no term](lesson:{id})")
-    else:
-        course.edit(id, "Prose", f"A {name} is {text}: $q_{{{id}}}$. Prose")
-
-
-def label(course: Course, id: str, text: str) -> None:
-    """A formula gets a label, and is referred to, if it has none."""
-    course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
-
-
-def ask(course: Course, id: str, text: str) -> None:
-    """A lesson asks something, or something else."""
-    path = course.folder.root / course.path(id)
-    if "```quiz" in path.read_text(encoding="utf-8"):
-        course.edit(id, '"why', '"why-not')
-    else:
-        course.edit(id, "Prose", QUIZ.replace("asked", f"asked-{id}") + "Prose")
-
-
-def model(course: Course, id: str, text: str) -> None:
-    course.folder.write("models/box.xml", f"<mujoco><!--{text.replace('-', '')}--></mujoco>\n")
-
-
-def page(course: Course, id: str, text: str) -> None:
-    course.folder.write("content/pages/about.md", f"{text}\n\n[m](model:box) and $é$\n")
-
-
-def picture(course: Course, id: str, text: str) -> None:
-    course.folder.write("content/images/dot.png", text.encode())
-
-
-def breakage(course: Course, id: str, text: str) -> None:
-    """What keeps the course from being built, or mends it."""
-    course.extra = "" if course.extra else '[[silence]]\nrule = "no-such-rule"\nreason = "x"\n'
-
-
-EDITS: list[Callable[[Course, str, str], None]] = [
-    *(prose, heading, retitle, script, plan, remove, turn, model, page, picture, breakage),
-    *(term, label, ask),
-]
-WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b>"]
-
-
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(EDITS),
-            st.sampled_from(["1.1", "1.2", "1.3", "2.1", "2.2"]),
-            st.sampled_from(WORDS),
-            st.booleans(),
-        ),
-        min_size=1,
-        max_size=7,
-    )
-)
-@settings(max_examples=12)
-def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
-    stores: Path, edits: list[tuple[Callable[[Course, str, str], None], str, str, bool]]
-) -> None:
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Folder(Path(scratch).resolve() / "edited")
-        course = Course(folder)
-        folder.borrow(stores)
-        assert folder.main("build", "--quiet").status == 0
-        for edit, id, word, build in edits:
-            if (folder.root / course.path(id)).exists() or edit in (plan, remove, turn, retitle):
-                edit(course, id, word)
-                course.save()
-            if build:
-                folder.main("build", "--quiet")
-        status = folder.main("build", "--quiet").status
-        clean = Folder(folder.root.with_name("clean"))
-        for top in ("content", "models"):
-            shutil.copytree(folder.root / top, clean.root / top)
-        clean.borrow(stores)
-        assert clean.main("build", "--quiet").status == status
-        if status == 0:
-            assert differing(folder, clean) == []
-
-
-def differing(a: Folder, b: Folder) -> list[str]:
-    left, right = a.tree("public"), b.tree("public")
-    return sorted(path for path in left.keys() | right.keys() if left.get(path) != right.get(path))
-
-
-def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path) -> None:
-    """With as many lessons as it takes for them to be used."""
-    sites = []
-    for jobs in ("1", "3"):
-        folder = Folder(tmp_path / f"jobs {jobs}")
-        course = Course(folder)
-        for n in range(6, 22):
-            id = f"1.{n}"
-            course.ids.append(id)
-            course.titles[id] = f"Title {n}"
-            course.write(id, LESSON.format(n=n, next="1.1", script=NORUN.format(n=n)))
-        course.save()
-        folder.borrow(stores)
-        done = folder.run("build", "--quiet", "--jobs", jobs)
-        assert (done.status, done.out, done.err) == (0, "", "")
-        sites.append(folder.tree("public"))
-    assert sites[0] == sites[1]

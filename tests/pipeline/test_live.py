@@ -1,119 +1,23 @@
-"""A course in memory gives the site that a build gives, whatever was edited before."""
+"""A course in memory gives the site that a build gives, after one edit."""
 
 from __future__ import annotations
 
-import itertools
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from coursekit import GOOD, ROOT, Folder, block
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from livekit import Builds, Live, differences, share
+from livekit import builds as builds
+from livekit import live as live
 
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.preview.behind import Behind
-from coursebuild.pipeline.preview.live import LiveCourse
-from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.serve import live_course
 from coursebuild.results import ScriptJob, ScriptRun
 
 Make = Callable[..., Folder]
 FULL = ROOT / "tests/courses/full/course"
-COPIES = (".br", ".gz")
-OURS = (".coursebuild-site", "files.json", "service-worker.js")
-"""By which a folder is known for a site of the tool; what keeps it without a network."""
-TRIALS = ("labs", "mjb", "pictures")
-"""Stores of what takes long, and which live courses and clean builds share in these tests."""
-
-
-class Live:
-    """A live course without the threads of a preview."""
-
-    def __init__(self, folder: Folder) -> None:
-        self.folder = folder
-        options = Options(folder.root.resolve(), 2, True)
-        self.course: LiveCourse = live_course(options)
-        self.behind = Behind(self.course, options, Progress(quiet=True))
-        self.course.reread()
-
-    def save(self, *paths: str) -> bool:
-        """What `follow` does with a save; whether the fast way was taken."""
-        plan = self.course.plan(paths)
-        if plan is not None and self.course.commit(plan):
-            return True
-        self.behind.notice()
-        self.course.reread()
-        return False
-
-    def site(self) -> dict[str, bytes]:
-        """Everything, once all is known."""
-        self.behind.once()
-        found = {path: self.course.find(path) for path in self.course.pages.paths()}
-        return {path: data for path, data in found.items() if data is not None}
-
-    def close(self) -> None:
-        self.behind.close()
-        self.course.close()
-
-    def wrong(self) -> list[str]:
-        return sorted(d.rule for d in self.course.diagnostics() if d.severity.value == "error")
-
-
-@pytest.fixture
-def live() -> Iterator[Callable[[Folder], Live]]:
-    made: list[Live] = []
-
-    def make(folder: Folder) -> Live:
-        made.append(Live(folder))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.close()
-
-
-def share(folder: Folder, trials: Path) -> None:
-    """Keep trials of labs with other courses."""
-    for name in TRIALS:
-        (trials / name).mkdir(parents=True, exist_ok=True)
-        (folder.root / ".coursebuild" / name).symlink_to(trials / name)
-
-
-class Builds:
-    """Clean builds of what a folder holds, each in a folder of its own."""
-
-    def __init__(self, where: Path, stores: Path) -> None:
-        self.where, self.stores, self.numbers = where, stores, itertools.count()
-
-    def __call__(self, folder: Folder) -> dict[str, bytes] | None:
-        """The published files, or nothing for a course with mistakes."""
-        fresh = Folder(self.where / f"clean {next(self.numbers)}")
-        for top in ("content", "models", "docs"):
-            if (folder.root / top).is_dir():
-                shutil.copytree(folder.root / top, fresh.root / top)
-        fresh.borrow(self.stores)
-        share(fresh, self.where / "trials")
-        done = fresh.main("build")
-        if done.status != 0:
-            return None
-        site = fresh.tree("public")
-        return {p: d for p, d in site.items() if not p.endswith(COPIES) and p not in OURS}
-
-
-@pytest.fixture
-def builds(tmp_path: Path, stores: Path) -> Builds:
-    return Builds(tmp_path, stores)
-
-
-def differences(a: dict[str, bytes], b: dict[str, bytes]) -> list[str]:
-    return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
-
-
-# --- one edit
 
 
 def test_the_course_that_uses_everything(
@@ -337,128 +241,3 @@ def test_scripts_run_behind_and_only_those_that_changed(
     assert not running.save("models/ball.xml")
     running.site()
     assert len(started) == 3
-
-
-# --- any edits
-
-
-class Author:
-    """Edits of a course of three lessons."""
-
-    def __init__(self, folder: Folder) -> None:
-        self.folder = folder
-        self.counter = itertools.count()
-
-    def prose(self, lesson: int) -> list[str]:
-        return self.add(lesson, f"Paragraph {next(self.counter)} with `code` and *emphasis*.\n\n")
-
-    def formula(self, lesson: int) -> list[str]:
-        return self.add(lesson, f"$$\n\\int x^{{{next(self.counter)}}}\\,dx\n$$\n\n")
-
-    def characters(self, lesson: int) -> list[str]:
-        return self.add(lesson, f"{chr(0x3B1 + next(self.counter) % 20)} and → ∮ Ж.\n\n")
-
-    def style(self, lesson: int) -> list[str]:
-        return self.add(lesson, f'<p style="margin-top: {next(self.counter)}px">Styled.</p>\n\n')
-
-    def heading(self, lesson: int) -> list[str]:
-        return self.add(lesson, f"## Heading {next(self.counter)}\n\n")
-
-    def script(self, lesson: int) -> list[str]:
-        number = next(self.counter)
-        return self.add(lesson, block(f"made{number}.py", f"print({number})", str(number)))
-
-    def output(self, lesson: int) -> list[str]:
-        """A script that prints another thing, with its recorded output."""
-        path = self.folder.lesson(lesson)
-        number = next(self.counter)
-        text = self.folder.text(path)
-        self.folder.write(path, text.replace("hello", f"hello{number}"))
-        return [path]
-
-    def question(self, lesson: int) -> list[str]:
-        number = next(self.counter)
-        quiz = (
-            f'{{"id": "q{number}", "title": "Quiz", "questions": [{{"kind": "output", '
-            f'"q": "What?", "of": "examples/hello1.py", "line": 1}}]}}'
-        )
-        return self.add(lesson, f"```quiz\n{quiz}\n```\n\n")
-
-    def link(self, lesson: int) -> list[str]:
-        return self.add(lesson, "See [the ball](model:ball) and lesson [two](lesson:1.2).\n\n")
-
-    def model(self, lesson: int) -> list[str]:
-        size = 1 + next(self.counter)
-        text = f"<mujoco><worldbody><geom size='{size}'/></worldbody></mujoco>"
-        self.folder.write("models/ball.xml", text)
-        return ["models/ball.xml"]
-
-    def picture(self, lesson: int) -> list[str]:
-        name = f"pic{next(self.counter)}.svg"
-        self.folder.write(f"content/{name}", '<svg xmlns="http://www.w3.org/2000/svg"/>')
-        return [f"content/{name}", *self.add(lesson, f"![A picture](../{name})\n\n")]
-
-    def map(self, lesson: int) -> list[str]:
-        text = self.folder.text("content/course.toml")
-        title = f'title = "Scratch {next(self.counter)}"'
-        self.folder.write("content/course.toml", text.replace('title = "Scratch"', title, 1))
-        return ["content/course.toml"]
-
-    def mistake(self, lesson: int) -> list[str]:
-        return self.add(lesson, "[gone](lesson:9.9)\n\n")
-
-    def mend(self, lesson: int) -> list[str]:
-        path = self.folder.lesson(lesson)
-        self.folder.write(path, self.folder.text(path).replace("[gone](lesson:9.9)\n\n", ""))
-        return [path]
-
-    def cut(self, lesson: int) -> list[str]:
-        """Half of what was added is gone."""
-        path = self.folder.lesson(lesson)
-        kept = self.folder.text(path).split("\n\n## Heading")[0]
-        self.folder.write(path, kept + "\n")
-        return [path]
-
-    def add(self, lesson: int, text: str) -> list[str]:
-        path = self.folder.lesson(lesson)
-        self.folder.write(path, self.folder.text(path) + "\n" + text)
-        return [path]
-
-
-EDITS = [name for name in vars(Author) if not name.startswith("_") and name != "add"]
-
-
-@pytest.mark.slow
-@settings(max_examples=6)
-@given(data=st.data())
-def test_after_any_edits_it_is_what_a_clean_build_gives(
-    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory, stores: Path
-) -> None:
-    where = tmp_path_factory.mktemp("live")
-    folder = Folder(where / "course")
-    lessons = [
-        GOOD.replace("hello.py", f"hello{n}.py").replace("## Hello", f"## Hello {n}")
-        for n in (1, 2, 3)
-    ]
-    folder.fill(lessons, stores)
-    text = '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'
-    folder.write("models/ball.xml", text)
-    builds = Builds(where, stores)
-    author = Author(folder)
-    running = Live(folder)
-    try:
-        for _ in range(data.draw(st.integers(1, 4), label="rounds")):
-            edits = st.lists(st.tuples(st.sampled_from(EDITS), st.integers(1, 3)), max_size=4)
-            for name, lesson in data.draw(edits, label="edits"):
-                running.save(*getattr(author, name)(lesson))
-                if data.draw(st.booleans(), label="all of it"):
-                    running.behind.once()
-            built = builds(folder)
-            site = running.site()
-            if built is None:
-                assert running.wrong()
-            else:
-                assert running.wrong() == []
-                assert differences(site, built) == []
-    finally:
-        running.close()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from coursekit import Folder
-from test_live import Builds, Live
-from test_live import builds as builds
-from test_live import live as live
+from livekit import Builds, Live
+from livekit import builds as builds
+from livekit import live as live
 
 ONE, TWO = "content/lessons/1.1-one.md", "content/lessons/1.2-two.md"
 

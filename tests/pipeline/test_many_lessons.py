@@ -14,7 +14,7 @@ from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.render.exports import tags
-from coursebuild.results import KeptFile, OutputFile
+from coursebuild.results import KeptFile, OutputFile, made
 
 FEW, MANY = 12, 96
 TEXT = 20_000
@@ -55,7 +55,7 @@ def peak(folder: Folder) -> int:
             for file in prepared.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
                     assert isinstance(file, KeptFile)
-                    for _ in file.pieces() if file.pieces is not None else (file.make(),):
+                    for _ in made(file.pieces() if file.pieces is not None else (file.make(),)):
                         pass  # as it is written
         return tracemalloc.get_traced_memory()[1]
     finally:
@@ -67,9 +67,10 @@ def peak(folder: Folder) -> int:
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Caches of a fixed size are left out: they would be filled by the longer course only."""
     monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
-    monkeypatch.setattr("coursebuild.pipeline.shelf.CODE_ROOM", 0)
     monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
     monkeypatch.setattr("coursebuild.pipeline.reading._COLLECT", 4)
+    monkeypatch.setattr("coursebuild.render.exports.chapters._ROOM", 0)
+    monkeypatch.setattr("coursebuild.render.search.counting._MOST", 0)
     monkeypatch.setattr("coursebuild.render.exports.rewrite._MANY", 0)
     monkeypatch.setattr("coursebuild.render.exports.tags._short", tags._read)
     monkeypatch.setattr("coursebuild.pipeline.documents._AT_ONCE", 8)

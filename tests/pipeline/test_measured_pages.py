@@ -2,97 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 from coursekit import GOOD, Folder
+from recordkit import BOX, NUMERICS, PAGE, Course
+from reportkit import case
 from servekit import serving
 
 from coursebuild.effects.versions import engine_version
-from coursebuild.measured.bench import SceneReport
 from coursebuild.measured.records import (
     STABILITY_PATH,
     bench_path,
-    diet_path,
     encode_bench,
-    encode_diet,
     encode_stability,
 )
-from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import scene_digest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "render"))
-
-from reportkit import box, case, diet, finding
-
-BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
-PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'
-PAGE, NUMERICS = "models/box.html", "numerics/index.html"
-
-
-class Course:
-    """A course with a model that was measured."""
-
-    def __init__(self, folder: Folder) -> None:
-        self.folder = folder
-        folder.write("models/box.xml", BOX)
-        folder.write("models/arm/part.xml", PART)
-        folder.write("models/cup.xml", PART)
-
-    def digest(self) -> str:
-        """Of the model as it is."""
-        course = load(self.folder.root).course
-        assert course is not None
-        model = next(one for one in course.models if one.name == "box")
-        declared = next((one for one in course.declarations if one.model == "box"), None)
-        return scene_digest(self.folder.root, model, declared)
-
-    def bench(self, **other: Any) -> SceneReport:
-        here = replace(box().machine, engine=engine_version())
-        return replace(box(), **{"digest": self.digest(), "machine": here, **other})
-
-    def record(self) -> None:
-        """Put reports into the course."""
-        self.folder.write(bench_path("box"), encode_bench(self.bench()))
-        self.write_diet("nobody reads it")
-        self.write_cases("it swings")
-
-    def write_diet(self, message: str) -> None:
-        report = diet(finding(message=message))
-        here = replace(report.machine, engine=engine_version())
-        report = replace(report, digest=self.digest(), machine=here)
-        self.folder.write(diet_path("box"), encode_diet(report))
-
-    def write_cases(self, note: str) -> None:
-        cases = (case("spring", 5, engine=engine_version(), note=note),)
-        self.folder.write(STABILITY_PATH, encode_stability(cases))
-
-    def build(self, *arguments: str) -> str:
-        """What is wrong, which has to be nothing that keeps the site from being published."""
-        done = self.folder.main("build", "-q", *arguments)
-        assert done.status == 0, done.out
-        return done.out
-
-    def page(self, path: str = PAGE) -> str:
-        return self.folder.text(f"public/{path}")
-
-    def drawn(self) -> set[str]:
-        """The pages that a build draws now."""
-        options = Options(self.folder.root, jobs=1, quiet=True)
-        with prepare(options, Progress(quiet=True)) as prepared:
-            assert prepared.report.ok, prepared.report.diagnostics
-            for file in prepared.files:
-                if file.path.endswith(".html"):
-                    file.make()
-            return set(prepared.drawn)
 
 
 @pytest.fixture
@@ -202,7 +130,7 @@ def test_a_check_tells_it_too_and_can_be_told_to_be_silent(course: Course) -> No
 
 def test_the_preview_follows_a_report(course: Course) -> None:
     def shown(path: str, text: str) -> bool:
-        until = time.monotonic() + 30
+        until = time.monotonic() + 300
         while text not in preview.get(path)[2].decode():
             if time.monotonic() > until:
                 return False

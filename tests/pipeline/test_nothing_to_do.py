@@ -10,6 +10,9 @@ from collections.abc import Callable
 import pytest
 from coursekit import FIRST, ROOT, Folder, block
 
+from coursebuild.effects.conditions import _SAYS_NOTHING
+from coursebuild.effects.surroundings import _PASSED_ON
+
 Make = Callable[..., Folder]
 
 
@@ -42,10 +45,30 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
         "1 lesson, 0 scripts run, 1 cached: everything holds\n"
     )
     assert done.stderr == (
-        "['coursebuild.cli', 'coursebuild.cli.arguments', 'coursebuild.cli.commands', "
-        "'coursebuild.cli.output', 'coursebuild.effects', 'coursebuild.effects.errors', "
+        "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
+        "'coursebuild.effects', "
         "'coursebuild.effects.place', 'coursebuild.effects.stamp']\n"
     )
+
+
+def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
+    """What is compiled, measured, drawn from reports, cut or read from HTML was not edited."""
+    folder = make(FIRST)
+    code = (
+        "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
+        "rare = {'mujoco', 'numpy', 'jinja2', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
+        " 'subprocess', 'coursebuild.effects.v8_library', 'coursebuild.measured.bench',"
+        " 'coursebuild.measured.points', 'coursebuild.render.cutting',"
+        " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"
+        " 'coursebuild.report.machine'};"
+        "print(sorted(rare & set(sys.modules)), file=sys.stderr); sys.exit(status)"
+    )
+    command = [sys.executable, "-c", code, "-C", str(folder.root), "build", "-q"]
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run(command, check=True, capture_output=True, env=env)
+    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nOne more.\n")
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
+    assert done.stderr == "[]\n"
 
 
 @pytest.mark.parametrize("wrong", [["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"]])
@@ -58,9 +81,107 @@ def test_wrong_usage_is_told_also_where_there_is_nothing_to_do(
     assert folder.main("check", *wrong).status == 2
 
 
+def test_a_stamp_goes_by_the_words_of_its_command(make: Make) -> None:
+    """And not by how it is said which course is meant."""
+    folder = make(FIRST)
+    aged(folder)
+    told = "nothing has changed"
+    assert told not in folder.main("check").out
+    assert told in folder.main("check").out
+    assert told in folder.main("-C", str(folder.root), "check", cwd=folder.root.parent).out
+    assert told in folder.main("check", cwd=folder.root / "content").out
+    assert told not in folder.main("check", "--no-cache").out
+    assert told in folder.main("check").out
+    for other in (["check", "-j", "1"], ["check", folder.lesson()], ["check", "--no-such"]):
+        assert told not in folder.main(*other).out
+    for elsewhere in (["-C", str(folder.root / "content"), "check"], [], ["-C"]):
+        assert told not in folder.main(*elsewhere).out
+
+
 def test_what_changed_is_looked_at_again(make: Make) -> None:
     folder = make(FIRST)
     aged(folder)
     assert folder.main("check").status == 0
     folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(2)", "1"))
+    assert folder.main("check").status == 1
+
+
+def test_a_lesson_in_whose_place_is_a_link_out_of_the_course_is_looked_at(make: Make) -> None:
+    folder = make(FIRST)
+    aged(folder)
+    assert folder.main("check").status == 0
+    away = folder.root.with_name("away.md")
+    (folder.root / folder.lesson()).rename(away)
+    (folder.root / folder.lesson()).symlink_to(away)
+    done = folder.main("check")
+    assert done.status == 1
+    assert "nothing has changed" not in done.out
+
+
+@pytest.mark.parametrize("name", sorted({*_PASSED_ON} - _SAYS_NOTHING))
+def test_what_scripts_see_of_the_environment_is_looked_at(
+    make: Make, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    folder = make(FIRST)
+    aged(folder)
+    assert folder.main("check").status == 0
+    assert "nothing has changed" in folder.main("check").out
+    monkeypatch.setenv(name, "egl")
+    assert "nothing has changed" not in folder.main("check").out
+
+
+def test_from_where_a_path_is_meant_is_looked_at(make: Make) -> None:
+    folder = make(FIRST)
+    (folder.root / "data").mkdir()
+    aged(folder)
+    command = ("check", f"../{folder.lesson().removeprefix('content/')}")
+    inner = folder.root / "content" / "lessons"
+    for told in (False, True):
+        done = folder.main(*command, cwd=inner)
+        assert (done.status, "nothing has changed" in done.out) == (0, told)
+    done = folder.main(*command, cwd=folder.root / "data")
+    assert (done.status, done.out) == (2, "")
+    assert "no lesson or page is called" in done.err
+
+
+def test_a_course_without_a_name_is_here(make: Make) -> None:
+    folder = make(FIRST)
+    aged(folder)
+    assert folder.main("-C", "", "check").status == 0
+    assert "nothing has changed" in folder.main("-C", "", "check").out
+    done = folder.main("-C", "", "check", cwd=folder.root / "content")
+    assert done.status == 1
+    assert "map-missing" in done.out
+
+
+def test_a_working_directory_that_is_gone(make: Make) -> None:
+    folder = make(FIRST)
+    gone = folder.root / "gone"
+    gone.mkdir()
+    code = (
+        "import os, sys; from coursebuild.cli import main;os.rmdir(os.getcwd()); sys.exit(main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "check"],
+        cwd=gone,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.endswith("the working directory is not there any more\n")
+    assert "Traceback" not in done.stderr
+
+
+def test_an_edit_that_puts_the_time_of_its_file_back_is_seen(make: Make) -> None:
+    folder = make(FIRST)
+    aged(folder)
+    assert folder.main("check").status == 0
+    assert "nothing has changed" in folder.main("check").out
+    lesson = folder.root / folder.lesson()
+    before = lesson.stat()
+    lesson.write_bytes(lesson.read_bytes().replace(b"print(1)", b"print(2)"))
+    os.utime(lesson, ns=(before.st_atime_ns, before.st_mtime_ns))
+    after = lesson.stat()
+    assert (after.st_size, after.st_mtime_ns) == (before.st_size, before.st_mtime_ns)
     assert folder.main("check").status == 1

@@ -9,7 +9,7 @@ import pytest
 from chromium import launch
 from coursekit import GOOD, ROOT, Folder
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
-from test_serving import Preview, serving
+from servekit import Preview, serving
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser

@@ -68,7 +68,7 @@ def test_jobs_run_at_a_time(make: Make) -> None:
 import pathlib, sys, time
 mine, other = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 mine.touch()
-for _ in range(600):
+for _ in range(12_000):
     if other.exists():
         break
     time.sleep(0.01)
@@ -77,8 +77,8 @@ else:
 """
     folder = make(
         "## Two that meet\n\n"
-        + block("a.py", meet, info='args="../met-a ../met-b" timeout=9')
-        + block("b.py", meet, info='args="../met-b ../met-a" timeout=9')
+        + block("a.py", meet, info='args="../met-a ../met-b" timeout=300')
+        + block("b.py", meet, info='args="../met-b ../met-a" timeout=300')
     )
     assert folder.main("check", "--jobs", "2").status == 0
 
@@ -115,6 +115,13 @@ def test_json_of_a_clean_course(make: Make) -> None:
     found = json.loads(done.out)
     assert found["diagnostics"] == []
     assert found["summary"]["ok"] is True
+
+
+def test_json_tells_what_ran_from_what_is_remembered(make: Make) -> None:
+    folder = make(GOOD)
+    for expected in ((1, 0), (0, 1)):
+        found = json.loads(folder.main("check", "--format", "json", "--quiet").out)
+        assert (found["summary"]["ran"], found["summary"]["cached"]) == expected
 
 
 def test_json_of_a_broken_map(make: Make) -> None:

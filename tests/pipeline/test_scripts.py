@@ -121,7 +121,7 @@ WRONG = {
     "status": ("raise SystemExit(77)", "script-failed", "exited with status 77"),
     "killed": ("import os\nos.kill(os.getpid(), 9)", "script-killed", "was ended by SIGKILL"),
     "crash": ("import os\nos.abort()", "script-killed", "was ended by SIGABRT"),
-    "slow": ("import time\ntime.sleep(30)", "script-timeout", "was stopped after 0.4 s"),
+    "slow": ("import time\ntime.sleep(600)", "script-timeout", "was stopped after 0.4 s"),
     "deaf": (
         "import signal, time\n"
         "for n in (2, 6, 15):\n    signal.signal(n, signal.SIG_IGN)\n"
@@ -148,7 +148,7 @@ def test_every_way_to_go_wrong_is_told_in_one_run(make: Make) -> None:
     folder = make(lesson)
     began = time.monotonic()
     done = folder.main("check", "--format", "json")
-    assert time.monotonic() - began < 25
+    assert time.monotonic() - began < 300
     assert done.status == 1
     found = json.loads(done.out)
     told = [(d["rule"], d["message"]) for d in found["diagnostics"]]
@@ -161,15 +161,15 @@ def test_every_way_to_go_wrong_is_told_in_one_run(make: Make) -> None:
 def test_what_a_script_leaves_running_is_ended(make: Make) -> None:
     code = """
 import subprocess, sys, time
-subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"], start_new_session=True)
-subprocess.Popen(["sh", "-c", "(sleep 60 &) ; sleep 60"])
+subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
+subprocess.Popen(["sh", "-c", "(sleep 600 &) ; sleep 600"])
 print("done")
 """
     folder = make("## One\n\n" + block("x.py", code, "done"))
     began = time.monotonic()
     done = folder.run("check")
     assert done.status == 0, done.out
-    assert time.monotonic() - began < 30
+    assert time.monotonic() - began < 300
     wait_until_alone(folder)
 
 

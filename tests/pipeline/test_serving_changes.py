@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from coursekit import GOOD, Folder, block
-from servekit import serving
+from servekit import PATIENT, serving
 
 Make = Callable[..., Folder]
 
@@ -129,7 +129,7 @@ def gone_for_a_moment(path: Path, text: str) -> None:
 
 def test_saves_of_every_editor_count_once(make: Make) -> None:
     folder = make(GOOD)
-    with serving(folder) as preview, preview.events() as events:
+    with serving(folder, code=PATIENT) as preview, preview.events() as events:
         events.settled()
         for name, save in SAVES.items():
             state, before = events.state, len(preview.said)
@@ -145,7 +145,7 @@ def test_a_switched_branch_is_one_change(make: Make) -> None:
     folder = make(*("## One\n" for _ in range(6)))
     for number in range(300):
         folder.write(f"content/pics/{number}.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
-    with serving(folder) as preview, preview.events() as events:
+    with serving(folder, code=PATIENT) as preview, preview.events() as events:
         events.settled()
         before = len(preview.said)
         for number in range(300):
@@ -199,7 +199,8 @@ def test_what_is_not_of_the_course_is_no_change(make: Make) -> None:
 
 
 def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
-    slow = "import time, pathlib\npathlib.Path('begun').touch()\ntime.sleep(0.7)\nprint(1)"
+    slow = "import time, pathlib\npathlib.Path('begun').touch()\n"
+    slow += "while not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
     folder = make("## First\n\n" + block("x.py", slow, "1"))
     with serving(folder) as preview, preview.events() as events:
         until = time.monotonic() + 120
@@ -211,6 +212,7 @@ def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
         ]
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
+        folder.write("go", "")
         events.settled()
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import pytest
 from coursekit import GOOD, Folder
+from recordkit import PAGE, Course
 from servekit import serving
-from test_measured_pages import PAGE, Course
 
 from coursebuild.measured.records import bench_path, encode_bench
 
@@ -143,7 +143,7 @@ def test_the_preview_follows_a_report_in_a_lesson(course: Course) -> None:
         page = f"lessons/{path.removesuffix('.md')}.html"
 
         def shown(text: str) -> bool:
-            until = time.monotonic() + 60
+            until = time.monotonic() + 300
             while text not in preview.get(page)[2].decode():
                 if time.monotonic() > until:
                     return False

@@ -41,6 +41,9 @@ def drafts() -> list[Draft]:
         replace(one, path="levels/1.html", kind="level", description=""),
         replace(one, path="levels/2.html", kind="level"),
         replace(one, path="models/a/b.html", kind="model"),
+        replace(one, path="course/index.html", kind="book", indexed=False),
+        replace(one, path="course/1.html", kind="book", indexed=False),
+        replace(one, path="course/2.html", kind="book", title=HOSTILE, indexed=False),
         replace(one, path="about.html", kind="page"),
         replace(one, path="index.html", kind="home", title="Bodies & <axes>"),
         replace(one, path="404.html", kind="notfound", indexed=False),
@@ -48,9 +51,10 @@ def drafts() -> list[Draft]:
 
 
 @pytest.mark.parametrize("base_url", ["", "https://example.org/course/"])
-def test_they_are_the_same(make: Make, base_url: str) -> None:
+@pytest.mark.parametrize("title", ["Bodies", "Icons \ue000icon\ue001 & \ue001more\ue000"])
+def test_they_are_the_same(make: Make, base_url: str, title: str) -> None:
     made = make("Text.")
-    course = replace(made.course, base_url=base_url)
+    course = replace(made.course, base_url=base_url, title=title)
     library = Library.of(course, made.results, made.assets)
     frames = Frames(library, NAMES)
     for parts in ((), ("labs",), ("labs", "quiz"), ()):

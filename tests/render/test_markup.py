@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from markupsafe import Markup
 
-from coursebuild.model import Document, NumberBinding, Target
-from coursebuild.render.markup import (
-    Look,
-    OwnBlock,
-    Words,
-    render_blocks,
-    render_footnotes,
-    render_inlines,
-)
+from coursebuild.model import Document, NumberBinding, Target, Text
+from coursebuild.render.look import Look, OwnBlock, Words
+from coursebuild.render.markup import render_blocks, render_footnotes, render_inlines
 from coursebuild.render.plain import PlainContext, plain_html
-from coursebuild.source import Source
+from coursebuild.render.quantities import in_order, joined, quantities
+from coursebuild.source import Source, Span
 from coursebuild.syntax.document import parse_document
 
 KINDS = frozenset({"note"})
@@ -187,3 +184,17 @@ def test_plain_html_of_own_blocks() -> None:
         '<p><code>1</code> <a href="page:b#c">a</a> <a href="model:e">d</a>'
         ' <a href="examples/x.py">f</a></p>\n'
     )
+
+
+_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+
+
+@given(st.text(alphabet="aµ 0123.,·kgm²<>&\"'×−%°\n\u00a0", max_size=24) | st.text())
+def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
+    inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
+    known = joined(text).translate(_ESCAPES)
+    assert render_inlines(inlines, Page(), Look(quantities="ltr")) == known
+    pieces = ((Markup(one.translate(_ESCAPES)), kept) for one, kept in quantities(joined(text)))
+    known = "".join(in_order(html) if kept else html for html, kept in pieces)
+    assert render_inlines(inlines, Page(), Look(quantities="rtl")) == known
+    assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

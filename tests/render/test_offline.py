@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coursebuild.render.offline import PAPER, facts_of, listing, short_name
 from coursebuild.results import FileFacts, OutputFile
@@ -118,6 +120,14 @@ def test_the_list_of_a_site_is_what_is_there(site: dict[str, bytes]) -> None:
         for name in re.findall(r'(?:src|href)="(?:\.\./)?(assets/[^"]+\.(?:css|js|svg))"', text):
             assert name in shell, name
     assert data["text"]["bytes"] == sum(len(site[path]) for path in data["text"]["files"])
+
+
+@given(st.lists(st.text(alphabet='ab"\\\n,é\ud800/.', max_size=6), unique=True, max_size=5))
+def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
+    files = [FileFacts(f"assets/{name}.js", "0" * 64, size) for size, name in enumerate(names)]
+    text = listing(SHELL, files).decode("utf-8", "surrogatepass")
+    assert f"{json.dumps(json.loads(text), ensure_ascii=False, indent=0)}\n" == text
+    assert [*json.loads(text)["text"]["files"]] == [one.path for one in files]
 
 
 def test_facts_come_sorted() -> None:

@@ -25,15 +25,14 @@ from coursebuild.effects.resources import assets_dir
 from coursebuild.render import Assets
 from coursebuild.render.assets import SCRIPTS, page_script
 from coursebuild.render.compressed import compressed_files
+from coursebuild.render.cutting import covered, measured
 from coursebuild.render.fonts import (
     BASE,
     MATH,
     VERSION,
     FontJob,
     characters_in,
-    covered,
     font_jobs,
-    measured,
     read_faces,
     ready_font,
 )

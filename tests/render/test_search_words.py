@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.render.search import words
+from coursebuild.render.search import tex, words
+from coursebuild.render.search.counting import counted
 from coursebuild.render.search.index import _hash
 from coursebuild.render.search.tex import plain_formula
-from coursebuild.render.search.words import counted, is_fuzzy, shelf_of, terms_of
+from coursebuild.render.search.words import is_fuzzy, shelf_of, terms_of
 
 AGREED = json.loads(
     (Path(__file__).parents[2] / "site" / "tests" / "search-words.json").read_text("utf-8")
@@ -53,7 +55,7 @@ def test_text_without_foreign_letters_is_read_in_no_other_way(text: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("tex", "text", "names"),
+    ("formula", "text", "names"),
     [
         (r"I_{xx}", "I_xx", ()),
         (r"\boldsymbol{\tau} = I\dot{\omega} + \omega\times(I\omega)", "τ = I ω + ω × (I ω)", ...),
@@ -78,14 +80,25 @@ def test_text_without_foreign_letters_is_read_in_no_other_way(text: str) -> None
         ("{" * 3000 + "x" + "}" * 3000, "x", ()),
     ],
 )
-def test_a_formula_as_text(tex: str, text: str, names: tuple[str, ...]) -> None:
-    found, said = plain_formula(tex)
+def test_a_formula_as_text(formula: str, text: str, names: tuple[str, ...]) -> None:
+    found, said = plain_formula(formula)
     assert found == text
     assert names is ... or said == names
 
 
+BLANKS = st.text(alphabet="_^([|⟨)]⟩,;Δδ∂∇ a1é", max_size=12)
+
+
+@given(BLANKS.map(lambda text: " ".join(text.split())))
+def test_blanks_that_are_left_out(text: str) -> None:
+    slow = re.sub(r"(?<=[_^]) | (?=[_^])", "", text)
+    assert tex._TIGHT.sub("", text) == slow
+    assert tex._INNER.sub("", text) == re.sub(r"(?<=[(\[|⟨]) | (?=[)\]⟩,;])", "", text)
+    assert tex._OPERATOR.sub("", text) == re.sub(r"(?<=[Δδ∂∇]) (?=[^\W\d])", "", text)
+
+
 @given(st.text(alphabet=r"\{}_^&~'% abαomegfrct1-+=()", max_size=60))
-def test_no_formula_is_too_odd(tex: str) -> None:
-    text, names = plain_formula(tex)
-    assert "{" not in text or r"\{" in tex
+def test_no_formula_is_too_odd(formula: str) -> None:
+    text, names = plain_formula(formula)
+    assert "{" not in text or r"\{" in formula
     assert all(name.isalpha() for name in names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -255,3 +256,31 @@ def test_modules_sought_in_vain_are_one_need_a_folder() -> None:
         "examples/json.py",
         "examples/json/__init__.py",
     )
+
+
+PARTS = st.lists(st.sampled_from(("a", "b-c", "__init__", "é")), min_size=1, max_size=3)
+NAMED = st.builds(
+    lambda parts, end: "/".join(parts) + end,
+    PARTS,
+    st.sampled_from((".py", "/__init__.py", "", ".txt")),
+)
+
+
+@given(st.sets(NAMED), st.sets(NAMED), st.randoms())
+def test_folding_leaves_nothing_out(names: set[str], there: set[str], random: Random) -> None:
+    def state(need: Need) -> str:
+        return "1" if need.name in there else ABSENT
+
+    needed = [Need(Kind.FILE, name) for name in sorted(names)] + [Need(Kind.MODULE, "a.py")]
+    found = folded(needed, state)
+    random.shuffle(needed)
+    assert folded(needed, state) == found
+    left = {need.name for need in found if need.kind is Kind.FILE}
+    hidden = [one for need in found if need.kind is Kind.SOUGHT for one in sought_files(need.name)]
+    assert sorted([*left, *hidden]) == sorted(names)
+    assert not there.intersection(hidden)
+    folders = [sought(need.name)[0] for need in found if need.kind is Kind.SOUGHT]
+    assert len(folders) == len(set(folders))
+    modules = (name.removesuffix(".py") for name in left if name.endswith(".py"))
+    pairs = [(f"{m}.py", f"{m}/__init__.py") for m in modules if m.split("/")[-1].isidentifier()]
+    assert all(pair[1] not in left or there.intersection(pair) for pair in pairs)

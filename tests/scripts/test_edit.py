@@ -1,78 +1,18 @@
+"""New outputs as edits of a lesson's text, and what is refused."""
+
 from __future__ import annotations
 
 import re
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from sample_lessons import (
-    DIGITS,
-    DIGITS_ELLIPSIS,
-    ELLIPSIS,
-    EXACT,
-    VOLATILE,
-    document,
-    recording,
-    recordings,
-    table,
-    told,
-    within,
-)
+from sample_edits import body, edited, refused
+from sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, VOLATILE, recording
 
-from coursebuild.diagnostics import Diagnostic, Edit
-from coursebuild.model import Comparison, Filter, Recording
-from coursebuild.scripts.compare import compare
+from coursebuild.diagnostics import Edit
+from coursebuild.model import Comparison, Filter
 from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.source import Source
-
-
-def edited(
-    lesson: Recording,
-    printed: str,
-    comparison: Comparison = EXACT,
-    filters: tuple[Filter, ...] = (),
-    again: str | None = None,
-) -> Recording:
-    """The recording after its update; a second update has nothing to do."""
-    edit = updated_body(lesson, comparison, filters, printed, printed if again is None else again)
-    assert isinstance(edit, Edit), edit
-    source = lesson.span.source
-    text = apply_edits(source.text, [edit])
-    assert text[: edit.span.start] == source.text[: edit.span.start]
-    assert text[edit.span.start + len(edit.text) :] == source.text[edit.span.end :]
-    (new,) = recordings(document(text, source.path, lesson.prefix))
-    assert updated_body(new, comparison, filters, printed, printed) is None
-    verdict = compare(new, comparison, filters, printed)
-    assert verdict.status in ("verified", "volatile")
-    return new
-
-
-def body(
-    recorded: str,
-    printed: str,
-    comparison: Comparison = EXACT,
-    filters: tuple[Filter, ...] = (),
-    **lesson: str,
-) -> str:
-    new = edited(recording(recorded, **lesson), printed, comparison, filters)
-    start, end = new.body_span.start, new.body_span.end
-    return new.span.source.text[start:end]
-
-
-def refused(
-    recorded: str,
-    printed: str,
-    comparison: Comparison = EXACT,
-    again: str | None = None,
-    **lesson: str,
-) -> str:
-    found = updated_body(
-        recording(recorded, **lesson), comparison, (), printed, printed if again is None else again
-    )
-    assert isinstance(found, Diagnostic), found
-    return told(found)
-
 
 # ------------------------------------------------------------------------------------ new text
 
@@ -261,73 +201,6 @@ def test_filters_see_no_white_space_at_ends() -> None:
     assert updated_body(recording("b 1"), EXACT, (Filter(r"^b.*\n", ""),), "b 2", "b 3") is None
 
 
-# ---------------------------------------------------------------------------------------- tables
-
-HEAD = "| a | b | c |\n| --- | --- | --- |\n"
-
-
-def table_after(
-    rows: str, printed: str, comparison: Comparison = EXACT, filters: tuple[Filter, ...] = ()
-) -> str:
-    new = edited(table(HEAD + rows), printed, comparison, filters)
-    return new.body_span.text.removeprefix(HEAD)
-
-
-def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
-    rows = "| `RK4` | **−0.000 %** |  3.9e-11|\n| Euler | +6.641 % | 6.9e-04 |"
-    printed = "RK4    -0.001 % of 3.9e-11\nEuler  +6.702 % of 7.5e-04\n"
-    assert table_after(rows, printed) == (
-        "| `RK4` | **−0.001 %** |  3.9e-11|\n| Euler | +6.702 % | 7.5e-04 |"
-    )
-
-
-def test_a_table_under_digits_keeps_its_decimals() -> None:
-    rows = "| Euler | 6.6 | 7e-04 |\n| RK4 | −1.25 | 4 |"
-    printed = "Euler +6.7021 9.12e-04\nRK4 -2.349 5\n"
-    assert table_after(rows, printed, DIGITS) == "| Euler | 6.7 | 9e-04 |\n| RK4 | −2.35 | 5 |"
-    assert table_after(rows, printed, within("0.01")) == (
-        "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
-    )
-
-
-def test_a_table_that_matches_is_left_alone() -> None:
-    for comparison in (EXACT, VOLATILE):
-        assert updated_body(table(HEAD + "| x | 1.5 | |"), comparison, (), "x 1.5", "x 1.5") is None
-
-
-def test_a_row_without_a_line_is_refused() -> None:
-    found = updated_body(
-        table(HEAD + "| x | 1.5 | |\n| **y** | 2.5 | |"), EXACT, (), "x 2.5", "x 2.5"
-    )
-    assert isinstance(found, Diagnostic)
-    assert (
-        told(found)
-        == """\
-output-not-updatable at 10:3 `**y** | 2.5`
-  no line of this run has the cells of this row in order
-  help: bring the row up to date by hand"""
-    )
-
-
-def test_a_table_of_runs_that_differ() -> None:
-    found = updated_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5", "x 2.6")
-    assert isinstance(found, Diagnostic)
-    assert (
-        told(found)
-        == """\
-output-unstable at 5:1 `Output:`
-  two runs of the script printed different lines
-  note: line 1: `x 2.5` in one run, `x 2.6` in the next
-  help: make the script print the same each time (a fixed seed, no clock), \
-or record the output in a `text` fence with `volatile`"""
-    )
-
-
-def test_lines_that_no_row_shows_may_differ_between_runs() -> None:
-    found = updated_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
-    assert isinstance(found, Edit) and found.text == "2.5"
-
-
 # ----------------------------------------------------------------------------------------- edits
 
 
@@ -355,120 +228,6 @@ def test_edits_that_overlap_are_a_bug(changes: list[tuple[int, int, str]]) -> No
 def test_edits_of_another_text_are_a_bug() -> None:
     with pytest.raises(ValueError, match=re.escape("an edit of another text than a.md is now")):
         apply_edits("abcdef", edits_of("abc", (0, 1, "x")))
-
-
-# ------------------------------------------------------------------------------------ properties
-
-CHARACTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\x00\n\r")
-LINES = st.one_of(
-    st.text(CHARACTERS, max_size=12),
-    st.sampled_from(
-        ["", "a 1.5", "a 1.6", "b", "[ 0.1 -0.2]", "x=3 y", "c  ", "\td", "e-3 nan", "``", "> q"]
-    ),
-)
-OUTPUTS = st.lists(LINES, min_size=1, max_size=7).map("\n".join)
-PREFIXES = st.sampled_from(["", "> ", "   ", ">   ", "> > "])
-EOLS = st.sampled_from(["\n", "\r\n"])
-RULES = st.lists(
-    st.sampled_from(
-        [Filter(r"\d\.\d", "N"), Filter(r"^b.*\n", ""), Filter("x", "y"), Filter(r" +$", "")]
-    ),
-    max_size=2,
-).map(tuple)
-
-
-@given(
-    OUTPUTS,
-    OUTPUTS,
-    st.sampled_from([EXACT, DIGITS, VOLATILE, within("0.05", "0.05")]),
-    RULES,
-    PREFIXES,
-    EOLS,
-)
-def test_after_an_update_all_is_well(
-    recorded: str,
-    printed: str,
-    comparison: Comparison,
-    filters: tuple[Filter, ...],
-    prefix: str,
-    eol: str,
-) -> None:
-    assume(printed.strip())
-    assume(
-        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
-    )
-    lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = updated_body(lesson, comparison, filters, printed, printed)
-    if found is None:
-        assert compare(lesson, comparison, filters, printed).status != "drift"
-    else:
-        new = edited(lesson, printed, comparison, filters)
-        if not filters:
-            assert compare(new, EXACT, (), printed).status == "verified"
-
-
-MARKED = st.lists(
-    st.one_of(LINES, st.sampled_from(["...", "a ... b", "a 1.5 ...", "x=... y", "... 1.5"])),
-    max_size=7,
-).map("\n".join)
-
-
-@given(MARKED, OUTPUTS, st.sampled_from([ELLIPSIS, DIGITS_ELLIPSIS]), PREFIXES, EOLS)
-def test_an_update_with_ellipses_is_right_or_refused(
-    recorded: str, printed: str, comparison: Comparison, prefix: str, eol: str
-) -> None:
-    assume(printed.strip())
-    assume(
-        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
-    )
-    lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = updated_body(lesson, comparison, (), printed, printed)
-    if isinstance(found, Edit):
-        edited(lesson, printed, comparison)
-    elif isinstance(found, Diagnostic):
-        assert found.rule == "output-not-updatable"
-        assert "..." in recorded
-
-
-@given(OUTPUTS, OUTPUTS, OUTPUTS)
-def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
-    assume(
-        first.strip()
-        and not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + first).split("\n"))
-    )
-    lesson = recording(recorded)
-    found = updated_body(lesson, EXACT, (), first, second)
-    same = compare(recording(first), EXACT, (), second).status == "verified"
-    if isinstance(found, Diagnostic):
-        assert not same and found.rule == "output-unstable"
-    else:
-        assert same
-
-
-CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])
-
-
-@given(
-    st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=4),
-    st.lists(
-        st.sampled_from(["Euler 1.6 % -2.51 4", "RK4 1.5 % 3.8e-11 5", "x 7 x 8 -9.25", "4"]),
-        min_size=1,
-        max_size=5,
-    ),
-    st.sampled_from([EXACT, DIGITS, within("0.5")]),
-)
-def test_tables_are_updated_right_or_refused(
-    rows: list[tuple[str, str, str]], lines: list[str], comparison: Comparison
-) -> None:
-    lesson = table(HEAD + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows))
-    printed = "\n".join(lines)
-    found = updated_body(lesson, comparison, (), printed, printed)
-    if isinstance(found, Edit):
-        edited(lesson, printed, comparison)
-    elif isinstance(found, Diagnostic):
-        assert found.rule == "output-not-updatable"
-    else:
-        assert compare(lesson, comparison, (), printed).status == "verified"
 
 
 def test_a_body_span_inside_a_line_is_widened() -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Meta, Struct
+from nodekit import shown
 
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax.course_schema import CourseFile
@@ -71,14 +72,6 @@ def read(text: str) -> Decoding[Body]:
     parsed = parse_json(Excerpt.of_span(source.span()), source.span())
     assert parsed.value is not None
     return decode(parsed.value, Body, "the body", JSON)
-
-
-def shown(decoding: Decoding[Body]) -> list[str]:
-    return [
-        f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"
-        + (f" [{d.help}]" if d.help else "")
-        for d in decoding.diagnostics
-    ]
 
 
 def test_a_clean_value() -> None:
@@ -178,12 +171,14 @@ def test_a_clean_value() -> None:
 )  # fmt: skip
 def test_what_an_author_is_told(field: str, expected: str) -> None:
     decoding = read('{"name": "box",\n  ' + field + "}")
-    assert shown(decoding) == ["2:" + expected]
+    assert shown(decoding.diagnostics) == ["2:" + expected]
 
 
 def test_the_whole_has_a_name_of_its_own() -> None:
-    assert shown(read("[]")) == ["1:1-2 field-type: the body must be an object, not an array"]
-    assert shown(read("{}")) == ["1:1-2 field-missing: `name` is missing"]
+    assert shown(read("[]").diagnostics) == [
+        "1:1-2 field-type: the body must be an object, not an array"
+    ]
+    assert shown(read("{}").diagnostics) == ["1:1-2 field-missing: `name` is missing"]
 
 
 def test_all_mistakes_come_in_one_run_and_none_twice() -> None:
@@ -191,7 +186,7 @@ def test_all_mistakes_come_in_one_run_and_none_twice() -> None:
         '{"nmae": "x",\n "count": 0,\n "tags": [1, "a", 2],\n "parts": [{"nam": "y"}, 3],\n'
         ' "colour": "bule", "wrong": 1, "limits": {"a": 1e999, "b": null}}'
     )
-    assert [line.split(" [")[0] for line in sorted(shown(decoding))] == [
+    assert [line.split(" [")[0] for line in sorted(shown(decoding.diagnostics))] == [
         "1:2-8 field-unknown: unknown field `nmae`",
         "2:11-12 field-value: `count` must be at least 1, not 0",
         "3:11-12 field-type: `tags[0]` must be a string, not the number 1",
@@ -213,7 +208,9 @@ def test_an_unknown_field_leaves_the_rest_usable() -> None:
 
 
 def test_a_value_that_the_reader_reported_is_not_reported_again() -> None:
-    assert shown(read('{"name": "x", "count": 01, "fixed": True, "parts": [NaN]}')) == []
+    assert (
+        shown(read('{"name": "x", "count": 01, "fixed": True, "parts": [NaN]}').diagnostics) == []
+    )
 
 
 def test_markdown_is_found_in_the_order_of_the_text() -> None:
@@ -228,7 +225,7 @@ def test_toml_has_other_nouns() -> None:
     parsed = parse_toml(Source("x.toml", 'name = 2024-01-01\nshape = 3\n[parts]\nname = "x"\n'))
     assert parsed.value is not None
     decoding = decode(parsed.value, Body, "the body", TOML)
-    assert shown(decoding) == [
+    assert shown(decoding.diagnostics) == [
         "1:8-18 field-type: `name` must be a string, not a date or time"
         ' [put it between quotes: `"2024-01-01"`]',
         "2:9-10 field-type: `shape` must be a table, not the number 3",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nodekit import shown
 
 from coursebuild.diagnostics import Parsed
 from coursebuild.model import Declarations, Measured
@@ -54,11 +55,7 @@ def parse(text: str) -> Parsed[Declarations | None]:
 
 
 def told(text: str) -> list[str]:
-    return [
-        f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"
-        + (f" [{d.help}]" if d.help else "")
-        for d in parse(text).diagnostics
-    ]
+    return shown(parse(text).diagnostics)
 
 
 def test_everything_that_a_file_can_say() -> None:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import datetime
+import re
 import tomllib
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from nodekit import plain, shown, tree
 
-from coursebuild.diagnostics import Diagnostic
 from coursebuild.source import Source
 from coursebuild.syntax.nodes import (
     ArrayNode,
-    BoolNode,
-    DateNode,
     Node,
-    NumberNode,
     ObjectNode,
     StringNode,
 )
@@ -32,23 +30,6 @@ def root_of(text: str) -> ObjectNode:
     return parsed.value
 
 
-def plain(node: Node) -> object:
-    match node:
-        case ObjectNode():
-            return {member.key.value: plain(member.value) for member in node.members}
-        case ArrayNode():
-            return [plain(item) for item in node.items]
-        case StringNode():
-            assert node.excerpt.text == node.value
-            return node.value
-        case NumberNode() | BoolNode():
-            return node.value
-        case DateNode():
-            return "a date"
-        case _:
-            raise AssertionError(node)
-
-
 def dated(value: object) -> object:
     """A value of tomllib as `plain` gives it."""
     if isinstance(value, dict):
@@ -56,14 +37,6 @@ def dated(value: object) -> object:
     if isinstance(value, list):
         return [dated(inner) for inner in value]
     return "a date" if isinstance(value, DATES) else value
-
-
-def shown(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
-    return [
-        f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"
-        + (f" [{d.help}]" if d.help else "")
-        for d in diagnostics
-    ]
 
 
 def told(text: str) -> list[str]:
@@ -382,3 +355,18 @@ def test_spans_nest(text: str) -> None:
             check(child)
 
     check(root)
+
+
+PLAIN = 'a = |b=|a.b = |"k" = |"v"|""|"""|"a\\n"|"|1| |[t]|[[t]]|[u.v]|{|}|[|]|,|# c|=|'
+PLAIN += "\n|\t|\\|'x'|é"
+
+
+@given(st.lists(st.sampled_from(PLAIN.split("|")), max_size=12).map("".join))
+def test_the_shorter_way_through_plain_pairs_leads_to_the_same(text: str) -> None:
+    source = Source("content/course.toml", text)
+    short = parse_toml(source)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("coursebuild.syntax.toml_scan._PLAIN_KEY", re.compile("(?!)"))
+        long = parse_toml(source)
+    assert tree(short.value) == tree(long.value)
+    assert short.diagnostics == long.diagnostics

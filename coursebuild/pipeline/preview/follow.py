@@ -4,7 +4,8 @@ Entry point: `follow(live, watcher, notice, said)`, which a thread of its own ru
 
 1. What one save of an editor comes to (an empty file that is written next, a new file that takes
    the place of the old one) counts once: when nothing more happened for some milliseconds. While
-   that is awaited the page is made already, so that it costs no time.
+   that is awaited the page is made already, so that it costs no time. Where it is known that the
+   file was written to its end, and nothing is wrong in it, nothing is awaited.
 2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
 3. A document that is gone or empty may be so only for a moment, and who has a file open may write
    more of it.
@@ -18,7 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from coursebuild.effects.watch import Watcher
-from coursebuild.pipeline.preview.live import MOST, LiveCourse, Plan
+from coursebuild.pipeline.preview.live import MOST, LiveCourse
 from coursebuild.render.library import owners
 
 QUIET = 0.008
@@ -70,10 +71,11 @@ def _take(
         last = began + LONGEST * (4 if many else 1)
         with live.changed, _without_collecting():
             plan = live.plan(paths)
-            soon = plan is not None and _whole(plan) and not watcher.writing
+            soon = plan is not None and plan.whole and not watcher.writing
+            sure = plan is not None and plan.sound and watcher.exact
             # So few milliseconds are waited for with the lock held: who asks for the page meanwhile
             # gets the new one.
-            more = _more(watcher, heard + QUIET, last) if soon else frozenset()
+            more = _more(watcher, heard + (0 if sure else QUIET), last) if soon else frozenset()
             if plan is not None and soon and not more:
                 live.commit(plan)
                 return bool(plan.found)
@@ -104,11 +106,6 @@ def _without_collecting() -> Iterator[None]:
     finally:
         if on:
             gc.enable()
-
-
-def _whole(plan: Plan) -> bool:
-    """Whether no document became empty."""
-    return all(document.source.text.strip() for document in plan.documents.values())
 
 
 def _elsewhere(live: LiveCourse) -> frozenset[str]:

@@ -16,7 +16,7 @@ Everything is under one lock, `changed`; what takes long is done outside of it.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -28,6 +28,7 @@ from coursebuild.measured.shown import Reports
 from coursebuild.model import Course, Document, Lesson
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
+from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.preview.differences import (
     changed_questions,
     changed_references,
@@ -40,17 +41,20 @@ from coursebuild.pipeline.preview.differences import (
     with_owners,
 )
 from coursebuild.pipeline.preview.memo import Parsing, PerDocument
+from coursebuild.pipeline.preview.noted import Noted
 from coursebuild.pipeline.preview.pages import Drawn, Pages, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
+from coursebuild.pipeline.preview.plan import Plan
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
-from coursebuild.render.frame import Names
 from coursebuild.render.library import Library, Owner, owners
 from coursebuild.render.own_pages import own_pages
+from coursebuild.render.page_list import PageEntry
+from coursebuild.render.shared import PageFacts
 from coursebuild.results import CompileResult, LabResult
 from coursebuild.source import Source
-from coursebuild.values import dataclass, replace
+from coursebuild.values import replace
 
 _Asked: TypeAlias = tuple[str, frozenset[str], bool]
 """A text and how it is to be parsed."""
@@ -58,27 +62,6 @@ _WHOLES = 64
 """Documents whose text is remembered though nobody edits them."""
 MOST = 8
 """Documents saved at once that are taken one by one; more are read with the whole course."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What some saves come to."""
-
-    edits: int
-    """The number of the state that it was made from."""
-    course: Course
-    library: Library
-    known: Places
-    found: Mapping[str, tuple[Diagnostic, ...]]
-    """The mistakes of the documents that changed; empty where none did."""
-    drawn: Mapping[str, tuple[Drawn, bytes]]
-    """Pages, and their finished texts."""
-    names: Names | None
-    """Of the shared files that these texts name."""
-    stale: frozenset[str] | None
-    """Pages that show something of it as well; `None` for all."""
-    documents: Mapping[str, Document]
-    """Those that changed, by path."""
 
 
 class LiveCourse:
@@ -91,9 +74,14 @@ class LiveCourse:
         subset: Callable[[fonts.FontJob], bytes],
         surroundings: Callable[[Course], zips.Surroundings],
         documents: Documents,
+        noted: Noted,
     ) -> None:
-        """`documents` gives the skeletons of those that nobody has edited since."""
+        """`documents` gives the skeletons of those that nobody has edited since.
+
+        `noted` says what builds have left of pages.
+        """
         self.root = root
+        self._noted = noted
         self.documents = documents
         self.changed = threading.Condition(threading.RLock())
         self.version = 0
@@ -105,7 +93,9 @@ class LiveCourse:
         self.calm.set()
         self.course: Course | None = None
         self.parts = Parts(assets)
-        self.pages = Pages(root, assets, subset, surroundings, self._ready, self._whole)
+        self.pages = Pages(
+            root, assets, subset, surroundings, self._ready, self._whole, self._known_facts
+        )
         self.behind: dict[str, tuple[Diagnostic, ...]] = {}
         """What the slow stages found, by stage."""
         self.busy = "reading the course"
@@ -217,16 +207,17 @@ class LiveCourse:
         scripts = {path: script.norun for path, (script, _) in library.scripts.items()}
         documents = {o.path: o.document for o in fresh if o.document is not None}
         self.parts.typeset(documents.values())
-        drawn: dict[str, tuple[Drawn, bytes]] = {}
+        pairs = [(self._document(path), document) for path, document in documents.items()]
+        stale = self._stale(pairs, course, library)
+        drawn: dict[str, tuple[Drawn, bytes | None]] = {}
         for path, document in documents.items():
             found[path] += check_document(course, document, known, scripts)
             if not has_errors(found[path]) and not has_errors(
                 self.parts.formula_mistakes(document)
             ):
                 page = self.pages.draw(self._sites[path], library)
-                drawn[self._sites[path]] = page, self.pages.framed(page, library)
-        pairs = [(self._document(path), document) for path, document in documents.items()]
-        stale = self._stale(pairs, course, library)
+                # Where all are stale, it is because of what is in all frames.
+                drawn[self._sites[path]] = page, None if stale is None else self.pages.framed(page)
         told = {path: tuple(diagnostics) for path, diagnostics in found.items()}
         names = self.pages.names
         return Plan(self.edits, course, library, known, told, drawn, names, stale, documents)
@@ -283,6 +274,18 @@ class LiveCourse:
         lesson = isinstance(owner, Lesson)
         saved = self._saved.known(source, callouts, lesson=lesson)
         return (saved or self._wholes(source, callouts, lesson=lesson)).value
+
+    def _known_facts(self, page: PageEntry, library: Library) -> PageFacts | None:
+        """What a build has noted of a page; of what was edited since it knows nothing."""
+        document = page.document(library)
+        if document is None:
+            return self._noted(page, library, None)
+        path = document.source.path
+        known = self._skeletons.get(path)
+        if known is None or known[1].value is not document or has_errors(self._found.get(path, ())):
+            return None
+        _, callouts, lesson = known[0]
+        return self._noted(page, library, Task.of(document.source, callouts, lesson))
 
     def _parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
         """A document as far as others look at it; the same text gives the very same document."""

@@ -27,15 +27,16 @@ from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.files import Around, Exports, OnDemand, export_paths
-from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render.frame import Draft, Frames, Names, parts_of
 from coursebuild.render.library import Library, owners
 from coursebuild.render.offline import offline_files
 from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.search.files import FOLDER
 from coursebuild.render.shared import PageFacts, page_facts, settled, shared_files
 from coursebuild.render.site import all_facts
+from coursebuild.render.tools import Tools, mark_now
 from coursebuild.results import OutputFile, SiteFile
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, replace
 
 Make: TypeAlias = Callable[[], bytes | None]
 """Makes a file, if it can be had."""
@@ -48,6 +49,8 @@ _ANYTHING = PageFacts(
 """For the first pages, which are shown before the others are known."""
 _DRAWN = 64
 """Pages that are kept drawn."""
+_MARKED = 256
+"""Pieces of code that are kept marked."""
 _GENERATIONS = 3
 """How many sets of shared files stay available."""
 
@@ -77,11 +80,14 @@ class Pages:
         surroundings: Callable[[Course], zips.Surroundings],
         ready: Callable[[str], bool],
         whole: Callable[[Document], Document],
+        noted: Callable[[PageEntry, Library], PageFacts | None],
     ) -> None:
         """`ready` makes all that drawing a page needs; it says no to one with a mistake.
 
-        `whole` gives a document with its text, which one that nobody edited may lack.
+        `whole` gives a document with its text, which one that nobody edited may lack. `noted` gives
+        what is known of a page as it is now, if it is known without drawing it.
         """
+        self._noted = noted
         self._whole = whole
         self._root = root
         self._ready = ready
@@ -105,6 +111,10 @@ class Pages:
         self._shared_facts: PageFacts | None = None
         self._generations: list[dict[str, bytes]] = []
         self._names: Names | None = None
+        self._frames: Frames | None = None
+        """The frames of pages as long as no menu and no shared file is another."""
+        self._tools: Tools | None = None
+        self._mark = functools.lru_cache(_MARKED)(mark_now)
 
     # --- what the course is
 
@@ -119,6 +129,7 @@ class Pages:
                 self._facts.pop(gone, None)
                 self._held.discard(gone)
             self._texts.clear()  # each has the menu of all
+            self._frames = None
             course = library.course
             self._ids = {
                 site: owner.id
@@ -131,10 +142,14 @@ class Pages:
         if self._names is None:
             self._share(_ANYTHING, lambda job: job.data)
 
-    def framed(self, drawn: Drawn, library: Library) -> bytes:
-        """The finished text of a page."""
-        assert self._names is not None, "there are shared files since the course was first read"
-        return frame(library, drawn.draft, self._names).encode()
+    def framed(self, drawn: Drawn) -> bytes:
+        """The finished text of a page of a library with the menus of this one."""
+        assert self._library is not None and self._names is not None, "the course was read"
+        if self._frames is None:
+            self._frames = Frames(self._library, self._names)
+        body = drawn.draft.body
+        before, after = self._frames.around(drawn.draft, parts_of(body))
+        return f"{before}{visible(body)}{after}".encode()
 
     def hold(self, path: str) -> None:
         """Draw a page, and keep it until it is drawn again: what comes now is not to be shown."""
@@ -311,8 +326,7 @@ class Pages:
         if drawn is None:
             return None
         if path not in self._texts:
-            assert self._library is not None
-            self._texts[path] = self.framed(drawn, self._library)
+            self._texts[path] = self.framed(drawn)
         return self._texts[path]
 
     def _page(self, path: str) -> Drawn | None:
@@ -332,7 +346,16 @@ class Pages:
 
     def draw(self, path: str, library: Library) -> Drawn:
         """Draw a page (`KeyError` where there is none) of a library of the same course map."""
-        return Drawn(*settled(self._entries[path].draft(library, self._whole)))
+        tools = self._with_what_is_known(library.tools)
+        return Drawn(*settled(self._entries[path].draft(library, self._whole, tools)))
+
+    def _with_what_is_known(self, tools: Tools) -> Tools:
+        """The same tools, which remember what they made for other pages."""
+        old = self._tools
+        same = old is not None and old.words is tools.words and old.templates is tools.templates
+        around = old.around if old is not None and same else {}
+        self._tools = replace(tools, mark=self._mark, around=around)
+        return self._tools
 
     # --- what may wait
 
@@ -340,11 +363,36 @@ class Pages:
         """The pages that are to be drawn anew."""
         return tuple(path for path in self._entries if path in self._stale)
 
+    def prepare(self, path: str) -> None:
+        """Make what looking at a page needs, so that to look at it takes half as long."""
+        if not self._is_noted(path) and not self._is_known(path):
+            self._ready(path)
+
     def look_at(self, path: str) -> None:
-        """Draw a page if it is stale, and note what the shared files must know of it."""
-        drawn = self._page(path) if path in self._entries else None
+        """Note what the shared files must know of a page; it is drawn if that is not known."""
+        drawn = None if self._is_noted(path) else self._page(path)
         if drawn is not None and path not in self._facts:
             self._facts[path] = page_facts(drawn.draft, drawn.declarations)
+
+    def _is_noted(self, path: str) -> bool:
+        """Whether what the shared files must know is that of the page as it is now."""
+        there = path in self._entries
+        return not there or (path in self._facts and path not in self._stale)
+
+    def _is_known(self, path: str) -> bool:
+        """Whether that is known without drawing the page: it is drawn when somebody asks for it."""
+        library = self._library
+        if library is None or path in self._held:
+            return False
+        facts = self._noted(self._entries[path], library)
+        if facts is None:
+            return False
+        self._drawn.pop(path, None)
+        self._texts.pop(path, None)
+        self._stale.discard(path)
+        self._search.renew()
+        self._facts[path] = facts
+        return True
 
     def unnoted(self) -> tuple[str, ...]:
         """The pages of which that is not noted yet."""
@@ -371,6 +419,7 @@ class Pages:
         if names != self._names:
             self._names = names
             self._texts.clear()
+            self._frames = None
 
     def _share(self, facts: PageFacts, subset: Callable[[fonts.FontJob], bytes]) -> None:
         files, names = shared_files(self._assets, subset, facts)

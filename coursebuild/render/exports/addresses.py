@@ -6,6 +6,7 @@ in; `quoted`, `xml_id`, `escape`, what ids and texts become.
 
 from __future__ import annotations
 
+import functools
 import posixpath
 import re
 from collections.abc import Callable
@@ -15,12 +16,16 @@ from urllib.parse import quote, unquote, urlsplit
 from coursebuild.patterns import pattern
 
 OPEN, SHUT = "\ue000", "\ue001"
-"""Around a slot, in which an address is put later; pages have no such characters."""
-_SLOT = pattern(f" {OPEN}([^{SHUT}]*){SHUT}")
+"""Around a slot, in which an address is put later. An author may write them, as icons of a font."""
+_SLOT = pattern(f" {OPEN}((?:xlink:href|href|src) [^{OPEN}{SHUT}]*){SHUT}")
 
 
+@functools.lru_cache(maxsize=128)
 def site_path(page: str, url: str) -> tuple[str | None, str]:
-    """The site path and the anchor of an address on a page; `None` where it leads elsewhere."""
+    """The site path and the anchor of an address on a page; `None` where it leads elsewhere.
+
+    A lesson is written twice, and asks the same both times.
+    """
     try:
         parts = urlsplit(url)
     except ValueError:  # it is no address
@@ -65,9 +70,10 @@ def xml_id(id: str) -> str:
     """An id as a name of XML: characters that no name has are written as their numbers."""
     if _IS_XML_ID.fullmatch(id):
         return id
-    name = "".join(c if re.match(r"[A-Za-z0-9_.-]", c) else f"_{ord(c):x}_" for c in id)
-    return name if re.match("[A-Za-z_]", name) else f"_{name}"
+    name = _NO_NAME.sub(lambda match: f"_{ord(match[0]):x}_", id)
+    return f"_{name}" if not name or name[0] in "0123456789.-" else name
 
 
 _IS_XML_ID = pattern(r"[A-Za-z_][A-Za-z0-9_.-]*+")
+_NO_NAME = pattern(r"[^A-Za-z0-9_.-]")
 _AS_IT_IS = pattern(r"[A-Za-z0-9_.~:-]*+")

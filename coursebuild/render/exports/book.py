@@ -1,7 +1,7 @@
 """The whole course as pages to be printed.
 
-Entry points: `books(library)`, which pages there are; `Book.texts`, the body of one in pieces, so
-that no more than a lesson is held at a time.
+Entry points: `books(library)`, which pages there are; `Book.texts`, the body of one in pieces, and
+`Book.section`, a lesson in it, so that no more than a lesson is held at a time.
 
 A course of at most `MOST` written lessons is one page. A longer one is a page for each level, and
 the contents: no browser prints a page of thousands of lessons.
@@ -9,7 +9,7 @@ the contents: no browser prints a page of thousands of lessons.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from markupsafe import Markup
 
@@ -52,43 +52,49 @@ class Book:
         title = library.words("exports.book_title", title=self.title)
         return Draft(self.path, "book", title, self.summary, Markup(), indexed=False)
 
-    def texts(self, library: Library, section: Callable[[Lesson], str]) -> Iterator[str]:
-        """Its body; `section` gives a lesson's part."""
+    def texts(self, library: Library) -> Iterator[str | Lesson]:
+        """Its body; a lesson stands for its section."""
         place = urls.Place(self.path)
+        entries = {part.id: self._entry(part) for part in self.levels}
         whole = library.render(
             "exports/book.html",
             title=self.title,
             summary=self.summary,
             facts=facts(library, sum(len(part.lessons) for part in self.levels)),
             epub=place.href(urls.EPUB),
-            levels=tuple(map(self._entry, self.levels)),
+            levels=tuple(entries.values()),
             lessons=_HERE,
         )
         before, _, after = str(whole).partition(_HERE)
         yield before
         for part in self.shown:
-            yield f"{library.render('exports/level.html', level=self._entry(part))}\n"
-            for lesson in part.lessons:
-                yield filled(section(lesson), self._address)
+            yield f"{library.render('exports/level.html', level=entries[part.id])}\n"
+            yield from part.lessons
         yield after
 
+    def section(self, part: str) -> str:
+        """What a lesson gives to the course, with its links put in."""
+        return filled(part, self._address)
+
     def _entry(self, part: Part) -> LevelEntry:
+        page, _ = self.places[urls.lesson_path(part.lessons[0])]  # and so are the others
+        there, href = self._page(page), urls.Place(self.path).href(page, part.anchor)
         lessons = tuple(
-            Entry(lesson.id, lesson.title, self._address(urls.lesson_path(lesson), ""))
+            Entry(lesson.id, lesson.title, f"{there}#{quoted(anchor(lesson.id))}")
             for lesson in part.lessons
         )
-        page, _ = self.places[urls.lesson_path(part.lessons[0])]
-        href = urls.Place(self.path).href(page, part.anchor)
         return LevelEntry(part.id, part.title, part.summary, part.anchor, href, lessons)
+
+    def _page(self, page: str) -> str:
+        """Where one of these pages is, as seen from here."""
+        return "" if page == self.path else urls.Place(self.path).href(page)
 
     def _address(self, path: str, id: str, shown: bool = False) -> str:
         """Where a site path is, as seen from here: lessons are on these pages."""
-        place = urls.Place(self.path)
         if path not in self.places:
-            return place.href(path, id or None)
+            return urls.Place(self.path).href(path, id or None)
         page, lesson = self.places[path]
-        there = quoted(anchor(lesson, id) if id else anchor(lesson))
-        return f"{'' if page == self.path else place.href(page)}#{there}"
+        return f"{self._page(page)}#{quoted(anchor(lesson, id) if id else anchor(lesson))}"
 
 
 def books(library: Library) -> tuple[Book, ...]:

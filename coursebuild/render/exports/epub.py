@@ -100,14 +100,22 @@ class Epub:
         """Names of pictures in the package, by their site path."""
 
     @property
+    def lessons(self) -> Iterator[Lesson]:
+        """The lessons that are chapters, in order."""
+        return (lesson for part in self._levels for lesson in part.lessons)
+
+    @property
     def places(self) -> str:
         """All that the links of a chapter depend on."""
         return f"{self._library.course.base_url}\0{sorted(self._names.items())!r}"
 
     def files(
-        self, facts: Callable[[Lesson], Chapter], picture: Callable[[str], bytes]
+        self,
+        facts: Callable[[Lesson], Chapter],
+        picture: Callable[[str], bytes],
+        key: Callable[[Lesson], str] = lambda lesson: "",
     ) -> Iterator[File]:
-        """The files in order; `picture` gives the bytes at a site path.
+        """The files in order; `picture` gives the bytes at a site path, `key` is of a chapter.
 
         Those of chapters are made by whoever calls, see `chapter`.
         """
@@ -124,7 +132,7 @@ class Epub:
         for part in self._levels:
             yield File(f"EPUB/{_level_name(part)}", functools.partial(self._level, part))
             for lesson in part.lessons:
-                yield File(self.file_of(lesson), bytes)
+                yield File(self.file_of(lesson), bytes, key(lesson))
         for path, name in self._pictures.items():
             yield File(f"EPUB/{name}", functools.partial(picture, path))
 

@@ -11,9 +11,6 @@ together again without drawing anything.
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
-import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Generic, Protocol, TypeAlias, TypeVar
 
@@ -22,7 +19,8 @@ from coursebuild.render import urls, zips
 from coursebuild.render.characters import visible
 from coursebuild.render.exports.archive import Deflated, File, deflate, packed
 from coursebuild.render.exports.book import Book, books
-from coursebuild.render.exports.epub import Chapter, Epub
+from coursebuild.render.exports.chapters import Chapters, Keep, Note
+from coursebuild.render.exports.epub import Epub
 from coursebuild.render.exports.llms import PATH as LLMS
 from coursebuild.render.exports.llms import llms
 from coursebuild.render.exports.notebook_file import finished
@@ -32,17 +30,13 @@ from coursebuild.render.exports.twin import twin_of
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import KeptFile, OutputFile, Piece, SiteFile, made
+from coursebuild.source import key_of
 from coursebuild.values import dataclass
 
 Of = TypeVar("Of")
 Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]]
 """Archives of scripts by site path, with their keys."""
-Keep: TypeAlias = Callable[[str, Callable[[], bytes]], bytes]
-"""Gives what was made under a key before, or makes it."""
-_HEAD = struct.Struct("<LLL")
-_ROOM = 4 << 20
-"""Bytes of compressed chapters that wait to be written, at most."""
 
 
 class Source(Protocol):
@@ -89,6 +83,8 @@ class Around:
     taken: frozenset[str]
     """Paths of files that authors have put there."""
     keep: Keep = lambda key, make: make()
+    note: Note = Note()
+    """What was known of the chapters of the last e-book."""
 
 
 def export_paths(library: Library, pages: Iterable[str], taken: frozenset[str]) -> Iterator[str]:
@@ -139,7 +135,7 @@ class Exports:
 
     def _notebook(self, lesson: Lesson) -> KeptFile:
         key, _ = self._around.archives.get(urls.lesson_zip_path(lesson), ("", None))
-        key = _key("notebook", self._page_key(lesson), key)
+        key = key_of("notebook", self._page_key(lesson), key)
         return KeptFile(urls.notebook_path(lesson), key, _Made(self._notebook_made, lesson))
 
     def _notebook_made(self, lesson: Lesson) -> bytes:
@@ -155,21 +151,26 @@ class Exports:
         places = ""
         for book in books(self._library):
             before, after = frames.around(book.draft(self._library), ())
-            places = places or _key(repr(sorted(book.places.items())))  # of all the same
-            fixed = "".join(book.texts(self._library, lambda lesson: ""))
-            lessons = map(self._page_key, book.lessons)
-            key = _key("book", before, after, fixed, places, *lessons)
-            pieces = functools.partial(self._book, book, before, after)
+            places = places or key_of(repr(sorted(book.places.items())))  # of all the same
+            texts = (before, *map(_shown, book.texts(self._library)), after)
+            keys = (t if isinstance(t, str) else self._page_key(t) for t in texts)
+            key = key_of("book", places, *keys)
+            pieces = functools.partial(self._book, book, texts, places)
             yield KeptFile(book.path, key, functools.partial(_joined, pieces), pieces)
 
-    def _book(self, book: Book, before: str, after: str) -> Iterator[bytes]:
-        def section(lesson: Lesson) -> str:
-            return self._source.section(urls.lesson_path(lesson))
+    def _book(
+        self, book: Book, texts: tuple[str | Lesson, ...], places: str
+    ) -> Iterator[bytes | Piece]:
+        for text in texts:
+            if isinstance(text, str):
+                yield text.encode("utf-8", "replace")
+            else:
+                key = key_of("section", book.path, places, self._page_key(text))
+                yield Piece(key, functools.partial(self._section, book, text))
 
-        yield before.encode("utf-8", "replace")
-        for text in book.texts(self._library, section):
-            yield visible(text).encode()
-        yield after.encode("utf-8", "replace")
+    def _section(self, book: Book, lesson: Lesson) -> bytes:
+        part = self._source.section(urls.lesson_path(lesson))
+        return visible(book.section(part)).encode()
 
     # --- the e-book
 
@@ -184,60 +185,30 @@ class Exports:
             sorted(self._around.declarations),
         )
         lessons = map(self._page_key, self._lessons)
-        key = _key("epub", repr(shown), self._around.style, self._around.pictures, *lessons)
+        key = key_of("epub", repr(shown), self._around.style, self._around.pictures, *lessons)
         return KeptFile(
             urls.EPUB, key, functools.partial(_joined, self._epub_pieces), self._epub_pieces
         )
 
-    def _epub_pieces(self) -> Iterator[bytes]:
+    def _epub_pieces(self) -> Iterator[bytes | Piece]:
         around = self._around
         epub = Epub(self._library, around.style, around.declarations)
-        links = _key(epub.places, self._library.course.language)
-        chapters = {epub.file_of(lesson): lesson for lesson in self._lessons}
-        waiting: dict[str, bytes] = {}
-        room = _ROOM
+        links = key_of(epub.places, self._library.course.language)
+        by_path = {epub.file_of(lesson): lesson for lesson in self._lessons}
 
-        def compressed(lesson: Lesson) -> bytes:
-            """A chapter and what is to be known of it: of a long course, one is made anew."""
+        def key(lesson: Lesson) -> str:
+            return key_of(epub.file_of(lesson), self._page_key(lesson), lesson.title, links)
 
-            def make() -> bytes:
-                part = self._source.chapter(urls.lesson_path(lesson))
-                facts = Chapter(part.pictures, part.mathml, part.svg)
-                return _joined_chapter(facts, deflate(epub.chapter(lesson, part)))
+        def part(lesson: Lesson) -> OpenChapter:
+            return self._source.chapter(urls.lesson_path(lesson))
 
-            key = _key(self._page_key(lesson), lesson.title, links)
-            return waiting.pop(lesson.id, None) or around.keep(key, make)
+        chapters = Chapters(epub, key, part, around.keep, around.note)
 
         def pack(file: File) -> Deflated:
-            lesson = chapters.get(file.path)
-            if lesson is None:
-                return deflate(file.make())
-            return _chapter_part(compressed(lesson))[1]
+            lesson = by_path.get(file.path)
+            return deflate(file.make()) if lesson is None else chapters.deflated(lesson)
 
-        def facts(lesson: Lesson) -> Chapter:
-            nonlocal room
-            data = compressed(lesson)
-            room -= len(data)
-            if room >= 0:  # each is asked for once more
-                waiting[lesson.id] = data
-            return _chapter_part(data)[0]
-
-        return packed(epub.files(facts, around.picture), pack)
-
-
-def _joined_chapter(facts: Chapter, made: Deflated) -> bytes:
-    """A chapter as it is kept."""
-    crc, size, data = made
-    head = json.dumps([facts.pictures, facts.mathml, facts.svg]).encode()
-    return _HEAD.pack(crc, size, len(head)) + head + data
-
-
-def _chapter_part(data: bytes) -> tuple[Chapter, Deflated]:
-    """The same taken apart."""
-    crc, size, length = _HEAD.unpack_from(data)
-    end = _HEAD.size + length
-    pictures, mathml, svg = json.loads(data[_HEAD.size : end])
-    return Chapter(tuple(pictures), mathml, svg), (crc, size, data[end:])
+        return packed(epub.files(chapters.facts(), around.picture, key), pack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,12 +222,12 @@ class _Made(Generic[Of]):
         return self.make(self.of)
 
 
-def _joined(pieces: Callable[[], Iterator[bytes]]) -> bytes:
-    return b"".join(pieces())
+def _shown(text: str | Lesson) -> str | Lesson:
+    return visible(text) if isinstance(text, str) else text
 
 
-def _key(*parts: str) -> str:
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest()
+def _joined(pieces: Callable[[], Iterator[bytes | Piece]]) -> bytes:
+    return b"".join(made(pieces()))
 
 
 class OnDemand:
@@ -300,6 +271,7 @@ class OnDemand:
 
     def _exports(self, path: str) -> PageExports:
         from coursebuild.render.draw import draw_whole
+        from coursebuild.render.settling import settle_with
 
         body, tools, entry = self._body(path), self._library.tools, self._entries[path]
         found = entry.document(self._library)
@@ -307,4 +279,4 @@ class OnDemand:
         sheet, document = entry.sheet(self._library), self._whole(found)
         _, text, page = draw_whole(sheet, document, tools)
         base = self._library.course.base_url
-        return page_exports(sheet, page, tools, base, body, str(text))
+        return page_exports(sheet, page, tools, base, body, settle_with(text, text)[1])

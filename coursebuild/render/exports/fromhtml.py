@@ -34,6 +34,7 @@ _BLOCKS = frozenset(
     " footer h1 h2 h3 h4 h5 h6 header hr li main ol p pre section summary table tbody td tfoot th"
     " thead tr ul".split()
 )
+_HEADINGS = frozenset("h1 h2 h3 h4 h5 h6".split())
 _IMPLIED = {"li": ("li",), "dt": ("dt", "dd"), "dd": ("dt", "dd"), "tr": ("tr", "td", "th")}
 _IMPLIED |= {"td": ("td", "th"), "th": ("td", "th"), "p": ("p",)}
 """What the start of an element ends, where its end was left out."""
@@ -59,14 +60,16 @@ def _tree(html: str) -> _Node:
     open_: list[_Node] = [root]
     for piece in pieces(html):
         if isinstance(piece, str):
-            open_[-1].children.append(unescape(piece))
+            open_[-1].children.append(unescape(piece) if "&" in piece else piece)
         elif isinstance(piece, Start):
-            if open_[-1].name in _IMPLIED.get(piece.name, ()):
+            if piece.name in _IMPLIED and open_[-1].name in _IMPLIED[piece.name]:
                 open_.pop()
             node = _Node(piece)
             open_[-1].children.append(node)
             if piece.name not in VOID and not piece.closed:
                 open_.append(node)
+        elif len(open_) > 1 and open_[-1].name == piece.name:
+            open_.pop()
         else:
             _close(open_, piece)
     return root
@@ -100,7 +103,7 @@ class _Blocks:
 
     def _block(self, node: _Node) -> Iterator[str]:
         name = node.name
-        if re.fullmatch("h[1-6]", name):
+        if name in _HEADINGS:
             text = self._line(node.children)
             yield f"{'#' * int(name[1])} {text}" if text else ""
         elif name in ("ul", "ol"):

@@ -13,8 +13,8 @@ lead and what our own blocks become.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from typing import Protocol, assert_never
+from collections.abc import Callable, Iterable
+from typing import Protocol, TypeAlias, assert_never
 
 from coursebuild.model import (
     Bench,
@@ -59,8 +59,15 @@ from coursebuild.model import (
     plain_text,
 )
 from coursebuild.patterns import pattern
+from coursebuild.render.exports.leaves import (
+    delimiter,
+    formula,
+    no_empty_lines,
+    number_text,
+    piped,
+    text_source,
+)
 from coursebuild.render.exports.marks import (
-    ALWAYS,
     code_span,
     escaped,
     fence,
@@ -71,7 +78,8 @@ from coursebuild.render.exports.marks import (
     quoted,
     table,
 )
-from coursebuild.render.markup import OwnBlock, escape
+from coursebuild.render.look import OwnBlock
+from coursebuild.render.markup import escape, is_tight
 
 
 class Context(Protocol):
@@ -102,20 +110,32 @@ class Context(Protocol):
         ...
 
 
-def write_blocks(blocks: Iterable[Block], context: Context) -> str:
-    """Blocks one after the other, an empty line between two, without the last line end."""
-    return _Writer(context).blocks(blocks)
+Same: TypeAlias = dict[int, tuple[object, str]]
+"""Texts that are the same in every context, by the identity of what they were written from, which
+is held so that it stays its own."""
 
 
-def write_inlines(inlines: Iterable[Inline], context: Context) -> str:
+def write_blocks(blocks: Iterable[Block], context: Context, same: Same | None = None) -> str:
+    """Blocks one after the other, an empty line between two, without the last line end.
+
+    Where the same document is written for several contexts that show the same numbers, `same` is
+    what they share.
+    """
+    return _Writer(context, same).blocks(blocks)
+
+
+def write_inlines(inlines: tuple[Inline, ...], context: Context, same: Same | None = None) -> str:
     """Inlines in one line, such as a title."""
-    return " ".join(_Writer(context).inlines(inlines, line=True).split("\n")).strip()
+    return _Writer(context, same).title(inlines)
 
 
-def write_footnotes(footnotes: Iterable[Footnote], context: Context) -> str:
+def write_footnotes(
+    footnotes: Iterable[Footnote], context: Context, same: Same | None = None
+) -> str:
     """The definitions of footnotes, which are referred to as `[^1]`."""
     return "\n\n".join(
-        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
+        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context, same), 4)
+        for note in footnotes
     )
 
 
@@ -125,10 +145,35 @@ _APART = (
 )
 """Blocks that an empty line parts from others, even in a tight list."""
 
+_LAST_MARKS = pattern(r"(^|\s)(#+)$")
+
 
 class _Writer:
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, same: Same | None) -> None:
         self.context = context
+        self._same = same
+        self._asked = False
+        """Whether the context said where something lies: elsewhere it may say otherwise."""
+
+    def title(self, inlines: tuple[Inline, ...]) -> str:
+        """Inlines in one line."""
+        return self._once(inlines, lambda: self._one_line(inlines))
+
+    def _one_line(self, inlines: Iterable[Inline]) -> str:
+        return " ".join(self.inlines(inlines, line=True).split("\n")).strip()
+
+    def _once(self, of: object, write: Callable[[], str]) -> str:
+        """A text, taken from another context where it is the same there."""
+        if self._same is None:
+            return write()
+        known = self._same.get(id(of))
+        if known is not None:
+            return known[1]
+        self._asked = False
+        text = write()
+        if not self._asked:
+            self._same[id(of)] = of, text
+        return text
 
     # --- blocks
 
@@ -152,9 +197,9 @@ class _Writer:
     def block(self, block: Block, after: Block | None = None) -> str:
         match block:
             case Heading():
-                return self._heading(block)
+                return self._once(block, lambda: self._heading(block))
             case Paragraph():
-                return self.inlines(block.children)
+                return self._once(block, lambda: self.inlines(block.children))
             case HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case ListBlock():
@@ -168,10 +213,10 @@ class _Writer:
             case ThematicBreak():
                 return "___"
             case MathBlock():
-                tex, tag = _no_empty_lines(block.tex.text), self._tag(block.span.start)
+                tex, tag = no_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case Table():
-                return self._table(block)
+                return self._once(block, lambda: self._table(block))
             case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf():
                 return self.context.own(block)
             case Bench() | Lab() | Quiz():
@@ -186,15 +231,14 @@ class _Writer:
         return self._inline(inline, line=False, cell=False)
 
     def _heading(self, heading: Heading) -> str:
-        text = " ".join(self.inlines(heading.children, line=True).split("\n")).strip()
-        text = _LAST_MARKS.sub(r"\1\\\2", text)
+        text = _LAST_MARKS.sub(r"\1\\\2", self._one_line(heading.children))
         return f"{'#' * heading.level} {text}".rstrip()
 
     def _list(self, block: ListBlock, *, other: bool) -> str:
         """A list; one right after another has other marks, by which it is known as another."""
         number, mark = block.start, "*" if other else "-"
         tight = all(
-            _is_tight(inner) or not isinstance(inner, Paragraph)
+            is_tight(inner) or not isinstance(inner, Paragraph)
             for item in block.items
             for inner in item.blocks
         )
@@ -233,7 +277,7 @@ class _Writer:
     def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
         match inline:
             case Text():
-                return _text(inline, cell=cell)
+                return text_source(inline, cell=cell)
             case SoftBreak():
                 return " " if line else "\n"
             case HardBreak():
@@ -243,17 +287,17 @@ class _Writer:
             case CodeSpan():
                 source = inline.span.text
                 ticks = source[: len(source) - len(source.lstrip("`"))]
-                return _piped(code_span(inline.text, ticks), cell=cell)
+                return piped(code_span(inline.text, ticks), cell=cell)
             case NumberBinding():
                 return escaped(number_text(inline))
             case Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
-                return _formula(inline, tag, cell=cell)
+                return formula(inline, tag, cell=cell)
             case Emphasis():
-                mark = _delimiter(inline.span.text, "*")
+                mark = delimiter(inline.span.text, "*")
                 return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
             case Strong():
-                mark = _delimiter(inline.span.text, "*") * 2
+                mark = delimiter(inline.span.text, "*") * 2
                 return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
             case Term():
                 return f"*{self._joined(inline.children, line=line, cell=cell)}*"
@@ -263,11 +307,13 @@ class _Writer:
                 text = self._joined(inline.children, line=line, cell=cell)
                 return self._link(inline, text, cell=cell)
             case Image():
+                self._asked = True
                 url = self.context.url(inline.url)
-                return _piped(picture(inline.alt, url, inline.title), cell=cell)
+                return piped(picture(inline.alt, url, inline.title), cell=cell)
             case RawInline():
-                return _piped(inline.html, cell=cell)
+                return piped(inline.html, cell=cell)
             case FootnoteRef():
+                self._asked = True
                 return self.context.reference(inline.number)
             case _:
                 assert_never(inline)
@@ -280,58 +326,7 @@ class _Writer:
         source = node.span.text
         if source == f"<{plain_text(node.children)}>" and not cell:
             return source
+        self._asked = True
         href = self.context.href(node.target)
         text = text or escaped(self.context.named(node.target))
         return link(text, href.replace("|", "%7C") if cell else href, node.title)
-
-
-_PIPE = pattern(r"(?<!\\)\|")
-_COMMENT = pattern(r"(?<!\\)%")
-_LAST_MARKS = pattern(r"(^|\s)(#+)$")
-_MINUS = pattern(r"(?<!\w)-(?=\d)")
-
-
-def number_text(node: NumberBinding) -> str:
-    """A number that a script printed, with a real minus sign."""
-    return _MINUS.sub("\u2212", node.text)
-
-
-def _is_tight(block: Block) -> bool:
-    return isinstance(block, Paragraph) and block.tight
-
-
-def _text(node: Text, *, cell: bool) -> str:
-    source = node.span.text
-    if source != node.text:
-        text = escaped(node.text)
-        if text[:1].isspace() and not source[:1].isspace():
-            text = f"&#{ord(text[0])};{text[1:]}"
-        if text[-1:].isspace() and not source[-1:].isspace():
-            text = f"{text[:-1]}&#{ord(text[-1])};"
-        return text.replace("\n", "&#10;")
-    if "$" in source or "`" in source:
-        source = ALWAYS.sub(lambda match: f"\\{match[0]}", source)
-    return _piped(source, cell=cell)
-
-
-def _piped(text: str, *, cell: bool) -> str:
-    return _PIPE.sub(r"\\|", text) if cell and "|" in text else text
-
-
-def _delimiter(source: str, usual: str) -> str:
-    return source[0] if source[:1] in ("*", "_") else usual
-
-
-def _formula(node: Math, tag: str, *, cell: bool) -> str:
-    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
-    if cell:  # a pipe would end the cell, and an escaped one is another sign
-        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
-    if "%" in tex and _COMMENT.search(tex):  # a line's end ends a comment
-        tex = _no_empty_lines(tex)
-    elif "\n" in tex:
-        tex = " ".join(part.strip() for part in tex.split("\n"))
-    return f"$${tex}$$" if node.display else f"${tex}$"
-
-
-def _no_empty_lines(tex: str) -> str:
-    return "\n".join(line for line in tex.split("\n") if line.strip())

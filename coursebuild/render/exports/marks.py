@@ -48,6 +48,8 @@ def code_span(text: str, ticks: str = "") -> str:
 
 
 _TICKS = pattern("`+")
+_ANY_MARK = pattern(r"[\\`*\[\]<$|!~&_]")
+"""What every mark has; most texts have none."""
 _MARKS = pattern(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
 ALWAYS = pattern(r"[$`]")
 """What is escaped wherever it is text: another reader may see more in it than ours did."""
@@ -55,7 +57,7 @@ ALWAYS = pattern(r"[$`]")
 
 def escaped(text: str) -> str:
     """Text with all its marks escaped, in one line or several."""
-    return _MARKS.sub(lambda match: f"\\{match[0]}", text)
+    return _MARKS.sub(lambda match: f"\\{match[0]}", text) if _ANY_MARK.search(text) else text
 
 
 def link(text: str, href: str, title: str = "") -> str:

@@ -1,6 +1,6 @@
 """A lesson as a Jupyter notebook that runs.
 
-Entry points: `notebook(sheet, page, base_url)`, all that the lesson itself gives, and
+Entry points: `notebook(sheet, page, …)`, all that the lesson itself gives, and
 `finished(notebook, …)`, the file, with what its scripts need around them.
 
 1. Markdown cells are cut at headings and at scripts. Links are made whole with the course's
@@ -31,7 +31,7 @@ from coursebuild.model import (
 )
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
-from coursebuild.render.exports.markdown import write_blocks
+from coursebuild.render.exports.markdown import Same, write_blocks
 from coursebuild.render.exports.marks import escaped, hang, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.exports.twin import head
@@ -71,12 +71,12 @@ class Notebook:
     """Texts of the first cells, by key, as Markdown."""
 
 
-def notebook(sheet: Sheet, page: PageContext, base_url: str) -> Notebook:
-    """The cells of a lesson."""
+def notebook(sheet: Sheet, page: PageContext, base_url: str, same: Same) -> Notebook:
+    """The cells of a lesson; `same` is what its twin has written."""
     document, words = page.document, page.tools.words
     here = _whole(base_url, sheet.path, page.place.href(sheet.path))
     locate = functools.partial(_whole, base_url, sheet.path)
-    context = Plain(page, locate, here, notebook=True)
+    context = Plain(page, locate, here, notebook=True, same=same)
     parts = head(sheet, words, locate)
     if base_url:
         parts.append(link(context.words("exports.on_site"), here))
@@ -106,7 +106,7 @@ def _cells(context: Plain, blocks: Iterable[Block]) -> Iterator[Cell]:
     done = {id(one) for some in joined.values() for one in some}
 
     def told() -> Iterator[Cell]:
-        text = write_blocks(waiting, context)
+        text = write_blocks(waiting, context, context.same)
         if text:
             yield Cell(section, text)
         waiting.clear()

@@ -5,14 +5,13 @@ Entry point: `page_exports`. It depends on what the page depends on, and on noth
 
 from __future__ import annotations
 
-from markupsafe import Markup
-
-from coursebuild.render import formulas, styles, urls
-from coursebuild.render.characters import visible
+from coursebuild.render import urls
 from coursebuild.render.context import PageContext
+from coursebuild.render.exports.markdown import Same
 from coursebuild.render.exports.notebook import Notebook, notebook
 from coursebuild.render.exports.parts import LessonPart, lesson_part
 from coursebuild.render.exports.twin import twin
+from coursebuild.render.formulas import Woven
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.tools import Tools
 from coursebuild.values import dataclass
@@ -38,15 +37,15 @@ class PageExports:
 
 
 def page_exports(
-    sheet: Sheet, page: PageContext | None, tools: Tools, base_url: str, body: str, article: str
+    sheet: Sheet, page: PageContext | None, tools: Tools, base_url: str, body: str, article: Woven
 ) -> PageExports:
     """All of it; `page` is the context of the page's document, if it has one.
 
-    `body` is the page's HTML as published, `article` its document's as drawn.
+    `body` is the page's HTML as published, `article` its document's part of that.
     """
-    text = twin(sheet, page, body) if urls.twin_path(sheet.path) is not None else ""
+    same: Same = {}
+    text = twin(sheet, page, body, same) if urls.twin_path(sheet.path) is not None else ""
     if sheet.kind != "lesson" or page is None:
         return PageExports(Beside(text, None), None)
-    settled, _ = styles.hoist(formulas.glue(article))
-    part = lesson_part(sheet, tools, Markup(visible(settled)))
-    return PageExports(Beside(text, notebook(sheet, page, base_url)), part)
+    part = lesson_part(sheet, tools, article)
+    return PageExports(Beside(text, notebook(sheet, page, base_url, same)), part)

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from coursebuild.render.exports.cut import Cut
 from coursebuild.render.exports.rewrite import Rewriter, Rules
 from coursebuild.render.exports.tags import Start
+from coursebuild.render.formulas import Woven
 from coursebuild.render.lesson import LessonHead
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.tools import Tools
@@ -22,6 +23,8 @@ _ON_PAPER = frozenset(("anchor", "bar-tools", "plot-wide", "qr"))
 """Classes of what an e-book does not need: links of headings to themselves, downloads, QR codes; of
 two drawings of a plot the one that small screens cannot show."""
 _TOP = "_top"
+_HERE = Markup("\ue000")
+"""Stands for the article."""
 _DOWN = 2
 """The course is the first heading, its levels are the second."""
 
@@ -55,16 +58,19 @@ def anchor(lesson: str, id: str = _TOP) -> str:
     return f"_{lesson}--{id}"
 
 
-def lesson_part(sheet: Sheet, tools: Tools, article: Markup) -> LessonPart:
+def lesson_part(sheet: Sheet, tools: Tools, article: Woven) -> LessonPart:
     """The part; `article` is the lesson's text as published."""
     head = sheet.values["lesson"]
     assert isinstance(head, LessonHead), "the sheet of a lesson has its head"
-    values = {"lesson": head, "draft": sheet.values["draft"], "article": article, "top": _TOP}
-    html = str(tools.render("exports/lesson.html", **values))
+    values = {"lesson": head, "draft": sheet.values["draft"], "article": _HERE, "top": _TOP}
+    # Behind the article are tags and nothing else.
+    before, _, after = str(tools.render("exports/lesson.html", **values)).rpartition(_HERE)
+    first, *others = (*article.texts[:-1], article.texts[-1] + after)
     prefix = anchor(head.id, "")
     page = Rules(sheet.path, prefix, down=_DOWN, opened=_is_no_answer, part=head.id)
     book = Rules(sheet.path, xml=True, pictures=SHOWN, without=_ON_PAPER)
-    cut, rewriter = Cut(html), Rewriter(book)
+    cut = Cut(Woven((before + first, *others), article.formulas))
+    rewriter = Rewriter(book)
     section, text = Rewriter(page).of(cut), rewriter.of(cut)
     mathml, svg = (f"<{name}" in text for name in ("math", "svg"))
     return LessonPart(section, OpenChapter(text, tuple(rewriter.pictures), mathml, svg))

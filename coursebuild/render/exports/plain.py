@@ -36,11 +36,9 @@ from coursebuild.model import (
     Target,
     plain_text,
 )
-from coursebuild.render.benches import bench_text
 from coursebuild.render.blocks import output_receipt, script_receipt
 from coursebuild.render.context import PageContext
-from coursebuild.render.exports.fromhtml import markdown_of
-from coursebuild.render.exports.markdown import write_blocks, write_inlines
+from coursebuild.render.exports.markdown import Same, write_blocks, write_inlines
 from coursebuild.render.exports.marks import (
     code_span,
     escaped,
@@ -60,9 +58,9 @@ from coursebuild.render.labs import (
     seconds,
     start_name,
 )
-from coursebuild.render.markup import OwnBlock
+from coursebuild.render.look import OwnBlock
 from coursebuild.render.quizzes import letter, output_line
-from coursebuild.values import dataclass
+from coursebuild.values import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +74,8 @@ class Plain:
     """The address of the page with its labs."""
     notebook: bool = False
     """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
+    same: Same = field(default_factory=dict)
+    """What the page's other context writes in the same way."""
 
     # what the writer asks
 
@@ -127,11 +127,11 @@ class Plain:
 
     def blocks(self, blocks: tuple[Block, ...]) -> str:
         """Blocks as Markdown."""
-        return write_blocks(blocks, self)
+        return write_blocks(blocks, self, self.same)
 
     def inlines(self, inlines: tuple[Inline, ...]) -> str:
         """Inlines as Markdown in one line."""
-        return write_inlines(inlines, self)
+        return write_inlines(inlines, self, self.same)
 
     def words(self, key: str, **values: str | int | float) -> str:
         """A text of the interface, as Markdown."""
@@ -165,6 +165,9 @@ class Plain:
         return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
 
     def _bench(self, block: Bench) -> str:
+        from coursebuild.render.benches import bench_text  # few lessons show a report
+        from coursebuild.render.exports.fromhtml import markdown_of
+
         html, said = bench_text(self.page, block)
         parts = [guarded(escaped(said))] if said else []
         head, *rest = markdown_of(str(html), self.locate).split("\n\n")

@@ -19,18 +19,21 @@ from urllib.parse import unquote
 
 from coursebuild.patterns import pattern
 from coursebuild.render.exports.addresses import OPEN, SHUT, escape, quoted, site_path, xml_id
-from coursebuild.render.exports.cut import MATHML, Cut, moved
-from coursebuild.render.exports.tags import VOID, End, Piece, Start
+from coursebuild.render.exports.attributes import (
+    ADDRESS,
+    ID,
+    IDS,
+    OF_PAGES,
+    OF_SCRIPTS,
+    XML_NAME,
+    use_of,
+)
+from coursebuild.render.exports.cut import MATHML, Cut
+from coursebuild.render.exports.tags import VOID, End, Piece, Start, read
+from coursebuild.render.formulas import Woven
 from coursebuild.values import dataclass, replace
 
 _DROPPED = frozenset("button form template script style dialog iframe object embed".split())
-_REFERRING = frozenset(
-    "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
-    " aria-flowto aria-labelledby aria-owns for headers list".split()
-)
-"""Attributes that hold ids."""
-_OTHER, _OF_SCRIPTS, _OF_PAGES, _ID, _IDS, _ADDRESS = range(6)
-"""What attributes are for; those of pages are not for XML."""
 _SIMPLE = pattern('[^&<>"\\x00-\\x1f\ud800-\udfff\ufffe\uffff]*+')
 """A value that is the same everywhere."""
 _IN_SVG = pattern(r"url\(#([^)]+)\)")
@@ -39,7 +42,6 @@ _NAMESPACES = {
     "math": MATHML,
 }
 _XLINK = "http://www.w3.org/1999/xlink"
-_XML_NAME = pattern(r"(?:(?:xml|xlink):)?[A-Za-z_][A-Za-z0-9_.-]*")
 _FORBIDDEN = pattern("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """What XML has not; said so since to compile a set takes as long as there are characters in it."""
 _ENDS_P = frozenset(
@@ -65,6 +67,19 @@ it ends where their ends were left out."""
 _START, _END, _BETWEEN, _LEFT_OUT = range(4)
 """Kinds: what opens and closes an element, what does neither, what opens one that is left out."""
 _NOTHING: _Written = (_BETWEEN, "", "", ())
+_OWN = pattern(
+    r'<([a-z][a-z0-9]*+)((?: (?!id=|href=|data-)[a-z-]++="[^"&]*+")*+) (id|href)="([^"&]*+)"'
+    r'((?: (?!id=|href=|data-)[a-z-]++="[^"&]*+")*+)>'
+)
+"""A start tag as we write most of those with a value of their own: the element, the attributes
+before, the one with that value, which is next, and the attributes after."""
+_SLOT = "own."
+"""Stands for that attribute; the names of the others have no dot."""
+_BY_VALUE = frozenset(("details", "img"))
+"""Elements of which an attribute may decide more than what is written in its place."""
+_Shape: TypeAlias = tuple[int, str, str, str, tuple[str, ...]]
+"""What becomes of such tags, whatever the value: as above, but what is written in two parts. Where
+the second is empty, nothing of the tag is."""
 _SHORT = 120
 """Characters of a mark that is remembered for other pages."""
 _MANY = 1000
@@ -99,7 +114,8 @@ class Rewriter:
         self.rules = rules
         self.pictures: dict[str, None] = {}
         """Site paths of the pictures that are shown, in order."""
-        self._everywhere = _everywhere(replace(rules, path="", prefix="", part=""))
+        known = _everywhere(replace(rules, path="", prefix="", part=""))
+        self._everywhere, self._shapes = known
         self._known = self._everywhere.copy()
         self._here = False
         """Whether what was written just now is so on this page only."""
@@ -108,17 +124,15 @@ class Rewriter:
 
     def text(self, html: str) -> str:
         """The whole."""
-        return self.of(Cut(html))
+        return self.of(Cut(Woven((html,))))
 
     def of(self, cut: Cut) -> str:
         """The same of what was cut, for another rewriter too perhaps."""
-        rest = iter(cut.parts)
         known, out, open_ = self._known, self._out, self._open
-        xml = self.rules.xml
         prefix = self._value(self._id("")) if self.rules.prefix else ""
-        for run, mark, _ in rest:
-            if run:
-                out.append(moved(run, prefix, xml=xml))
+        rest = zip(cut.moved(prefix, xml=self.rules.xml), cut.marks, strict=True)
+        for run, mark in rest:
+            out.append(run)
             found = known.get(mark)
             if found is None:
                 found = known[mark] = self._learnt(mark, cut)
@@ -156,11 +170,34 @@ class Rewriter:
     # --- tags
 
     def _learnt(self, mark: str, cut: Cut) -> _Written:
+        own = _OWN.fullmatch(mark)
+        if own is not None and (shaped := self._shaped(*own.groups())) is not None:
+            return shaped
         self._here = len(mark) > _SHORT
         written = self._written(cut.read(mark))
         if not self._here and len(self._everywhere) < _MANY:
             self._everywhere[mark] = written
         return written
+
+    def _shaped(self, name: str, before: str, own: str, value: str, after: str) -> _Written | None:
+        """What becomes of a tag like `_OWN`; `None` where it must be looked at as a whole."""
+        at = name, before, own, after
+        if at not in self._shapes:
+            if len(self._shapes) >= _MANY:
+                self._shapes.clear()
+            self._shapes[at] = self._shape(name, before, after)
+        shape = self._shapes[at]
+        if shape is None:
+            return None
+        kind, name, start, end, ends = shape
+        written = f"{start}{self._attribute(name, own, value)}{end}" if end else start
+        return kind, name, written, ends
+
+    def _shape(self, name: str, before: str, after: str) -> _Shape | None:
+        self._here = name in _BY_VALUE
+        kind, name, written, ends = self._written(read(f'<{name}{before} {_SLOT}=""{after}>'))
+        start, _, end = written.partition(f' {_SLOT}=""')
+        return None if self._here else (kind, name, start, end, ends)
 
     def _written(self, found: tuple[Piece, ...]) -> _Written:
         """What becomes of a mark; of one outside of what is left out."""
@@ -192,7 +229,7 @@ class Rewriter:
         alone = name in VOID or start.closed
         if self._is_left_out(start):
             return _NOTHING if alone else (_LEFT_OUT, name, "", ())
-        if self.rules.xml and not _XML_NAME.fullmatch(name):
+        if self.rules.xml and not XML_NAME.fullmatch(name):
             return _NOTHING
         ends = _ENDS.get(name, ("p",) if name in _ENDS_P else ())
         if name == "img" and not self._shows(start):
@@ -224,19 +261,20 @@ class Rewriter:
         return f"{text}/>" if closed else f"{text}>"
 
     def _attribute(self, element: str, name: str, value: str | None) -> str:
-        rules, use = self.rules, _use(name)
-        if use == _OF_SCRIPTS or (use == _OF_PAGES and rules.xml):
+        rules, use = self.rules, use_of(name)
+        if use == OF_SCRIPTS or (use == OF_PAGES and rules.xml):
             return ""
         if value is None:
-            return f' {name}=""' if rules.xml else f" {name}"
-        if use == _ID or (name == "name" and element == "a"):
+            # A name with a prefix would have to be declared, and says nothing without a value.
+            return ("" if ":" in name else f' {name}=""') if rules.xml else f" {name}"
+        if use == ID or (name == "name" and element == "a"):
             value = self._id(value)
-        elif use == _IDS:
+        elif use == IDS:
             value = " ".join(map(self._id, value.split()))
         elif name == "aria-label" and element == "section":
             self._here = True
             value = f"{value}, {rules.part}" if rules.part else value
-        elif use == _ADDRESS:
+        elif use == ADDRESS:
             # A picture inside a drawing is no part of the book.
             return "" if rules.xml and element == "image" else self._address(name, value)
         elif "url(#" in value:
@@ -280,15 +318,17 @@ class Rewriter:
 
 
 @functools.lru_cache(maxsize=8)
-def _everywhere(rules: Rules) -> dict[str, _Written]:
-    """What is the same on all pages: most tags have no address and no id."""
-    return {}
+def _everywhere(
+    rules: Rules,
+) -> tuple[dict[str, _Written], dict[tuple[str, str, str, str], _Shape | None]]:
+    """What is the same on all pages: most tags have no address and no id, or nothing else."""
+    return {}, {}
 
 
-def _skip(name: str, rest: Iterator[tuple[str, str, str]], cut: Cut) -> None:
+def _skip(name: str, rest: Iterator[tuple[str, str]], cut: Cut) -> None:
     """Go behind the end of an element that has begun."""
     open_ = [name]
-    for _, mark, _ in rest:
+    for _, mark in rest:
         for piece in cut.read(mark):
             if isinstance(piece, Start):
                 if piece.name not in VOID and not piece.closed:
@@ -298,18 +338,3 @@ def _skip(name: str, rest: Iterator[tuple[str, str, str]], cut: Cut) -> None:
                     pass
         if not open_:
             return
-
-
-@functools.lru_cache(maxsize=512)
-def _use(name: str) -> int:
-    """What an attribute is for."""
-    lower = name.lower()
-    if lower.startswith(("on", "data-")) or lower in ("style", "download", "loading", "srcset"):
-        return _OF_SCRIPTS
-    if lower in ("tabindex", "sizes") or not _XML_NAME.fullmatch(name):
-        return _OF_PAGES
-    if name == "id":
-        return _ID
-    if name in _REFERRING:
-        return _IDS
-    return _ADDRESS if name in ("href", "xlink:href", "src") else _OTHER

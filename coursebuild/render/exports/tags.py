@@ -56,18 +56,24 @@ _NAMED = r"(?P<raw>(?ai:script|style|textarea|title|xmp|iframe|noembed|noframes)
 """An element in which there are no tags."""
 _ENDED = r"</(?ai:(?P=raw))(?=[\s/>])[^>]*>"
 MARK = (
-    r"<!--(?:>|->|.*?(?:-->|--!>|\Z))"
+    r"</[a-z][a-z0-9]*+>"
+    r'|<(?!s[ct]|t[ei]|xm|if|no)[a-z][a-z0-9]*+(?: [a-z-]++="[^"]*+")*+>'
+    r"|<!--(?:>|->|.*?(?:-->|--!>|\Z))"
     rf"|<{_NAMED}{_INSIDE}>.*?{_ENDED}"
     rf"|</?[a-zA-Z]{_INSIDE}>"
     r"|<[!?/][^>]*>"
 )
-"""What is no text: a comment, an element without tags in it, a tag, a declaration. A dot is any
-character."""
+"""What is no text: a comment, an element without tags in it, a tag, a declaration. Before these,
+what most of them are: tags as we write them. A dot is any character."""
 _MARK = pattern(MARK, re.DOTALL)
 _PARTS = pattern(
     rf"<{_NAMED}(?P<rest>{_INSIDE})>(?P<inside>.*?){_ENDED}|<(?P<tag>/?[a-zA-Z]{_INSIDE})>",
     re.DOTALL,
 )
+_RAW = frozenset("script style textarea title xmp iframe noembed noframes".split())
+_PLAIN = pattern(r'<([a-z][a-z0-9]*+)((?: [a-z-]++="[^"&]*+")*+)>')
+_PLAIN_ATTRIBUTE = pattern(r' ([a-z-]++)="([^"]*+)"')
+"""A start tag as we write most of them, of which nothing else need be asked."""
 _NAME = pattern(r"/?([a-zA-Z][^\s/>]*)")
 _ATTRIBUTE = pattern(r"""([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 _SHORT = 24
@@ -97,6 +103,12 @@ def read(mark: str) -> tuple[Piece, ...]:
 
 
 def _read(mark: str) -> tuple[Piece, ...]:
+    plain = _PLAIN.fullmatch(mark)
+    if plain is not None:
+        name, attributes = plain.groups()
+        found = _PLAIN_ATTRIBUTE.findall(attributes)
+        if name not in _RAW and len(dict(found)) == len(found):
+            return (Start(name, tuple(found), False),)
     match = _PARTS.fullmatch(mark)
     if match is None:
         return () if _MARK.fullmatch(mark) else (mark,)

@@ -1,6 +1,6 @@
 """A page as plain Markdown: for people, feeds and language models.
 
-Entry points: `twin(sheet, page, body)`, the text; `twin_href`, an address in it.
+Entry points: `twin(sheet, page, …)`, the text; `twin_href`, an address in it.
 
 A lesson or page of the course is written from its document. Every other page (the map, levels,
 models, measured figures) is written from its HTML, so that it says what the page says.
@@ -15,11 +15,11 @@ from urllib.parse import unquote, urlsplit
 
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
-from coursebuild.render.exports.fromhtml import markdown_of
-from coursebuild.render.exports.markdown import write_blocks, write_footnotes
+from coursebuild.render.exports.markdown import Same, write_blocks, write_footnotes
 from coursebuild.render.exports.marks import code_span, escaped, guarded, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
+from coursebuild.render.links import plain_target
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
 
@@ -28,26 +28,43 @@ Locate: TypeAlias = Callable[[str], str]
 
 def twin_href(place: urls.Place, href: str) -> str:
     """An address on a page as its twin has it: that of the other page's twin."""
+    plain = plain_target(place.path, href)
+    if plain is None:
+        return _any_twin_href(place, href)
+    target, anchor = plain
+    if not target.endswith(".html") or not _has_twin(target):
+        return href
+    path, _, _ = href.partition("#")
+    return f"{path.removesuffix('.html')}.md{f'#{anchor}' if anchor else ''}"
+
+
+def _any_twin_href(place: urls.Place, href: str) -> str:
+    """The same, however the address is written."""
     parts = urlsplit(href)
     if parts.scheme or parts.netloc or not parts.path.endswith(".html"):
         return href
     folder = posixpath.dirname(place.path)
     target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
-    if target.startswith(("files/", "../")) or urls.twin_path(target) is None:
+    if not _has_twin(target):
         return href
     return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
 
 
-def twin(sheet: Sheet, page: PageContext | None, body: str) -> str:
-    """The text of a page; `body` is its HTML, as published."""
+def _has_twin(page: str) -> bool:
+    return not page.startswith(("files/", "../")) and urls.twin_path(page) is not None
+
+
+def twin(sheet: Sheet, page: PageContext | None, body: str, same: Same) -> str:
+    """The text of a page; `body` is its HTML, as published, `same` what its notebook shares."""
     if page is None:
         return twin_of(sheet.path, body)
     place, words, document = page.place, page.tools.words, page.document
-    context = Plain(page, lambda href: twin_href(place, href), place.href(place.path))
+    here = place.href(place.path)
+    context = Plain(page, lambda href: twin_href(place, href), here, same=same)
     parts = (
         *head(sheet, words, context.locate),
-        write_blocks(document.blocks, context),
-        write_footnotes(document.footnotes, context),
+        write_blocks(document.blocks, context, same),
+        write_footnotes(document.footnotes, context, same),
         *_foot(sheet, words, context.locate),
     )
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -57,6 +74,8 @@ def twin_of(path: str, body: str) -> str:
     """The text of a page without a document, from its HTML."""
     if urls.twin_path(path) is None:
         return ""
+    from coursebuild.render.exports.fromhtml import markdown_of  # pages with one need none of it
+
     return f"{markdown_of(body, lambda href: twin_href(urls.Place(path), href))}\n"
 
 

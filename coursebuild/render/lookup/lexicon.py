@@ -39,9 +39,10 @@ from coursebuild.model import (
 from coursebuild.model.lexicon import Piece
 from coursebuild.render import formulas as typeset
 from coursebuild.render.equations import numbered
+from coursebuild.render.look import Look
 from coursebuild.render.lookup.sentences import runs_on, sentence_of
 from coursebuild.render.lookup.symbols import only_symbol, symbols
-from coursebuild.render.markup import Look, render_inlines
+from coursebuild.render.markup import render_inlines
 from coursebuild.render.plain import PlainContext
 from coursebuild.render.plainly import without_links
 from coursebuild.results import Formula, MathError

@@ -41,7 +41,7 @@ _WRAPPERS = frozenset(("mrow", "mpadded", "mstyle", "semantics", "math", "mphant
 @functools.lru_cache(maxsize=1024)
 def symbols(mathml: str) -> tuple[str, ...]:
     """The symbols of a formula in their order, each once."""
-    root = _parsed(mathml)
+    root = _parsed(mathml) if "<mi" in mathml else None  # without letters it has none
     found: dict[str, None] = {}
     if root is not None:
         _collect(root, found)

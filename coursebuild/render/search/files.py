@@ -18,7 +18,7 @@ from typing import Protocol
 from coursebuild.render import urls
 from coursebuild.render.compressed import COPIES, copy_of
 from coursebuild.render.search import index
-from coursebuild.render.search.index import DIGEST, Cells, Plan
+from coursebuild.render.search.index import DIGEST, Cells, Numbers, Plan
 from coursebuild.render.search.page import call
 from coursebuild.results import KeptFile
 from coursebuild.values import dataclass
@@ -26,6 +26,8 @@ from coursebuild.values import dataclass
 FOLDER = "assets/search"
 _QUALITY = 5
 """Of Brotli: the tenth would be a seventh less for ten times the time."""
+_MOST = 64
+"""Buckets of which the numbers of pages are remembered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,7 @@ class SearchFiles:
         self._members: list[list[int]] = [[] for _ in range(self._plan.buckets)]
         for number, entry in enumerate(entries):
             self._members[self._plan.bucket(entry.path)].append(number)
+        self._numbers = functools.lru_cache(_MOST)(self._numbers_of)
         self._made: dict[tuple[int, int], Callable[[], bytes]] = {}
         self._group: tuple[int, list[list[bytes]]] = (-1, [])
         self._last: tuple[int, bytes] = (-1, b"")
@@ -139,7 +142,11 @@ class SearchFiles:
             buckets = range(self._plan.buckets)
             self._group = group, [index.slices(self._cell(b, group)) for b in buckets]
         parts = (slices[at] for slices in self._group[1])
-        return call("shard", f"{number}", index.shard(zip(parts, self._members, strict=True)))
+        numbers = map(self._numbers, range(self._plan.buckets))
+        return call("shard", f"{number}", index.shard(zip(parts, numbers, strict=True)))
+
+    def _numbers_of(self, bucket: int) -> Numbers:
+        return Numbers(self._members[bucket])
 
     def _digests(self, bucket: int) -> bytes:
         """Of all slices of a bucket."""

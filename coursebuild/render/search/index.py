@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
 from coursebuild.render.search.words import BEGINNING, is_fuzzy, shelf_of
@@ -106,15 +107,14 @@ DIGEST = 8
 def cells(plan: Plan, pages: Iterable[bytes]) -> Cells:
     """Sort the terms of a bucket's pages, given in the order of the course, into slices."""
     found: list[dict[str, str]] = [{} for _ in range(plan.terms + plan.words)]
-    pages_of: dict[str, str] = {}
+    pages_of: defaultdict[str, list[str]] = defaultdict(list)
     for number, data in enumerate(pages):
-        prefix = f" {number:x}"
+        having = {digit: f" {number:x}{digit}" for digit in "0123456789abcdef"}
         for line in data.decode().split("\n") if data else ():
-            term = line[1:]
-            pages_of[term] = pages_of.get(term, "") + prefix + line[0]
-    for term, having in pages_of.items():
+            pages_of[line[1:]].append(having[line[0]])
+    for term, places in pages_of.items():
         first, *others = plan.shards(term)
-        found[first][term] = having
+        found[first][term] = "".join(places)
         for shard in others:
             found[shard][term] = " "
     slices = [_slice(terms) for terms in found]
@@ -133,34 +133,14 @@ def slices(group: bytes) -> list[bytes]:
     return group.split(b"\0")
 
 
-def shard(parts: Iterable[tuple[bytes, Sequence[int]]]) -> str:
-    """A shard as the browser reads it, from its slices of all buckets.
+class Numbers(dict[str, int]):
+    """The pages of a bucket's slices as numbers in the course, times 16 and with the weight.
 
-    Args:
-        parts: slices, and for each the numbers that its bucket's pages have in the course.
-
-    Returns:
-        Lines of a term and, after a blank, its pages: rising numbers as differences to the one
-        before, times 16 and with the weight, each in digits of five bits, the lowest first.
+    Each is worked out once: the slices of a bucket have the same pages again and again.
     """
-    found: dict[str, list[int]] = {}
-    for part, numbers in parts:
-        read = _Read(numbers)
-        for line in part.decode().split("\n") if part else ():
-            term, _, pages = line.partition(" ")
-            here = [read[page] for page in pages.split()]
-            held = found.get(term)
-            if held is None:
-                found[term] = here
-            else:
-                held += here
-    return "\n".join(_line(term, found[term]) for term in sorted(found))
-
-
-class _Read(dict[str, int]):
-    """The pages of a slice as numbers in the course, times 16 and with the weight."""
 
     def __init__(self, numbers: Sequence[int]) -> None:
+        """`numbers` are those that the bucket's pages have in the course."""
         super().__init__()
         self._numbers = numbers
 
@@ -168,6 +148,30 @@ class _Read(dict[str, int]):
         """As `_slice` writes it."""
         self[page] = found = self._numbers[int(page[:-1], 16)] << 4 | int(page[-1], 16)
         return found
+
+
+def shard(parts: Iterable[tuple[bytes, Numbers]]) -> str:
+    """A shard as the browser reads it, from its slices of all buckets.
+
+    Args:
+        parts: slices, each with the numbers of its bucket's pages.
+
+    Returns:
+        Lines of a term and, after a blank, its pages: rising numbers as differences to the one
+        before, times 16 and with the weight, each in digits of five bits, the lowest first.
+    """
+    found: dict[str, list[int]] = {}
+    for part, numbers in parts:
+        number = numbers.__getitem__
+        for line in part.decode().split("\n") if part else ():
+            term, _, pages = line.partition(" ")
+            here = map(number, pages.split())
+            held = found.get(term)
+            if held is None:
+                found[term] = [*here]
+            else:
+                held += here
+    return "\n".join([_line(term, found[term]) for term in sorted(found)])
 
 
 def _line(term: str, pages: list[int]) -> str:

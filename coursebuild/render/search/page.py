@@ -11,10 +11,9 @@ import json
 from coursebuild.model import Document
 from coursebuild.render.characters import visible
 from coursebuild.render.lesson import LessonHead
-from coursebuild.render.search.drawn import drawn_sections
+from coursebuild.render.search.counting import TERMS, runs
 from coursebuild.render.search.sections import document_sections
 from coursebuild.render.search.values import PageText, Piece, Searched, Section
-from coursebuild.render.search.words import counted
 from coursebuild.render.sheet import Highlighted, Sheet, Shown, ShownBench
 
 _LEFT_OUT = frozenset({"home", "notfound", "search"})
@@ -25,9 +24,22 @@ TITLE, HEADING, TEXT, CODE = 3, 2, 1, 0
 """Where a term stands, by weight."""
 _FIELDS = {"text": TEXT, "formula": TEXT, "code": CODE, "output": CODE}
 _SHORT = {"text": "t", "formula": "f", "code": "c", "output": "o"}
-_DIGITS = "0123456789abcdef"
-_OFTEN = {1: 0, **dict.fromkeys((2, 3), 1), **dict.fromkeys(range(4, 10), 2)}
-"""By how often a term occurs, up to nine times; see `terms`."""
+
+
+class _Digits(dict[int, str]):
+    """The digit of a term by how often it occurs, for one field; see `terms`."""
+
+    def __init__(self, field: int) -> None:
+        once, few, some, self._many = (f"{field << 2 | often:x}" for often in range(4))
+        super().__init__(
+            {1: once, **dict.fromkeys((2, 3), few), **dict.fromkeys(range(4, 10), some)}
+        )
+
+    def __missing__(self, times: int) -> str:
+        return self._many
+
+
+_DIGITS = {field: _Digits(field) for field in (CODE, TEXT, HEADING, TITLE)}
 _FUNCTION = "coursebuildSearch.take"
 """What a file of the index calls: browsers load scripts from a disk, but no other data."""
 
@@ -60,8 +72,16 @@ def page_text(sheet: Sheet, document: Document | None, body: str) -> PageText | 
         return PageText(sheet.title, name, document_sections(document, lead, labels, measured))
     code = [v.text for v in sheet.values.values() if isinstance(v, Highlighted)]
     pieces = [Piece("text", text) for text in lead if text] + [Piece("code", t) for t in code if t]
-    drawn = drawn_sections(body) if sheet.kind not in _LEADS else ()
-    return PageText(sheet.title, name, (Section("", "", 0, tuple(pieces)), *drawn))
+    return PageText(sheet.title, name, (Section("", "", 0, tuple(pieces)), *_drawn(sheet, body)))
+
+
+def _drawn(sheet: Sheet, body: str) -> tuple[Section, ...]:
+    """The sections of a page that was made from no document."""
+    if sheet.kind in _LEADS:
+        return ()
+    from coursebuild.render.search.drawn import drawn_sections  # and a parser of HTML
+
+    return drawn_sections(body)
 
 
 def _scenario(shown: ShownBench) -> str:
@@ -95,14 +115,15 @@ def terms(text: PageText) -> bytes:
     The digit is the field (0 to 3) times four, and how often the term occurs on the page: 0 for
     once, 1 up to three times, 2 up to nine, 3 for more.
     """
-    fields: dict[str, int] = {}
     times: dict[str, int] = {}
+    digits: dict[str, _Digits] = {}
     for field, said in sorted(_said(text).items()):
-        for term, count in counted("\n".join(said)).items():
-            fields[term] = field << 2
-            times[term] = times.get(term, 0) + count
-    often = _OFTEN.get
-    lines = [_DIGITS[fields[term] | often(times[term], 3)] + term for term in sorted(times)]
+        digits_here = _DIGITS[field]
+        for run, count in runs("\n".join(said)).items():
+            for term in TERMS[run]:
+                times[term] = times.get(term, 0) + count
+                digits[term] = digits_here
+    lines = [digits[term][times[term]] + term for term in sorted(times)]
     return "\n".join(lines).encode("utf-8", "replace")
 
 

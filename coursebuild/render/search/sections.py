@@ -10,7 +10,7 @@ Entry point: `document_sections(document, lead, labels, measured)`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from html import unescape
 from typing import assert_never
 
@@ -116,12 +116,12 @@ class _Reader:
 
     def _block(self, block: Block) -> None:
         match block:
+            case Paragraph() | HtmlFlow():
+                self.add("text", self._text(block.children))
             case Heading():
                 heading = _line(self._text(block.children))
                 self.ended()
                 self._begin(block.anchor, heading, block.level)
-            case Paragraph() | HtmlFlow():
-                self.add("text", self._text(block.children))
             case ListBlock():
                 for item in block.items:
                     self.blocks(item.blocks)
@@ -196,29 +196,33 @@ class _Reader:
 
     def _formula(self, tex: str) -> str:
         text, names = plain_formula(tex)
-        self._also.update(dict.fromkeys(names))
+        for name in names:
+            self._also[name] = None
         return text
 
     def _text(self, inlines: Iterable[Inline]) -> str:
-        return "".join(self._parts(inlines))
+        parts: list[str] = []
+        self._gather(inlines, parts)
+        return "".join(parts)
 
-    def _parts(self, inlines: Iterable[Inline]) -> Iterator[str]:
+    def _gather(self, inlines: Iterable[Inline], parts: list[str]) -> None:
         for inline in inlines:
             match inline:
                 case Text() | CodeSpan() | NumberBinding():
-                    yield inline.text
+                    parts.append(inline.text)
                 case Math():
-                    yield self._formula(inline.tex.text)
+                    parts.append(self._formula(inline.tex.text))
                     if inline.meaning is not None:
                         self._also[inline.meaning.text] = None
-                case Emphasis() | Strong() | Strikethrough() | Link() | Term():
-                    yield from self._parts(inline.children)
-                case Image():
-                    yield inline.alt
                 case SoftBreak() | HardBreak():
-                    yield " "
+                    parts.append(" ")
+                case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+                    self._gather(inline.children, parts)
+                case Image():
+                    parts.append(inline.alt)
                 case RawInline():
-                    yield " " if inline.html.startswith(("<br", "<BR")) else ""
+                    if inline.html.startswith(("<br", "<BR")):
+                        parts.append(" ")
                 case FootnoteRef():
                     pass
                 case _:

@@ -45,10 +45,11 @@ _SKIPPED = frozenset("begin end label tag color hspace vspace phantom hphantom v
 _VARIANTS = {"varepsilon": "ε", "vartheta": "ϑ", "varphi": "φ", "varrho": "ϱ", "varpi": "ϖ"}
 _VARIANTS["varsigma"] = "ς"
 _MATHEMATICAL = pattern("[\U0001d400-\U0001d7ff]")
-_TIGHT = pattern(r"(?<=[_^]) | (?=[_^])")
-_OPERATOR = pattern(r"(?<=[Δδ∂∇]) (?=[^\W\d])")
+# A blank is looked for first, what stands around it then: the other way about takes far longer.
+_TIGHT = pattern(r" (?:(?<=[_^] )|(?=[_^]))")
+_OPERATOR = pattern(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
 """Between a difference or derivative and what it is of: they are one word, as `Δt`."""
-_INNER = pattern(r"(?<=[(\[|⟨]) | (?=[)\]⟩,;])")
+_INNER = pattern(r" (?:(?<=[(\[|⟨] )|(?=[)\]⟩,;]))")
 
 
 def _letters() -> dict[str, str]:
@@ -56,10 +57,17 @@ def _letters() -> dict[str, str]:
     for letter, name in GREEK.items():
         found.setdefault(name, letter)
         found.setdefault(name.capitalize(), letter.upper())
-    return found
+    return {name: f" {letter} " for name, letter in found.items()}
 
 
 _LETTERS = _letters()
+"""What the commands of letters say, with blanks around."""
+_SAID = {
+    **{name: f" {sign} " for name, sign in _SIGNS.items()},
+    **{name: f" {name} " for name in _NAMED},
+    **{"quad": " ", "qquad": " "},
+}
+"""What other commands say that have no argument."""
 
 
 @functools.lru_cache(maxsize=1024)
@@ -83,7 +91,9 @@ class _Reader:
     """Reads pieces from left to right."""
 
     def __init__(self, tex: str) -> None:
-        self._pieces: list[_Piece] = [p for p in _PIECE.findall(tex) if any(p)]  # no comments
+        self._pieces: list[_Piece] = _PIECE.findall(tex)
+        if "%" in tex:
+            self._pieces = [piece for piece in self._pieces if any(piece)]  # no comments
         self._at = 0
         self._depth = 0
         self.names: list[str] = []
@@ -100,9 +110,17 @@ class _Reader:
         """Up to the brace that closes, which is left."""
         pieces, end = self._pieces, len(self._pieces)
         parts: list[str] = []
-        while self._at < end and (piece := pieces[self._at])[2] != "}":
-            self._at += 1
-            parts.append(piece[3] or self._said(piece))
+        while self._at < end:
+            piece = pieces[self._at]
+            run = piece[3]
+            if not run:
+                if piece[2] == "}":
+                    break
+                self._at += 1
+                run = self._said(piece)
+            else:
+                self._at += 1
+            parts.append(run)
         return "".join(parts)
 
     def _said(self, piece: _Piece) -> str:
@@ -135,29 +153,32 @@ class _Reader:
 
     def _argument(self) -> str:
         """The next group or item; of a run of letters the first."""
-        while self._at < len(self._pieces) and self._pieces[self._at][3].isspace():
-            self._at += 1
-        if self._at >= len(self._pieces) or self._pieces[self._at][2] == "}":
+        pieces, at, end = self._pieces, self._at, len(self._pieces)
+        while at < end and pieces[at][3].isspace():
+            at += 1
+        self._at = at
+        if at >= end or pieces[at][2] == "}":
             return ""
-        piece = self._pieces[self._at]
-        self._at += 1
+        piece = pieces[at]
         if not piece[3]:
+            self._at += 1
             return self._said(piece).strip()
         text = piece[3].lstrip()
         if len(text) > 1:  # what follows the first character stays
-            self._at -= 1
-            self._pieces[self._at] = ("", "", "", text[1:])
+            pieces[at] = ("", "", "", text[1:])
+        else:
+            self._at += 1
         return text[:1]
 
     def _command(self, name: str) -> str:
-        if name in _LETTERS:
-            return f" {_LETTERS[name]} "
+        letter = _LETTERS.get(name)
+        if letter is not None:
+            return letter
         if name not in _STYLE:
             self.names.append(name)
-        if name in _SIGNS:
-            return f" {_SIGNS[name]} "
-        if name in _NAMED:
-            return f" {name} "
+        said = _SAID.get(name)
+        if said is not None:
+            return said
         if name in ("frac", "dfrac", "tfrac", "cfrac"):
             top = _bracketed(self._argument())
             return f" {top}/{_bracketed(self._argument())} "
@@ -166,10 +187,10 @@ class _Reader:
         if name in _SKIPPED:
             self._argument()
             return " "
-        return " " if name in ("quad", "qquad") else ""
+        return ""
 
 
 def _bracketed(text: str) -> str:
     """In brackets, unless it is one word or sign."""
     text = text.strip()
-    return text if len(text) <= 1 or text.isalnum() else f"({text})"
+    return f"({text})" if len(text) > 1 and not text.isalnum() else text

@@ -1,7 +1,7 @@
 """The terms that a text is found by; what a reader types goes through the same rules.
 
-Entry points: `terms_of(text)`, the terms of a text in order; `counted(text)`, how often each
-occurs; `shelf_of(term)`, what decides which file of the index has a term.
+Entry points: `terms_of(text)`, the terms of a text in order; `shelf_of(term)`, what decides which
+file of the index has a term.
 
 1. Characters are brought to their compatible form, without marks (NFKD, so that `Iₓₓ` is `Ixx` and
    `é` is `e`).
@@ -17,7 +17,6 @@ from __future__ import annotations
 import functools
 import re
 import unicodedata
-from collections import Counter
 from collections.abc import Iterator
 
 from coursebuild.patterns import pattern
@@ -96,20 +95,6 @@ def terms_of(text: str) -> list[str]:
     return [term for token in _tokens(text) for term in _expanded(token)]
 
 
-def counted(text: str) -> dict[str, int]:
-    """How often each term occurs."""
-    found: dict[str, int] = {}
-    lines = [text] if text.isascii() else text.split("\n")  # which no token reaches over
-    foreign = [line for line in lines if not line.isascii()]
-    tokens = Counter(_tokens("\n".join(filter(str.isascii, lines))))
-    if foreign:
-        tokens.update(_tokens("\n".join(foreign)))
-    for token, times in tokens.items():
-        for term in _expanded(token):
-            found[term] = found.get(term, 0) + times
-    return found
-
-
 def shelf_of(term: str) -> str:
     """Terms with the same shelf stand in the same file: those that begin alike.
 
@@ -154,7 +139,7 @@ def _folded(run: str) -> str:
     return "".join(c for c in text if unicodedata.category(c)[0] != "M")
 
 
-@functools.lru_cache(maxsize=1 << 15)
+@functools.lru_cache(maxsize=1 << 12)
 def _expanded(token: str) -> tuple[str, ...]:
     """The terms of a word, a name, a number or a symbol, each once."""
     if _SIMPLE.match(token):

@@ -10,8 +10,12 @@ from typing import Any
 
 import nbformat
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coursebuild.render import SiteOptions, check_links
+from coursebuild.render.exports import twin
+from coursebuild.render.urls import Place
 from coursebuild.results import Outcome, OutputFile, ScriptRun
 
 Make = Callable[..., Any]
@@ -269,3 +273,13 @@ def test_numbers_of_formulas_are_written(make: Make) -> None:
     twin = site(make, text)["lessons/0.1-falling.md"].decode()
     assert "$$\na = b % so\n\\tag{1}\n$$" in twin
     assert "[(1)](#eq:one)" in twin
+
+
+STEPS = ("a.html", "b.htm", "levels/", "files/", "../", "./", "/", "404", "é", "%20", "x:", "index")
+HREFS = st.lists(st.sampled_from((*STEPS, ".html", "#", "#c", "#%20", "?q", "//", "course/", ".")))
+
+
+@given(st.sampled_from(("a.html", "lessons/1.1-a.html", "a b/c.html")), HREFS.map("".join))
+def test_an_address_as_most_are_is_taken_to_the_twin_as_any(path: str, href: str) -> None:
+    place = Place(path)
+    assert twin.twin_href(place, href) == twin._any_twin_href(place, href)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.model import Callout, Document, PlainCode, Target
-from coursebuild.render.exports.markdown import write_blocks, write_footnotes, write_inlines
+from coursebuild.render.exports.markdown import Same, write_blocks, write_footnotes, write_inlines
 from coursebuild.render.exports.marks import (
     _guarded_line,
     code_span,
@@ -21,7 +21,7 @@ from coursebuild.render.exports.marks import (
     picture,
     quoted,
 )
-from coursebuild.render.markup import OwnBlock
+from coursebuild.render.look import OwnBlock
 from coursebuild.render.plain import PlainContext, plain_html
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
@@ -96,6 +96,28 @@ PIECES = st.sampled_from(
 @given(st.lists(PIECES, max_size=10).map("".join))
 def test_any_text_means_the_same(text: str) -> None:
     assert plainly(text) == plainly(written(text)), written(text)
+
+
+class Elsewhere(Context):
+    """Where links lead elsewhere, and footnotes look otherwise."""
+
+    def href(self, target: Target) -> str:
+        return f"https://elsewhere.example/{super().href(target)}"
+
+    def url(self, url: str) -> str:
+        return f"https://elsewhere.example/{url}"
+
+    def reference(self, note: int) -> str:
+        return f"<sup>{note}</sup>"
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.lists(PIECES, max_size=16).map("".join))
+def test_what_contexts_share_changes_nothing(text: str) -> None:
+    blocks = read(text).blocks
+    same: Same = {}
+    for context in (Context(), Elsewhere(), Context()):
+        assert write_blocks(blocks, context, same) == write_blocks(blocks, context)
 
 
 def plainly(markdown: str) -> str:

@@ -9,10 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coursebuild.render.exports import tags
 from coursebuild.render.exports.addresses import filled, site_path, xml_id
 from coursebuild.render.exports.cut import Cut
 from coursebuild.render.exports.rewrite import Rewriter, Rules
 from coursebuild.render.exports.tags import VOID, End, Start, pieces
+from coursebuild.render.formulas import Woven
+from coursebuild.render.mathml import is_ours
+from coursebuild.render.settling import settle_with
 
 PAGE = "lessons/1.1-one.html"
 BOOK = Rules(PAGE, xml=True, pictures=frozenset({"png"}))
@@ -51,6 +55,12 @@ OURS = st.sampled_from(
 <!-- <math><mi> -->|<![CDATA[ > <math> ]]>|<TITLE>a<b</Title>|<title/>|<svg><title>b</title></svg>
 <P TITLE='>'>|</P>|<p title=a>|<IMG SRC=a.png>|<h2 ID=x>|</h2>|<p|<p title='|<svg class=qr>|</svg>
 <section aria-label=a>|</section>|<a href='1.2-two.html#c'>|</a>|<details class=answer>|</details>
+<h2 id="a">|<h2 id="b c">|<h2 class="d" id="1" title="é">|<a class="qr" href="#a">|<p id="">
+<a class="b" href="1.2-two.html#c" aria-label="d">|<a class="b" href="#c" aria-label="d">
+<a href="">|<section id="s" aria-label="a">|<img id="i" src="b.avif">
+<details class="answer" id="d">|<1 id="a">|<a name="n" href="x:y">|<i id="a>b">|<i id="<">
+<button id="x">|<textarea id="t">|<svg id="v">|<use href="#a" xmlns="b">|<image href="a.png">
+<x-y id="a">|<i id="a" id="b">|<i id="own.">|<i own.="" id="a">|<br id="f">
 <button>|</button>|\n""".replace("\n", "|").split("|")
 )
 ALL = st.lists(st.one_of(OURS, PIECES), max_size=20).map("".join)
@@ -116,10 +126,25 @@ def test_runs_are_what_their_tags_become(rules: Rules, html: str) -> None:
     assert fast.text(html) == slowly.text(html)
 
 
+@settings(max_examples=400, deadline=None)
+@given(st.sampled_from(RULES), ALL, st.sampled_from(("", "\x01", "<h1>&lt;</h1>\n<p>")))
+def test_formulas_that_were_settled_are_what_their_tags_become(
+    rules: Rules, html: str, before: str
+) -> None:
+    woven = settle_with(html, html)[1]
+    whole = Woven((before + woven.texts[0], *woven.texts[1:]), woven.formulas)
+    slowly, fast = Slowly(rules), Rewriter(rules)
+    assert fast.of(Cut(whole)) == slowly.text(whole.html)
+
+
 @settings(deadline=None)
 @given(ALL)
 def test_a_cut_text_is_whole(html: str) -> None:
-    assert "".join(run + mark for run, mark, _ in Cut(html).parts) == html
+    for woven in (Woven((html,)), settle_with(html, html)[1]):
+        cut = Cut(woven)
+        runs = cut.moved("", xml=False)
+        whole = "".join(run + mark for run, mark in zip(runs, cut.marks, strict=True))
+        assert whole == woven.html
 
 
 @pytest.mark.parametrize(
@@ -129,10 +154,46 @@ def test_a_cut_text_is_whole(html: str) -> None:
         '<span id="code.L1"><span class="f">a</span> <span class="n">1</span></span>',
         "<math><mrow><mi>x</mi><mo>=</mo><mn>1</mn></mrow></math>",
         '<math display="block" class="tml-display"><mspace width="1em"></mspace></math>',
+        'a <math><mi>x</mi></math> <em>b</em> <math><mtd class="s0123abc"></mtd></math>',
     ],
 )
 def test_what_is_the_same_everywhere_goes_in_one_run(html: str) -> None:
-    assert [part for part in Cut(html).parts if any(part)] == [(html, "", "")]
+    cut = Cut(settle_with(html, html)[1])
+    assert ("".join(cut.moved("", xml=False)), "".join(cut.marks)) == (html, "")
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        *(">", "><mi>x</mi>", "><mtext>a &lt; b</mtext>", "><mspace/>", "><mi></mi>é"),
+        ' display="block" class="tml-display s0123abc"><mtd class="tml-eqn"></mtd>',
+    ],
+)
+def test_formulas_that_are_ours(formula: str) -> None:
+    assert is_ours(formula)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        *("><mi>", "></mi>", "><mi></mo>", "><mi/ >", "></mi/>", '><mi form="a" form="b"></mi>'),
+        *('><mi id="a"></mi>', '><mi href="a"></mi>', '><mi style="a"></mi>', "><mi form></mi>"),
+        *(
+            ">&nbsp;",
+            ">&",
+            "><b></b>",
+            "><svg/>",
+            ">\r",
+            ">\x01",
+            ">\ufffe",
+            ">\ud800",
+            "><!-- -->",
+        ),
+        *("", "><math></math>", '><mi class="qr"></mi>', ' id="a">', "></math>", "></math><math>"),
+    ],
+)
+def test_formulas_that_are_not(formula: str) -> None:
+    assert not is_ours(formula)
 
 
 def test_formulas_that_do_not_fit_are_read_tag_by_tag() -> None:
@@ -196,6 +257,21 @@ def test_what_is_left_out_takes_what_is_in_it_along() -> None:
     assert Rewriter(rules).text(html) == "abd"
 
 
+@pytest.mark.parametrize("rules", [BOOK, Rules(PAGE, down=2)])
+def test_characters_of_icons_are_text(rules: Rules) -> None:
+    """Icon fonts have theirs where those lie that open and shut a slot."""
+    html = '<p>A \ue000 b <b>c</b> <a href="1.2-b.html">d</a> \ue001 \ue000 e</p>'
+    text = filled(Rewriter(rules).text(html), lambda path, anchor, shown: "x")
+    assert text == '<p>A \ue000 b <b>c</b> <a href="x">d</a> \ue001 \ue000 e</p>'
+
+
+@pytest.mark.parametrize("name", ["xlink:href", "xml:lang", "odd:name"])
+def test_a_name_with_a_prefix_and_no_value_is_left_out_of_xml(name: str) -> None:
+    text = Rewriter(BOOK).text(f"<p {name}>a</p>")
+    assert text == "<p>a</p>"
+    ElementTree.fromstring(text)
+
+
 def test_a_link_that_leads_nowhere_is_text() -> None:
     text = Rewriter(BOOK).text('<a class="x" href="data.csv">a</a>')
     assert filled(text, lambda path, anchor, shown: "") == '<a class="x">a</a>'
@@ -221,3 +297,23 @@ def test_site_paths(url: str, expected: tuple[str | None, str]) -> None:
 def test_ids_of_xml_are_names_and_differ(a: str, b: str) -> None:
     assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", xml_id(a))
     assert a == b or "_" in a + b or xml_id(a) != xml_id(b)
+
+
+NAMES = st.sampled_from("a|p|title|textarea|svg|x1|h-1|script|A|br".split("|"))
+ATTRIBUTES = st.sampled_from(
+    (
+        *' a="b"| a="c"| b=""| c|  d="e"| e-f="g h"| -="x"| 1="x"| a="&lt;"| a="&"'.split("|"),
+        *' a="<>"| a=b| A="b"| a=""x"| /|/| a = "b"| href="x/"|\tz="y"| a="\n"|\n'.split("|"),
+        " a='b'",
+    )
+)
+
+
+@settings(max_examples=400)
+@given(name=NAMES, attributes=st.lists(ATTRIBUTES, max_size=4).map("".join))
+def test_a_tag_as_most_are_is_read_as_any(name: str, attributes: str) -> None:
+    mark = f"<{name}{attributes}>"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tags, "_PLAIN", re.compile("(?!)"))
+        slowly = tags._read(mark)
+    assert tags._read(mark) == slowly

@@ -1,0 +1,35 @@
+"""What a build has noted of a page that shows just this: then it need not be drawn to know it.
+
+Entry point: `Noted`.
+"""
+
+from __future__ import annotations
+
+from coursebuild.effects.store import Store
+from coursebuild.pipeline.outlines import Task
+from coursebuild.pipeline.pages import text_page_key
+from coursebuild.pipeline.records import part, unpack_record
+from coursebuild.pipeline.requests import PAGES
+from coursebuild.render.library import Library
+from coursebuild.render.page_list import PageEntry
+from coursebuild.render.shared import PageFacts
+from coursebuild.render.sheet import sheet_bytes
+
+
+class Noted:
+    """The records of pages that builds have left in a store."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __call__(self, page: PageEntry, library: Library, task: Task | None) -> PageFacts | None:
+        """What the shared files must know of a page, if that was noted.
+
+        `task`: the text of its document, if it has one.
+        """
+        if self._store.fresh:
+            return None
+        key = text_page_key(library.course, task, sheet_bytes(page.sheet(library)))
+        data = self._store.peek(PAGES, key)
+        record = None if data is None else unpack_record(part(data)[0])
+        return None if record is None else record.facts

@@ -1,0 +1,82 @@
+"""A site of a few pages, of which some were published twice, so that there is a spare."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.results import KeptFile, SiteFile
+
+SPARE = ".coursebuild/published/spare"
+
+
+class Pages:
+    """Pages whose text is their key, and which were made."""
+
+    def __init__(self) -> None:
+        self.made: list[str] = []
+
+    def __call__(self, **keys: str) -> list[SiteFile]:
+        """Files `a/b/c.html` are called `a__b__c`."""
+        return [self.one(name.replace("__", "/") + ".html", key) for name, key in keys.items()]
+
+    def one(self, path: str, key: str) -> KeptFile:
+        def make() -> bytes:
+            self.made.append(path)
+            return f"{path} {key}".encode()
+
+        return KeptFile(path, key, make)
+
+
+def texts(folder: Path) -> dict[str, str]:
+    return {
+        p.relative_to(folder).as_posix(): p.read_text()
+        for p in folder.rglob("*")
+        if p.is_file() and p.name != MARKER
+    }
+
+
+MANY = {"a": "1", "b__c": "1", "b__d": "1", "e__f__g": "1"}
+TEXTS = {path: f"{path} 1" for path in ("a.html", "b/c.html", "b/d.html", "e/f/g.html")}
+
+
+def beside(root: Path) -> list[str]:
+    return sorted(p.name for p in root.iterdir() if p.name != ".coursebuild")
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "course").mkdir()
+    return tmp_path / "course"
+
+
+@pytest.fixture
+def pages() -> Pages:
+    return Pages()
+
+
+@pytest.fixture
+def spared(root: Path, pages: Pages) -> Path:
+    """A course with a site of the files MANY and a spare, in which one of them is older."""
+    publish(root, root / "public", pages(**MANY | {"a": "0"}))
+    publish(root, root / "public", pages(**MANY))
+    assert texts(root / SPARE) == TEXTS | {"a.html": "a.html 0"}
+    pages.made.clear()
+    return root
+
+
+@pytest.fixture
+def links(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Which files are linked."""
+    found: list[str] = []
+    really = os.link
+
+    def link(source: str, target: str, *, follow_symlinks: bool = True) -> None:
+        found.append(source.rpartition("public/")[2])
+        really(source, target, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(os, "link", link)
+    return found

@@ -1,0 +1,122 @@
+"""A course that is edited, and what its builds draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from coursekit import Folder, block
+
+from coursebuild.pipeline.build import prepare
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+
+HEAD = """
+[course]
+title = "Tested"
+summary = "A course."
+base_url = "https://example.org/c/"
+
+[[page]]
+id = "about"
+title = "About"
+file = "content/pages/about.md"
+"""
+NORUN = block("s{n}.py", "import s1\nprint({n})\n", info="norun")
+LESSON = """## First
+
+Prose of {n} with $x_{n}$ and [the next](lesson:{next}).[^n]
+
+{script}
+> [!note] Remark
+> ![dot](../images/dot.png) and ==more==.
+
+$$
+E = {n}
+$$
+
+[^n]: A note.
+"""
+
+
+class Course:
+    """A course that is edited."""
+
+    def __init__(self, folder: Folder) -> None:
+        self.folder = folder
+        self.ids = ["1.1", "1.2", "1.3", "2.1", "2.2"]
+        self.titles = {id: f"Title {id}" for id in self.ids}
+        self.levels = {"1": "One", "2": "Two"}
+        self.needs = {"1.3": ["1.1"], "2.1": ["1.2"]}
+        self.planned = {"2.2"}
+        self.extra = ""
+        for n, id in enumerate(self.ids, 1):
+            following = self.ids[n % len(self.ids)]
+            if id not in self.planned:
+                self.write(id, LESSON.format(n=n, next=following, script=NORUN.format(n=n)))
+        folder.write("content/pages/about.md", "About *it*.\n\n## Part\n\nSee [m](model:box).\n")
+        folder.write("content/images/dot.png", b"\x89PNG")
+        folder.write("models/box.xml", "<mujoco/>\n")
+        self.save()
+
+    def path(self, id: str) -> str:
+        return f"content/lessons/{id}-l{id.replace('.', '')}.md"
+
+    def write(self, id: str, text: str) -> None:
+        self.folder.write(self.path(id), text)
+
+    def edit(self, id: str, old: str, new: str) -> None:
+        """An edit in a lesson, as far as there is something to edit."""
+        text = self.folder.text(self.path(id))
+        self.write(id, text.replace(old, new, 1))
+
+    def save(self) -> None:
+        """Write the map."""
+        parts = [HEAD, self.extra]
+        for level, title in self.levels.items():
+            parts.append(f'[[level]]\nid = "{level}"\ntitle = "{title}"\n')
+            for id in (id for id in self.ids if id.startswith(f"{level}.")):
+                needs = [need for need in self.needs.get(id, []) if need in self.ids]
+                parts.append(
+                    f'[[level.lesson]]\nid = "{id}"\nslug = "l{id.replace(".", "")}"\n'
+                    f'title = "{self.titles[id]}"\nprerequisites = {needs!r}\n'.replace("'", '"')
+                    + f'status = "{"planned" if id in self.planned else "complete"}"\n'
+                )
+        self.folder.write("content/course.toml", "\n".join(parts))
+
+
+def options(folder: Folder) -> Options:
+    return Options(folder.root.resolve(), 1, True)
+
+
+def drawn(folder: Folder) -> set[str]:
+    """The pages that a build draws anew, in words of their own."""
+    with prepare(options(folder), Progress(quiet=True)) as prepared:
+        assert prepared.report.ok, prepared.report.diagnostics
+        assert len(set(prepared.drawn)) == len(prepared.drawn)
+        return set(prepared.drawn)
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Documents are fetched anew each time, as they are in a long course."""
+    monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
+    monkeypatch.setattr("coursebuild.pipeline.shelf._LAST", 0)
+    monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
+
+
+@pytest.fixture
+def course(tmp_path: Path, stores: Path) -> Course:
+    folder = Folder(tmp_path / "course")
+    made = Course(folder)
+    folder.borrow(stores)
+    drawn(folder)
+    return made
+
+
+QUIZ = """```quiz
+{"id": "asked", "title": "Check", "questions": [
+  {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}]}
+```
+
+"""

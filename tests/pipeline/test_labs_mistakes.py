@@ -1,0 +1,135 @@
+"""Whatever a reader of a lab could run into is found first, at its line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from coursekit import GOOD, Folder
+from simlabkit import BALL, CART, checked, fence
+
+# What is wrong, its rule, and the lab; `‸` stands where the message must point.
+MISTAKES = [
+    ("a readout that throws", "lab-throws",
+     '{"model": "ball",\n "readouts": [{"label": "r",\n  "expr": ‸"lib.bodyPos(\'bell\')"}]}'),
+    ("a readout without a value", "lab-value",
+     '{"model": "ball", "readouts": [\n{"label": "r", "expr": ‸"ctx.none"}]}'),
+    ("a readout that becomes NaN", "lab-value",
+     '{"model": "ball", "readouts": [\n{"label": "r", "expr": ‸"Math.sqrt(1 - sim.time)"}]}'),
+    ("a readout that is infinite after a button", "lab-value",
+     '{"model": "ball", "controls": [{"type": "button", "label": "b", "run": "ctx.d = 1"}],\n'
+     '"readouts": [{"label": "r", "expr": ‸"ctx.d ? 1 / 0 : 0"}]}'),
+    ("a trace that is a text", "lab-value",
+     '{"model": "ball", "plots": [{"ylabel": "y",\n"traces": [{"label": "t", "expr": "1"},\n'
+     '{"label": "u", "expr": ‸"\'text\'"}]}]}'),
+    ("a trace that throws after a while", "lab-throws",
+     '{"model": "ball", "plots": [{"ylabel": "y",\n"traces": [{"label": "t",\n'
+     '"expr": ‸"sim.time > 0.3 ? null.x : 0"}]}]}'),
+    ("a setter that cannot set", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER,\n"set": ‸"ctx.none.x"}]}'),
+    ("a control at its maximum", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER,\n'
+     '"apply": ‸"if (value === 1) null.x"}]}'),
+    ("a control at its minimum", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER,\n'
+     '"apply": ‸"if (value === 0) null.x"}]}'),
+    ("a control at its value", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER,\n'
+     '"apply": ‸"if (value === 0.5) null.x"}]}'),
+    ("an option", "lab-throws",
+     '{"model": "ball", "controls": [{"type": "select", "label": "s",\n'
+     '"options": [["A", "a"], ["B", "b"], ["C", 3]],\n"apply": ‸"if (value === 3) null.x"}]}'),
+    ("stepping after a control was moved", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p"}],\n'
+     '"controller": ‸"if (ctx.p > 0.9 && sim.time > 0.1) null.x"}'),
+    ("a reset after a control was moved", "lab-throws",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p", "reset": true}],\n'
+     '"setup": ‸"if (ctx.p > 0.9) null.x"}'),
+    ("a button that throws", "lab-throws",
+     '{"model": "ball", "controls": [{"type": "button", "label": "fine", "run": "ctx.a = 1"},\n'
+     '{"type": "button", "label": "b",\n"run": ‸"data.qvell[0] = 1"}]}'),
+    ("a button that does not parse", "lab-code",
+     '{"model": "ball", "controls": [{"type": "button", "label": "b",\n"run": ‸"if ("}]}'),
+    ("a setup that throws", "lab-throws", '{"model": "ball",\n\n"setup": ‸"undeclared = 1"}'),
+    ("a warning after an option", "lab-warning",
+     '{"model": "cart", "controls": [{"type": "select", "label": "s",\n'
+     '"options": [["A", 0], ["B", 1]],\n"apply": ‸"data.ctrl[0] = value / (1 - value)"}]}'),
+    ("divergence at the end of a slider", "lab-diverged",
+     '{"model": "cart", "setup": "data.qpos[0] = 0.1", "controls": [\n{"label": "dt",\n'
+     '"min": 0.001, "max": 0.1, "value": 0.001, "set": ‸"model.opt.timestep"}]}'),
+    ("a position that is no number", "lab-diverged",
+     '{"model": "ball", "controls": [{"type": "button", "label": "b",\n'
+     '"run": ‸"data.qpos[2] = 0 / 0"}]}'),
+    ("a claim from the start", "lab-expect",
+     '{"model": "ball", "expect": [{"t": 0.5, "expr": "data.qpos[2]", "max": 1},\n'
+     '{"t": 0.2,\n"expr": ‸"data.qpos[2]", "max": 0.5}]}'),
+    ("a claim after a button", "lab-expect",
+     '{"model": "ball", "controls": [{"type": "button", '
+     '"label": "b", "run": "data.qvel[2] = 9"}],\n'
+     '"expect": [{"after": "b", "t": 0.1, "min": 3,\n"expr": ‸"data.qpos[2]"}]}'),
+    ("a claim with a control", "lab-expect",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p"}],\n'
+     '"expect": [{"after": {"s": 0.25}, "t": 0.1, "max": 0.2,\n"expr": ‸"ctx.p"}]}'),
+    ("a claim after a control and a button", "lab-expect",
+     '{"model": "ball", "controls": [{"label": "s", SLIDER, "param": "p"}, {"type": "button",\n'
+     '"label": "b", "run": "data.qvel[2] = ctx.p"}],\n'
+     '"expect": [{"after": [{"s": 0.25}, "b"], "t": 0, "max": 0.25, "expr": "data.qvel[2]"},\n'
+     '{"after": [{"s": 0.25}, "b"], "t": 0, "max": 0.2,\n"expr": ‸"data.qvel[2]"}]}'),
+    ("a claim that is NaN", "lab-value",
+     '{"model": "ball", "expect": [{"t": 0.1,\n"expr": ‸"0 / 0", "min": 0}]}'),
+    ("a pause that is jumped over", "lab-expect",
+     '{"model": "ball",\n"stopAt": ‸1, '
+     '"controller": "if (sim.time > 0.5) data.time = 2 + sim.time"}'),
+    ("engines that differ", "lab-parity",
+     '‸{"model": "ball",\n'
+     '"controller": "model.opt.gravity[0] = sim.time > 0.5 && sim.time < 1 ? 2 : 0"}'),
+    ("a built-in that is another's too", "lab-shared",
+     '{"model": "ball", "controls": [{"type": "button", "label": "b",\n'
+     '"run": ‸"Math.sin = Math.cos"}]}'),
+    ("a lab with its own model", "lab-throws",
+     '{"xml": "<mujoco><worldbody><geom size=\'1\'/></worldbody></mujoco>",\n'
+     '"readouts": [{"label": "r", "expr": ‸"null.x"}]}'),
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A course of all mistakes, after one check."""
+
+    status: int
+    found: list[dict[str, Any]]
+    labs: list[dict[str, Any]]
+    lesson: str
+
+
+@pytest.fixture(scope="module")
+def everything_wrong(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Checked:
+    folder = Folder(tmp_path_factory.mktemp("labs") / "course")
+    lesson = "## Labs\n\n" + "".join(fence(body) for _, _, body in MISTAKES)
+    folder.fill([GOOD, lesson.replace("‸", "")], stores)
+    folder.write("models/ball.xml", BALL)
+    folder.write("models/cart.xml", CART)
+    report = checked(folder)
+    found = [d for d in report["diagnostics"] if d["rule"].startswith("lab-")]
+    assert len(found) == len(report["diagnostics"])
+    return Checked(report["status"], found, report["labs"], lesson)
+
+
+def test_one_mistake_each_and_all_are_found(everything_wrong: Checked) -> None:
+    assert everything_wrong.status == 1
+    assert len(everything_wrong.found) == len(MISTAKES)
+    assert [lab["status"] for lab in everything_wrong.labs] == ["failed"] * len(MISTAKES)
+
+
+@pytest.mark.parametrize("number", range(len(MISTAKES)), ids=[title for title, _, _ in MISTAKES])
+def test_it_is_found_at_its_line(everything_wrong: Checked, number: int) -> None:
+    _, rule, _ = MISTAKES[number]
+    parts = everything_wrong.lesson.split("‸")
+    before = "".join(parts[: number + 1])
+    line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+    if rule == "lab-parity":  # it is about the lab, which begins with its fence
+        line, column = line - 1, 1
+    found = everything_wrong.found[number]
+    assert (found["rule"], found["line"], found["column"]) == (rule, line, column), found["message"]

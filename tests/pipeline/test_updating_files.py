@@ -1,0 +1,231 @@
+"""`update` and the files: which may be written, and what others do to them meanwhile."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import stat
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from coursekit import GOOD, Folder, block, command, ended
+
+Make = Callable[..., Folder]
+
+
+def test_a_lesson_saved_meanwhile_is_not_overwritten(make: Make) -> None:
+    saves = "from pathlib import Path\np = Path('{}')\np.write_text(p.read_text() + 'saved')\n"
+    folder = make(
+        "## One\n\n" + block("x.py", "print(1)", "OLD"),
+        "## Two\n\n" + block("y.py", saves.format("content/lessons/1.1-one.md"), "OLD"),
+    )
+    folder.replace(folder.lesson(2), "'saved')", "'saved')\nprint(2)")
+    before = folder.text(folder.lesson(1))
+    done = folder.main("update")
+    assert done.status == 1
+    assert f"{folder.lesson(1)} was changed in the meantime" in done.out
+    assert "run the command again" in done.out
+    assert folder.text(folder.lesson(1)) == before + "savedsaved"
+    assert "2\n```" in folder.text(folder.lesson(2))
+    assert f"updated {folder.lesson(2)}" in done.out
+
+
+def test_a_lesson_removed_meanwhile_is_not_made_again(make: Make) -> None:
+    code = "from pathlib import Path\nPath('content/lessons/1.1-one.md').unlink(missing_ok=True)"
+    folder = make("## One\n\n" + block("x.py", code + "\nprint(1)", "OLD"))
+    done = folder.main("update")
+    assert done.status == 1
+    assert "was removed in the meantime" in done.out
+    assert not (folder.root / folder.lesson()).exists()
+
+
+def test_a_linked_lesson_stays_a_link(make: Make) -> None:
+    folder = make(GOOD)
+    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
+    folder.write("drafts/hello.md", stale)
+    (folder.root / folder.lesson()).unlink()
+    (folder.root / folder.lesson()).symlink_to("../../drafts/hello.md")
+    assert folder.main("update").status == 0
+    assert (folder.root / folder.lesson()).is_symlink()
+    assert folder.text("drafts/hello.md") == GOOD
+    assert [path.name for path in (folder.root / "drafts").iterdir()] == ["hello.md"]
+
+
+def test_a_lesson_linked_from_outside_is_never_written(make: Make) -> None:
+    folder = make(GOOD)
+    outside = folder.root.parent / "outside.md"
+    outside.write_text(GOOD.replace("hello 3.14159\n", "OLD\n"))
+    (folder.root / folder.lesson()).unlink()
+    (folder.root / folder.lesson()).symlink_to(outside)
+    done = folder.main("update")
+    assert done.status == 1
+    assert "leads out of the project" in done.out
+    assert "OLD" in outside.read_text()
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o444, 0o755])
+def test_permissions_stay(make: Make, mode: int) -> None:
+    folder = make(GOOD.replace("hello 3.14159\n", "OLD\n"))
+    (folder.root / folder.lesson()).chmod(mode)
+    assert folder.main("update").status == 0
+    assert folder.text(folder.lesson()) == GOOD
+    assert stat.S_IMODE((folder.root / folder.lesson()).stat().st_mode) == mode
+
+
+def _as_an_ordinary_user() -> None:
+    """Root may write everywhere but for these capabilities, which are dropped at exec."""
+    drop, override, search = 24, 1, 2  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+    libc = ctypes.CDLL(None)
+    for capability in (override, search):
+        libc.prctl(drop, capability, 0, 0, 0)
+
+
+def test_a_folder_that_cannot_be_written(make: Make) -> None:
+    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
+    folder = make(stale)
+    folder.main("extract")
+    lessons = folder.root / "content/lessons"
+    lessons.chmod(0o555)
+    try:
+        done = subprocess.run(
+            command("update"),
+            cwd=folder.root,
+            env=folder.environment(),
+            capture_output=True,
+            text=True,
+            preexec_fn=_as_an_ordinary_user,
+        )
+    finally:
+        lessons.chmod(0o755)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert f"{folder.lesson()} cannot be written: permission denied" in done.stdout
+    assert folder.text(folder.lesson()) == stale
+    assert [path.name for path in lessons.iterdir()] == ["1.1-one.md"]
+
+
+def test_a_lesson_that_cannot_be_read(make: Make) -> None:
+    folder = make(GOOD, "## Two\n\n" + block("y.py", "print(2)", "2"))
+    (folder.root / folder.lesson()).chmod(0)
+    done = subprocess.run(
+        command("check"),
+        cwd=folder.root,
+        env=folder.environment(),
+        capture_output=True,
+        text=True,
+        preexec_fn=_as_an_ordinary_user,
+    )
+    assert done.returncode == 1
+    assert f"error[file-unreadable]: {folder.lesson()} cannot be read: permission denied" in (
+        done.stdout
+    )
+    assert "error[lesson-missing]" not in done.stdout
+
+
+def test_two_at_once_take_turns(make: Make) -> None:
+    """A build and an update, begun together: one waits, and each is whole."""
+    slow = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
+    folder = make("## One\n\n" + block("x.py", slow, "OLD", info="timeout=600"), GOOD)
+    said = folder.tmp / "update", folder.tmp / "build"
+    quiet = {"stdout": subprocess.DEVNULL}
+
+    def waits() -> list[bool]:
+        return [b"waiting for it" in path.read_bytes() for path in said]
+
+    with (
+        said[0].open("wb") as to_update,
+        said[1].open("wb") as to_build,
+        ended(folder.start("update", **quiet, stderr=to_update.fileno())) as update,
+        ended(folder.start("build", **quiet, stderr=to_build.fileno())) as build,
+    ):
+        until = time.monotonic() + 300
+        while not any(waits()):
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        folder.write("go", "")
+        assert update.wait(600) == 0
+        build.wait(600)
+    waited = waits()
+    assert waited.count(True) == 1
+    assert build.returncode == (0 if waited[1] else 1)  # drift, where it came first
+    assert "1\n```" in folder.text(folder.lesson())
+    assert folder.main("build").status == 0
+    assert not [name for name in folder.beside() if "tmp" in name or ".new" in name]
+
+
+def test_two_builds_at_once(make: Make) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    site = folder.tree()
+    done = threading.Event()
+    torn: list[str] = []
+
+    def watch() -> None:
+        """The site is there and whole at every moment."""
+        index = folder.root / "public/index.html"
+        while not done.is_set():
+            try:
+                if index.read_bytes() != site["public/index.html"]:
+                    torn.append("changed")
+            except FileNotFoundError:
+                torn.append("gone")
+            time.sleep(0)
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        builds = [folder.start("build", "-q", stdout=subprocess.DEVNULL) for _ in range(3)]
+        for build in builds:
+            with ended(build):
+                assert build.wait(600) == 0
+    finally:
+        done.set()
+        watcher.join()
+    assert torn == []
+    assert folder.tree() == site
+    assert not [name for name in folder.beside() if name.startswith(".public")]
+
+
+def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
+    folder = make("## One\n\n" + block("x.py", "import time\ntime.sleep(0.1)\nprint(1)", "1"))
+    first = folder.start("build", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with ended(first):
+        while not (folder.root / ".coursebuild/lock").exists():
+            time.sleep(0.01)
+        os.kill(first.pid, signal.SIGKILL)
+        first.wait()
+    began = time.monotonic()
+    assert folder.main("build").status == 0
+    assert time.monotonic() - began < 300
+
+
+def test_an_editor_that_saves_all_the_time(make: Make, tmp_path: Path) -> None:
+    """Whatever the moment of a save, its text is what stands in the lesson afterwards."""
+    folder = make("## One\n\n" + block("x.py", "print(1)", "OLD"))
+    stop = threading.Event()
+    saved: list[bytes] = []
+
+    def save() -> None:
+        number = 0
+        while not stop.wait(0.002):
+            number += 1
+            text = "## One\n\n" + block("x.py", "print(1)", "OLD") + f"Edit {number}.\n"
+            fresh = tmp_path / "fresh"
+            fresh.write_text(text)
+            saved.append(text.encode())
+            fresh.replace(folder.root / folder.lesson())
+
+    editor = threading.Thread(target=save)
+    editor.start()
+    try:
+        statuses = {folder.main("update").status for _ in range(4)}
+    finally:
+        stop.set()
+        editor.join()
+    left = folder.read(folder.lesson())
+    assert statuses <= {0, 1}
+    assert left.replace(b"\n1\n", b"\nOLD\n") == saved[-1]

@@ -1,0 +1,30 @@
+"""Course maps, and what an author is told of them."""
+
+from __future__ import annotations
+
+from nodekit import shown
+
+from coursebuild.diagnostics import Parsed
+from coursebuild.model import Course
+from coursebuild.source import Source
+from coursebuild.syntax.coursemap import parse_course_map
+
+
+def parse(text: str) -> Parsed[Course | None]:
+    return parse_course_map(Source("content/course.toml", text))
+
+
+def told(text: str) -> list[str]:
+    return shown(parse(text).diagnostics)
+
+
+HEAD = '[course]\ntitle = "T"\n'
+LEVEL = HEAD + '[[level]]\nid = "4"\ntitle = "L"\n'
+
+
+def lesson(id: str, *required: str, slug: str = "s", status: str = "planned") -> str:
+    names = ", ".join(f'"{name}"' for name in required)
+    return (
+        f'[[level.lesson]]\nid = "{id}"\nslug = "{slug}"\ntitle = "T"\nstatus = "{status}"\n'
+        f"prerequisites = [{names}]\n"
+    )

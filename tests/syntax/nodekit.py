@@ -1,0 +1,60 @@
+"""Nodes of JSON and TOML with their places, and what is told of a text."""
+
+from __future__ import annotations
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.syntax.nodes import (
+    ArrayNode,
+    BoolNode,
+    DateNode,
+    Node,
+    NullNode,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+)
+
+
+def shown(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
+    """Each mistake in a line: its place, rule, message and help."""
+    return [
+        f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"
+        + (f" [{d.help}]" if d.help else "")
+        for d in diagnostics
+    ]
+
+
+def plain(node: Node) -> object:
+    """The value as `json.loads` and `tomllib.loads` give it, but for dates."""
+    match node:
+        case ObjectNode():
+            return {member.key.value: plain(member.value) for member in node.members}
+        case ArrayNode():
+            return [plain(item) for item in node.items]
+        case StringNode():
+            assert node.excerpt.text == node.value
+            return node.value
+        case NumberNode() | BoolNode():
+            return node.value
+        case NullNode():
+            return None
+        case DateNode():
+            return "a date"
+        case _:
+            raise AssertionError(node)
+
+
+def tree(node: Node | None) -> object:
+    """A node with its places."""
+    match node:
+        case None:
+            return None
+        case ObjectNode():
+            inner: object = [(tree(one.key), tree(one.value)) for one in node.members]
+        case ArrayNode():
+            inner = [tree(item) for item in node.items]
+        case StringNode():
+            inner = (node.value, node.runs)
+        case _:
+            inner = node.raw
+    return type(node), node.start, node.end, node.mark, inner
