@@ -41,7 +41,7 @@ serve: $(VENV)/.site
 
 test: $(VENV)/.dev npm system
 	@PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" \
-	  $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(PYTEST_ARGS)
+	  $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --reruns 1 $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -31,6 +31,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Tell in full what failed and passed when it was run again: that is a fault as well."""
+    for report in terminalreporter.getreports("rerun"):
+        terminalreporter.section(f"failed and was run again: {report.nodeid}", sep="_")
+        terminalreporter.line(report.longreprtext)
+
+
 STORES = ("fonts", "compressed")
 
 
