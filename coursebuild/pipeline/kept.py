@@ -20,6 +20,7 @@ from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob
+    from coursebuild.scripts.held import Asked, Borne
 
 _TEMPLATES, _WORDS, _FONTS, _BINDINGS = "templates", "words", "fonts", "bindings"
 
@@ -116,16 +117,22 @@ class KeptBindings:
         self._before = frozenset(data.decode("ascii").split()) if data is not None else frozenset()
         self._now: set[str] = set()
 
-    def __contains__(self, key: str, /) -> bool:
+    def holds(self, key: str, leans: Asked) -> bool:
         """Whether nothing was wrong in the last run."""
         if key in self._before:
             self._now.add(key)
             return True
         return False
 
-    def add(self, key: str, /) -> None:
+    def add(self, key: str, leans: Asked, borne: Borne) -> None:
         """That nothing is wrong."""
         self._now.add(key)
+
+    def before(self, leans: Asked) -> Borne:
+        """Not kept: what is said of a course does not depend on what was said of it before."""
+        from coursebuild.scripts.held import Borne  # fonts and templates need it not
+
+        return Borne()
 
     def save(self) -> None:
         """Keep what was found."""

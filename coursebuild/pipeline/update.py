@@ -8,7 +8,7 @@ Entry point: `update(options, names, dry_run=…)`.
 2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
    changed it meanwhile.
 3. The bound numbers of the lessons as they are now are checked, so that prose which a new output
-   makes false is told.
+   makes false is told, and what is printed now in place of the number that it had.
 4. Scripts whose output was written run again with their initial states moved a little: digits that
    change with them are noise, and should not have been printed.
 """
@@ -25,7 +25,7 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.foresight import RunAll
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.effects.write import write_atomic
+from coursebuild.effects.write import check_writable, write_atomic
 from coursebuild.model import Course, Recording, document_blocks
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
@@ -34,11 +34,11 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts, run, script_lines
 from coursebuild.report import Report
-from coursebuild.results import Outcome, ScriptRun
+from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.scripts.extract import Extraction, extract
-from coursebuild.scripts.findings import script_findings
+from coursebuild.scripts.findings import bearings, script_findings
 from coursebuild.source import Source
 from coursebuild.values import replace
 
@@ -72,7 +72,7 @@ def _update(
     remarks, unwritten = _write(options, edits, dry_run=dry_run)
     now = loaded if dry_run or not edits else load(options.root)
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
-    found += _afterwards(now.course or course, scripts, first, again)
+    found += _afterwards(course, now.course or course, scripts, first, again)
     if edits and not dry_run and now.course is not None:
         changed = {r.script for r in _recordings(course, chosen) if _is_touched(r, edits, ())}
         found += _noise(now.course, chosen, changed, first, options, progress)
@@ -210,7 +210,9 @@ def _write(
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
         try:
-            if not dry_run:
+            if dry_run:
+                check_writable(options.root, source.path)
+            else:
                 write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
         except EffectError as error:
             span = min((edit.span for edit in changes), key=lambda span: span.start)
@@ -229,6 +231,7 @@ def changed_text(what: str, source: Source, new: str) -> str:
 
 
 def _afterwards(
+    before: Course,
     now: Course,
     scripts: Sequence[Extraction],
     first: Sequence[ScriptRun],
@@ -240,9 +243,13 @@ def _afterwards(
         for one, two in zip(first, again, strict=True)
     ]
     ran = {extraction.path for extraction in scripts}
+
+    def verdicts(course: Course) -> list[Verdict]:
+        return [v for v in compare_all(course, runs) if v.recording.script in ran]
+
     # What was written above a script moved it, so that its place is another than before.
     placed = [extraction for extraction in extract(now).value if extraction.path in ran]
-    verdicts = [v for v in compare_all(now, runs) if v.recording.script in ran]
-    found = script_findings(now, placed, runs, verdicts)
+    held = bearings(before, runs, verdicts(before)) if now is not before else None
+    found = script_findings(now, placed, runs, verdicts(now), held)
     # What update just refused is told by the refusal; a dry run leaves the drift as it is.
     return [d for d in found if d.rule != "output-drift"]

@@ -18,11 +18,13 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Protocol
+from functools import partial
+from typing import TYPE_CHECKING
 
-from coursebuild.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
+from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
+from coursebuild.scripts.held import Borne, Held, Leans
 from coursebuild.source import Span
 from coursebuild.values import dataclass
 
@@ -95,6 +97,17 @@ class Printed:
         )
         return found[after - 1 : after] if after else []
 
+    def leans(self, binding: NumberBinding) -> Leans:
+        """What a binding shows, and on which outputs it leans."""
+        recorded = self.recorded(binding)
+        if binding.script is not None or not recorded:
+            return Leans(binding.text, binding.script or "", "", 0, len(recorded))
+        (verdict,) = recorded
+        path, script = binding.span.path, verdict.recording.script or ""
+        same = [v for v in self._by_document[path] if v.recording.script == script]
+        nth = next(nth for nth, one in enumerate(same) if one is verdict)
+        return Leans(binding.text, script, path, nth, len(same))
+
     def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
         """The lines of a recorded output."""
         key = (verdict.recording.span.path, verdict.recording.body_span.start)
@@ -112,33 +125,28 @@ def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
     return tuple(i for i in document_inlines(document) if isinstance(i, NumberBinding))
 
 
-class Held(Protocol):
-    """Remembers bindings in which nothing is wrong."""
-
-    def __contains__(self, key: str, /) -> bool:
-        """Whether nothing is wrong, by a hash of all that this depends on."""
-
-    def add(self, key: str, /) -> None:
-        """That nothing is wrong."""
-
-
 def check_bindings(
     document: Document, printed: Printed, held: Held | None = None
 ) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
-    Nothing is said of bindings that lean on a script that failed: its failure is reported.
+    Nothing is said of bindings that lean on a script that failed: its failure is reported. `held`
+    remembers what was looked at before.
     """
     found: list[Diagnostic] = []
     for binding in document_bindings(document):
-        key = _leans_on(binding, printed) if held is not None else ""
-        if held is not None and key in held:
-            continue
-        diagnostic = _check(binding, printed)
-        if diagnostic is not None:
-            found.append(diagnostic)
-        elif held is not None:
-            held.add(key)
+        checked: Diagnostic | Borne
+        if held is None:
+            checked = _check(binding, printed, Borne())
+        else:
+            key, leans = _leans_on(binding, printed), partial(printed.leans, binding)
+            if held.holds(key, leans):
+                continue
+            checked = _check(binding, printed, held.before(leans))
+            if isinstance(checked, Borne):
+                held.add(key, leans, checked)
+        if isinstance(checked, Diagnostic):
+            found.append(checked)
     return tuple(found)
 
 
@@ -162,7 +170,11 @@ def _leans_on(binding: NumberBinding, printed: Printed) -> str:
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
+def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnostic | Borne:
+    """What is wrong with a binding, or the lines by which it holds, as far as it was looked at.
+
+    `before` are those by which it held before, if that is known.
+    """
     from coursebuild.scripts.printed import lines_of_run
 
     verdicts = printed.recorded(binding)
@@ -171,9 +183,9 @@ def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
     if path is None or path not in printed:
         return _orphan(binding, printed)
     if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
-        return None
+        return Borne()
     if not verdicts:
-        return _unrecorded(binding, path, run)
+        return _unrecorded(binding, path, run, before)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
     if not steady:
         return diagnose(
@@ -184,24 +196,35 @@ def _check(binding: NumberBinding, printed: Printed) -> Diagnostic | None:
         )
     lines = [line for verdict in steady for line in printed.lines(verdict)]
     if _holds(binding, lines):
-        return None
+        return _borne(lines)
+    counted, now = lines, lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
     if (partial or drifted) and run is not None and run.outcome is Outcome.OK:
-        lines = ([] if drifted else lines) + list(lines_of_run(run.stdout))
-        if _holds(binding, lines):
-            return None
-    return _mismatch(binding, path, lines)
+        ran = list(lines_of_run(run.stdout))
+        counted = ([] if drifted else lines) + ran
+        if _holds(binding, counted):
+            return _borne(ran, ran=True)
+        now = ran if drifted or before.ran else lines
+    from coursebuild.scripts.mismatch import mismatch  # in most courses nobody asks for it
+
+    return mismatch(binding, path, counted, before.lines, now)
+
+
+def _borne(lines: Sequence[PrintedLine], *, ran: bool = False) -> Borne:
+    return Borne(tuple(line.text for line in lines), ran)
 
 
 def _silent(run: ScriptRun) -> bool:
     return run.outcome is Outcome.OK and not run.stdout.strip()
 
 
-def _unrecorded(binding: NumberBinding, path: str, run: ScriptRun | None) -> Diagnostic | None:
+def _unrecorded(
+    binding: NumberBinding, path: str, run: ScriptRun | None, before: Borne
+) -> Diagnostic | Borne:
     """A binding to a script without a recorded output: what it printed in this run counts."""
     if run is None:
-        return None
+        return Borne()
     if run.outcome is Outcome.NORUN:
         return diagnose(
             "binding-orphan",
@@ -210,11 +233,15 @@ def _unrecorded(binding: NumberBinding, path: str, run: ScriptRun | None) -> Dia
             help="record its output below it",
         )
     if run.outcome is not Outcome.OK:
-        return None
+        return Borne()
     from coursebuild.scripts.printed import lines_of_run
 
     lines = lines_of_run(run.stdout)
-    return None if _holds(binding, lines) else _mismatch(binding, path, lines)
+    if _holds(binding, lines):
+        return _borne(lines, ran=True)
+    from coursebuild.scripts.mismatch import mismatch
+
+    return mismatch(binding, path, lines, before.lines, lines)
 
 
 def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
@@ -239,38 +266,6 @@ def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
         binding.text_span,
         f"`{binding.text}` is bound to `{binding.script}`, which is no script of the course",
         help=did_you_mean(binding.script, printed.scripts()),
-    )
-
-
-def _mismatch(binding: NumberBinding, path: str, lines: Sequence[PrintedLine]) -> Diagnostic:
-    from coursebuild.scripts.nearest import meant
-    from coursebuild.scripts.shown import Shown
-
-    shown = Shown.of(binding.text)
-    if not shown.numbers:
-        return diagnose(
-            "binding-mismatch",
-            binding.text_span,
-            f"`{binding.text}` does not stand in the output of `{path}`",
-            help="write it as it is printed, or take `{out}` away",
-        )
-    windows = shown.windows(lines)
-    label, better = "", ""
-    if windows:
-        likeliest = meant(shown, windows)
-        label = likeliest.label
-        better = likeliest.rewritten(shown, binding.text)
-    elif len(shown.numbers) > 1 and any(line.numbers for line in lines):
-        label = f"no printed line has {len(shown.numbers)} numbers one after the other"
-    else:
-        label = "no number was printed"
-    return diagnose(
-        "binding-mismatch",
-        binding.text_span,
-        f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown",
-        label=label,
-        help=f"write `{better}`" if better else "",
-        edits=[Edit(binding.text_span, better)] if better else [],
     )
 
 

@@ -1,7 +1,7 @@
 """Everything that running the scripts of a course shows to be wrong.
 
-Entry point: `script_findings`. Each script that failed, each recorded output that is not what was
-printed, each bound number that no output bears out.
+Entry points: `script_findings`: each script that failed, each recorded output that is not what was
+printed, each bound number that no output bears out; `bearings`, by what those hold that do.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course
 from coursebuild.results import Outcome, ScriptRun, Verdict
-from coursebuild.scripts.bindings import Held, Printed, check_bindings, leaning_on
+from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
 from coursebuild.scripts.divergence import divergence
 from coursebuild.scripts.extract import Extraction, extract, owners
+from coursebuild.scripts.held import Bearings, Held
 
 _ENDED_WELL = (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN)
 """Or was not to be made: nothing is to be said of such a run itself."""
@@ -31,7 +32,7 @@ def script_findings(
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
     `extractions` are those that were run, maybe not all of the course; `everything` is what
-    `extract` gives for it, where that is known.
+    `extract` gives for it, where that is known. `held` are bindings that were looked at before.
     """
     by_path = {run.path: run for run in runs}
     everything = extract(course).value if everything is None else everything
@@ -63,3 +64,12 @@ def script_findings(
     for document in course.documents:
         found += check_bindings(document, printed, held)
     return tuple(found)
+
+
+def bearings(course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]) -> Bearings:
+    """By which lines the bindings of a course hold."""
+    held = Bearings()
+    printed = Printed(verdicts, runs)
+    for document in course.documents:
+        check_bindings(document, printed, held)
+    return held

@@ -1,6 +1,6 @@
 """Which printed numbers the author of a binding that does not hold most probably meant.
 
-Entry point: `meant`.
+Entry points: `meant` (the likeliest of some), `of_window` (these and no others).
 
 1. The same numbers with another sign, to the digits shown, come first.
 2. Else the numbers that are relatively nearest, since a slip or an older run changes the last
@@ -68,7 +68,11 @@ class Meant:
 
 def meant(shown: Shown, windows: Sequence[Window]) -> Meant:
     """The likeliest of some printed numbers, at least one; the first of those alike."""
-    window = min(windows, key=lambda window: _unlikeness(shown, window))
+    return of_window(shown, min(windows, key=lambda window: _unlikeness(shown, window)))
+
+
+def of_window(shown: Shown, window: Window) -> Meant:
+    """Some printed numbers as what a binding means."""
     pairs = list(zip(shown.numbers, window.numbers, strict=True))
     if all(_same_size(one, other) for one, other in pairs):
         return Meant(window, Likeness.SIGN)

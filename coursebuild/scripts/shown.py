@@ -6,7 +6,7 @@ Entry points: `Shown.of`, `shows`, `text_places`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from coursebuild.scripts.celltext import plain
 from coursebuild.scripts.numbers import (
@@ -94,10 +94,18 @@ class Shown:
     def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
         """The printed numbers that may be meant, by number and by the text around them."""
         windows = [window for line in lines for window in self._in(line)]
+        for pattern, side in self._sides():
+            windows = [w for w in windows if side(w, pattern)] or windows
+        return windows
+
+    def stands_beside(self, window: Window) -> bool:
+        """Whether the text around the numbers stands around the printed ones as well."""
+        return all(side(window, pattern) for pattern, side in self._sides())
+
+    def _sides(self) -> Iterator[tuple[str, Callable[[Window, str], bool]]]:
         for pattern, side in ((self.after, _followed), (self.before, _preceded)):
             if pattern:
-                windows = [w for w in windows if side(w, pattern)] or windows
-        return windows
+                yield pattern, side
 
 
 def _followed(window: Window, text: str) -> bool:

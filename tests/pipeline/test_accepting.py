@@ -111,3 +111,50 @@ def test_a_bound_number_is_accepted(make: Make) -> None:
         assert preview.accept(body, Origin=origin, X_Coursebuild_Token=token)[0] == 200
         assert folder.text(folder.lesson()) == GOOD + "It is `3.14`{out}, nearly.\n"
         events.settled()
+
+
+def test_an_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None:
+    """And not the one that is nearest, which is another quantity."""
+    code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
+    prose = "The period is `2.006`{out}.\n"
+    folder = make(
+        "## Swing\n\n" + block("x.py", code, "period 2.006 s\nhalf 1.003 s") + prose,
+        "## Again\n\n`2.01 s`{out=examples/x.py} and `1.003`{out=examples/x.py}\n",
+    )
+    with serving(folder) as preview, preview.events() as events:
+        right = {
+            "Origin": f"http://127.0.0.1:{preview.port}",
+            "X_Coursebuild_Token": "",
+        }
+
+        def accept(id: str) -> None:
+            right["X_Coursebuild_Token"] = events.hello["token"]
+            body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
+            assert preview.accept(body, **right) == (200, {"message": ""})
+
+        events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
+        assert events.news["numbers"] == []  # what is recorded bears them out
+        accept(events.news["outputs"][0]["offer"])
+        events.until(lambda told: bool(told.news["numbers"]))
+        (number,) = events.news["numbers"]
+        assert (number["text"], number["better"]) == ("2.006", "2.950")
+        assert number["label"] == "2.95 is printed where 2.006 was"
+        accept(number["offer"])
+        events.settled("binding-mismatch", "binding-mismatch")
+        assert prose.replace("2.006", "2.950") in folder.text(folder.lesson())
+        assert [problem["label"] for problem in events.news["problems"]] == [
+            "2.95 is printed where 2.006 was",
+            "1.975 is printed where 1.003 was",
+        ]
+
+
+def test_a_number_of_which_nobody_knows_where_it_was_is_not_offered(make: Make) -> None:
+    code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
+    folder = make(
+        "## Swing\n\n" + block("x.py", code, "period 2.95 s\nhalf 1.975 s") + "`2.006`{out}\n"
+    )
+    with serving(folder) as preview, preview.events() as events:
+        events.until(lambda told: bool(told.news["numbers"]))
+        (number,) = events.news["numbers"]
+        assert (number["better"], number["offer"]) == ("", None)
+        assert number["label"] == "the nearest printed value is 1.975"

@@ -243,6 +243,29 @@ def test_prose_that_becomes_false_is_told(make: Make) -> None:
     assert "`2.75`{out}" in folder.text(folder.lesson())
 
 
+def test_what_is_printed_in_the_place_of_a_number_is_told(make: Make) -> None:
+    """And not what is nearest: of another quantity, it would make the sentence false."""
+    code = "print('period  ', 2.95, 's')\nprint('half    ', 1.975, 's')"
+    folder = make(
+        "## One\n\n"
+        + block("x.py", code, "period   2.006 s\nhalf     1.003 s")
+        + "The period is `2.006 s`{out}.\n\n| half |\n| --- |\n| `1.0`{out} |\n",
+        "## Two\n\nIt was `2.01`{out=examples/x.py}, or `8.1`{out=examples/x.py}.\n",
+    )
+    done = folder.main("update")
+    told = [line.strip() for line in done.out.splitlines() if "^^" in line or "= help" in line]
+    assert [line.partition("^ ")[2] or line for line in told] == [
+        "2.95 is printed where 2.006 was",
+        "= help: write `2.950 s`",
+        "1.975 is printed where 1.003 was",
+        "= help: write `2.0`",
+        "2.95 is printed where 2.006 was",
+        "= help: write `2.95`",
+        "the nearest printed value is 2.95",
+        "= help: write `3.0`, if that is what is meant",
+    ]
+
+
 @pytest.mark.parametrize(
     ("code", "how", "says"),
     [

@@ -22,6 +22,7 @@ from coursebuild.pipeline.verify import extract_scripts, run
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.extract import Extraction, jobs
 from coursebuild.scripts.findings import script_findings
+from coursebuild.scripts.held import Bearings
 
 _BATCH = 16
 """Scripts whose results are waited for before they are shown."""
@@ -52,8 +53,8 @@ class Scripts:
         self._runnable: set[str] = set()
         self._others = False
         """Whether scripts that did not change lean on something that did."""
-        self._held: set[str] = set()
-        """Bindings in which nothing is wrong; see `check_bindings`."""
+        self._held = Bearings()
+        """Bindings that held, also before an output was accepted; see `check_bindings`."""
         self._server = ScriptServer()
 
     def close(self) -> None:
