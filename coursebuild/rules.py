@@ -23,7 +23,7 @@ class Rule:
 
 _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     # files
-    ("file-encoding", "error", "A file of the course is not UTF-8."),
+    ("file-encoding", "error", "A file of the course is not text in UTF-8."),
     (
         "file-unreadable",
         "error",
@@ -37,6 +37,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("page-unlisted", "error", "A file in content/pages is not named by the course map."),
     ("lesson-missing", "error", "The course map names a lesson whose file is missing."),
     ("lesson-planned-file", "error", "A lesson that the map calls planned has a file."),
+    ("lesson-empty", "error", "A complete lesson has nothing to read in its file."),
     ("prerequisite-unknown", "error", "A prerequisite is not a lesson of the map."),
     ("prerequisite-cycle", "error", "Lessons require each other in a circle."),
     ("page-missing", "error", "The course map names a page whose file is missing."),

@@ -1,4 +1,4 @@
-"""A whole course checked: links, mentions, quizzes, labs and terms, against each other.
+"""A whole course checked: lessons, links, mentions, quizzes, labs and terms, against each other.
 
 Entry points: `check_course`; `check_document`, the same for one document.
 """
@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from coursebuild.checks.benches import bench_findings
 from coursebuild.checks.labs import lab_findings
+from coursebuild.checks.lessons import lesson_findings
 from coursebuild.checks.links import (
     Places,
     defined_terms,
@@ -24,7 +25,7 @@ from coursebuild.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
-    """Links, mentions, quizzes, labs and terms, checked against each other."""
+    """Lessons, links, mentions, quizzes, labs and terms, checked against each other."""
     scripts: dict[str, bool] = {}
     terms: dict[str, Span] = {}
     for document in course.documents:
@@ -39,6 +40,7 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
     found: list[Diagnostic] = []
     for document in course.documents:
         blocks = tuple(document_blocks(document))
+        found += lesson_findings(course, document, blocks)
         found += document_links(course, document, known, anchors_of)
         found += quiz_findings(blocks, scripts, quizzes)
         found += lab_findings(blocks, course)
@@ -56,6 +58,6 @@ def check_document(
     document has a quiz of the same id goes unseen.
     """
     blocks = tuple(document_blocks(document))
-    links = document_links(course, document, known)
+    whole = (*lesson_findings(course, document, blocks), *document_links(course, document, known))
     own = (*bench_findings(blocks, course), *term_findings(blocks, known.terms))
-    return (*links, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)
+    return (*whole, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)

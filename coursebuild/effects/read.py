@@ -9,6 +9,8 @@ Entry points: `find_root`, `read_course`, `read_bytes`.
 3. A file that cannot be had becomes a diagnostic. One that is not UTF-8 still becomes a source,
    with U+FFFD for what is wrong, so that its other mistakes are found in the same run; it is no
    longer what stands on the disk, so nothing can be written back over it by mistake.
+4. A file that is no text at all, such as a picture, or is in UTF-16, becomes a diagnostic and
+   nothing else: whatever was found in it would be noise.
 """
 
 from __future__ import annotations
@@ -28,6 +30,10 @@ from coursebuild.source import Source
 from coursebuild.values import dataclass
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks."""
+_STRAY = 0.1
+"""The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
 _OUTSIDE = "is reached through a link that leads out of the project"
 
 
@@ -47,7 +53,7 @@ class CourseFiles:
     files: tuple[str, ...]
     """Every regular file in `content/` and `models/`: what a relative link can lead to."""
     unreadable: tuple[str, ...]
-    """What is there and cannot be read."""
+    """What is there and cannot be read, or not as text."""
 
 
 def find_root(chosen: Path | None, start: Path) -> Path:
@@ -218,7 +224,7 @@ class _Reader:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
 
     def sources(self, paths: list[str], aside: Aside | None = None) -> tuple[Source, ...]:
-        """The files that can be read, decoded; those that are UTF-8 are put aside."""
+        """The files that hold text, decoded; those that are UTF-8 are put aside."""
         found = []
         for path in paths:
             if path in self.unreadable:
@@ -230,7 +236,8 @@ class _Reader:
             except EffectError as error:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
             else:
-                found.append(self._decode(path, data, aside))
+                source = self._decode(path, data, aside)
+                found += [] if source is None else [source]
         return tuple(found)
 
     def _plainly_read(self, path: str) -> bytes | None:
@@ -242,24 +249,32 @@ class _Reader:
         except OSError:  # told by who looks closer
             return None
 
-    def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source:
+    def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source | None:
+        """The text of a file; `None` where it holds none."""
+        is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _STRAY
+        wrong, why = -1 if is_text else data.find(b"\0"), "is not text"  # though it is UTF-8
         try:
             text = data.decode("utf-8")
-            if aside is None:
-                return Source(path, text)
-            return Source.away(path, aside.put(data).text, hashlib.sha256(data).digest())
         except UnicodeDecodeError as error:
-            source = Source(path, data.decode("utf-8", "replace"))
-            at = len(data[: error.start].decode("utf-8"))
+            text, wrong, why = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
+            is_text = is_text and b"\0" not in data
+        if wrong < 0 and aside is not None:
+            return Source.away(path, aside.put(data).text, hashlib.sha256(data).digest())
+        source = Source(path, text)
+        if wrong >= 0:
+            at = len(data[:wrong].decode("utf-8"))
             self.diagnostics.append(
                 diagnose(
                     "file-encoding",
                     source.span(at, at + 1),
-                    f"byte 0x{data[error.start]:02x} is not UTF-8",
+                    f"byte 0x{data[wrong]:02x} {why}",
                     help=f"save the file as UTF-8{_guess(data)}",
                 )
             )
+        if is_text:
             return source
+        self.unreadable.append(path)
+        return None
 
     def _refuse(self, path: str, why: str) -> None:
         shown = path if _is_text(path) else path.encode("utf-8", "backslashreplace").decode("utf-8")
@@ -290,8 +305,14 @@ def _is_text(path: str) -> bool:
 
 def _guess(data: bytes) -> str:
     """What the file may be instead."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if data.startswith(_UTF16) or _is_every_other_zero(data[:1024]):
         return "; it looks like UTF-16"
-    if b"\0" in data[:1024]:
+    if b"\0" in data:
         return "; it looks like a binary file"
     return "; it may be Latin-1 or Windows-1252"
+
+
+def _is_every_other_zero(data: bytes) -> bool:
+    """As in UTF-16 without a byte order mark, where the letters are Latin."""
+    fewer, more = sorted((data[::2].count(0), data[1::2].count(0)))
+    return fewer == 0 and more > len(data) // 4

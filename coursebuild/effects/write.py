@@ -1,12 +1,13 @@
 """Replacing a file of the course in one step, or not at all.
 
-Entry points: `write_atomic`, `remove_leftovers`.
+Entry points: `write_atomic`, `check_writable`, `remove_leftovers`.
 
 1. The new bytes go into a temporary file in the same folder, locked so that others see that its
    writer lives.
 2. They are brought to the disk, with the permissions and the owner of the file that they replace.
 3. If the file is still what the caller read, the temporary one takes its place by a rename.
 
+A rename would replace a read-only file as well; an author who made it so means it, and it stays.
 Killed at any instant, the file is whole, old or new; at most a temporary file stays, which the next
 run removes.
 """
@@ -36,15 +37,15 @@ def write_atomic(
         path: POSIX path relative to it.
         data: the new content.
         expected: what the file held when it was read; `None` when there was none.
-        durable: whether the bytes must survive a power cut from now on (an author's must; a derived
-            file can be made again).
+        durable: whether it is an author's file: its bytes must survive a power cut from now on, and
+            it stays as it is where it is read-only (a derived file can be made again).
 
     Raises:
         FileChangedError: the file holds something else by now; it stays as it is.
         OutsideProjectError: the path, or a link there, leads out of the project.
         EffectError: it cannot be written.
     """
-    target = resolve_inside(root, path)
+    target = check_writable(root, path) if durable else resolve_inside(root, path)
     temporary = ""  # its path, as long as it is to be removed
     try:
         if target.exists() and not target.is_file():
@@ -78,6 +79,23 @@ def resolve_inside(root: Path, path: str) -> Path:
     target = Path(os.path.realpath(root / path))
     if not target.is_relative_to(os.path.realpath(root)):
         raise OutsideProjectError(f"{path} leads out of the project")
+    return target
+
+
+def check_writable(root: Path, path: str) -> Path:
+    """Where a path of the course really leads, if an author lets the file there be replaced.
+
+    The owner's bit tells what was meant: root may write every file.
+
+    Raises:
+        OutsideProjectError: out of the project.
+        EffectError: the file is read-only.
+    """
+    target = resolve_inside(root, path)
+    with contextlib.suppress(OSError):  # told by who writes
+        if not target.stat().st_mode & stat.S_IWUSR:
+            help = "nothing was written to it; make it writable, and run the command again"
+            raise EffectError(f"{path} is read-only", help=help)
     return target
 
 

@@ -108,5 +108,6 @@ from coursebuild.model.walk import document_blocks as document_blocks
 from coursebuild.model.walk import document_has as document_has
 from coursebuild.model.walk import document_inlines as document_inlines
 from coursebuild.model.walk import document_scripts as document_scripts
+from coursebuild.model.walk import is_blank as is_blank
 from coursebuild.model.walk import walk_blocks as walk_blocks
 from coursebuild.model.walk import walk_inlines as walk_inlines

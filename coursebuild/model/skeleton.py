@@ -10,6 +10,7 @@ terms, pictures, raw HTML.
 2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
 3. Formulas are left out, but for those of recorded tables: that they parse is found out where the
    whole document is.
+4. Only where the document shows nothing does its skeleton: else a break stands for all the prose.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from coursebuild.model.blocks import (
 )
 from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInline, Term
 from coursebuild.model.interactive import Lab, OutputQuestion, Quiz
-from coursebuild.model.walk import block_inlines, document_blocks, walk_inlines
+from coursebuild.model.walk import block_inlines, document_blocks, is_blank, walk_inlines
 from coursebuild.source import Span
 from coursebuild.values import replace
 
@@ -56,6 +57,8 @@ def skeleton(document: Document) -> Document:
             recorded.add(id(block.body))
         if id(block) not in recorded:  # a recorded table stays in its recording
             kept += _bones(block)
+    if is_blank(kept) and not is_blank(document_blocks(document)):
+        kept.append(ThematicBreak(document.blocks[0].span))
     return Document(document.source, tuple(kept), ())
 
 

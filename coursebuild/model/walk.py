@@ -1,12 +1,12 @@
 """Walking a document: every block and every inline in order.
 
 Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_blocks` and
-`walk_inlines`.
+`walk_inlines`; `is_blank`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from coursebuild.model.blocks import (
@@ -15,6 +15,7 @@ from coursebuild.model.blocks import (
     Callout,
     Document,
     Heading,
+    HtmlBlock,
     HtmlFlow,
     Io,
     ListBlock,
@@ -32,6 +33,7 @@ from coursebuild.model.interactive import (
     OrderQuestion,
     Quiz,
 )
+from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
 from coursebuild.values import replace
 
@@ -39,6 +41,7 @@ _HOLDERS = frozenset((BlockQuote, Callout, ListBlock, Lab, Quiz, Recording))
 """Blocks that may have others in them."""
 _AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
 """Inlines that may have others in them."""
+_COMMENTS = pattern(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
 def child_blocks(block: Block) -> tuple[Block, ...]:
@@ -113,6 +116,15 @@ def document_blocks(document: Document) -> Iterator[Block]:
         for footnote in document.footnotes:
             known += walk_blocks(footnote.blocks)
     return iter(known)
+
+
+def is_blank(blocks: Iterable[Block]) -> bool:
+    """Whether all blocks of a document show nothing: comments, and paragraphs of odd blanks."""
+    return all(
+        (isinstance(block, Paragraph) and not block.children)
+        or (isinstance(block, HtmlBlock) and _COMMENTS.fullmatch(block.html) is not None)
+        for block in blocks
+    )
 
 
 _KINDS: dict[frozenset[type], frozenset[type]] = {}

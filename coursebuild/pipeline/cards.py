@@ -33,21 +33,24 @@ def with_card(root: Path, scene: Scene, report: SceneReport) -> SceneReport:
     """
     import mujoco
 
+    from coursebuild.physics.engine import silent
     from coursebuild.physics.scene import scenes
     from coursebuild.physics.touching import possible_pairs, touched_pairs
 
     source = scene.model.source
-    model = mujoco.MjModel.from_xml_path(
-        str(root / source.path), assets={str(root / source.path): source.text.encode()}
-    )
-    found = scenes(model, scene.declared)
+    with silent():  # what it warns of, it would write into the working directory
+        model = mujoco.MjModel.from_xml_path(
+            str(root / source.path), assets={str(root / source.path): source.text.encode()}
+        )
+        found = scenes(model, scene.declared)
+        touched = touched_pairs(model, found)
     files = (root / path for path in parts(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,
         geoms=int(model.ngeom),
         freedom=int(model.nv),
         possible=len(possible_pairs(model)),
-        touched=len(touched_pairs(model, found)),
+        touched=len(touched),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
         browser=_browser(root, scene, found[0].scenario.duration, found[0].scenario.keyframe),

@@ -165,7 +165,7 @@ class _Run:
             self.progress.started(scene.name)
             began = time.monotonic()
             try:
-                report = self._fixed(look) if fix else self._surveyed(look)[0]
+                report = self._looked(look, fix)
             except CannotError as error:
                 self.diagnostics.append(error.diagnostic)
                 self.progress.finished(scene.name, "not looked at", time.monotonic() - began)
@@ -179,6 +179,13 @@ class _Run:
                 self.options.store.keep(_KIND, key, msgspec.json.encode(report), local=True)
             self.progress.finished(scene.name, "looked at", time.monotonic() - began)
             return report
+
+    def _looked(self, look: DietModel, fix: bool) -> DietReport | None:
+        """What is found, and changed; `None` where it could not be written, which is told."""
+        from coursebuild.physics.engine import silent
+
+        with silent():  # what MuJoCo warns of, it would write into the working directory
+            return self._fixed(look) if fix else self._surveyed(look)[0]
 
     def _surveyed(self, look: DietModel) -> tuple[DietReport, Survey, ModelText]:
         tell = lambda text: self.progress.doing(look.scene.name, text)  # noqa: E731

@@ -2,8 +2,10 @@
 
 Entry points: `scenarios_of(root, scene)`, `measured(loaded, …)`.
 
-The clock is the processor time of this thread: it stands still while others run. Nothing is
-collected as garbage while it counts.
+1. The clock is the processor time of this thread: it stands still while others run. Nothing is
+   collected as garbage while it counts.
+2. MuJoCo's warnings are not printed: it would also write them into the working directory, which is
+   the author's.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import mujoco
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.measured.bench import ScenarioReport
 from coursebuild.physics.bench import measure_scenario
+from coursebuild.physics.engine import silent
 from coursebuild.physics.scene import Scene as PhysicsScene
 from coursebuild.physics.scene import SceneError, scenes
 from coursebuild.pipeline.scenes import Scene
@@ -39,15 +42,14 @@ def scenarios_of(root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnosti
     """Compile a scene, and work out its scenarios; or why they cannot be."""
     source = scene.model.source
     path = str(root / source.path)
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(_ignore)  # it would be written into the working directory
     try:
-        model = mujoco.MjModel.from_xml_path(path, assets={path: source.text.encode()})
-        found = scenes(model, scene.declared, quick=quick)
+        with silent():
+            model = mujoco.MjModel.from_xml_path(path, assets={path: source.text.encode()})
+            found = scenes(model, scene.declared, quick=quick)
     except SceneError as error:
         return _told(scene, error)
-    finally:
-        mujoco.set_mju_user_warning(before)
+    except mujoco.FatalError as error:
+        return _refused(scene, error)
     return Loaded(scene, model, found)
 
 
@@ -58,22 +60,21 @@ def measured(
     collecting = gc.isenabled()
     gc.disable()
     try:
-        return measure_scenario(
-            loaded.model,
-            loaded.scenarios[number],
-            quick=quick,
-            clock=time.thread_time_ns if timed else None,
-            said=tell,
-        )
+        with silent():
+            return measure_scenario(
+                loaded.model,
+                loaded.scenarios[number],
+                quick=quick,
+                clock=time.thread_time_ns if timed else None,
+                said=tell,
+            )
     except SceneError as error:
         return _told(loaded.scene, error)
+    except mujoco.FatalError as error:
+        return _refused(loaded.scene, error)
     finally:
         if collecting:
             gc.enable()
-
-
-def _ignore(_: str) -> None:
-    pass
 
 
 def _told(scene: Scene, error: SceneError) -> Diagnostic:
@@ -81,6 +82,12 @@ def _told(scene: Scene, error: SceneError) -> Diagnostic:
     if place is None:
         place = scene.model.source.span(0, 0) if scene.declared is None else _beside(scene)
     return diagnose("scenario-model", place, error.message, help=error.help)
+
+
+def _refused(scene: Scene, error: Exception) -> Diagnostic:
+    """Such as a model that asks for less memory than it needs."""
+    said = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
+    return diagnose("model-error", scene.model.source.span(0, 0), said)
 
 
 def _beside(scene: Scene) -> Any:

@@ -158,9 +158,7 @@ class TestText:
             (b"ab\xe9c", 1, 3, "byte 0xe9 is not UTF-8", "Latin-1"),
             ("é\r\n\U0001d4b3x".encode() + b"\xffz", 2, 3, "byte 0xff is not UTF-8", "Latin-1"),
             (b"a\rb\r\n\xc3", 3, 1, "byte 0xc3 is not UTF-8", "Latin-1"),
-            ("hi".encode("utf-16"), 1, 1, "byte 0xff is not UTF-8", "UTF-16"),
             (b"\xed\xa0\x80", 1, 1, "byte 0xed is not UTF-8", "Latin-1"),
-            (b"\x7fELF\x02\x00\x00\xff", 1, 8, "byte 0xff is not UTF-8", "binary"),
         ],
     )
     def test_bytes_that_are_not_utf8(
@@ -183,6 +181,39 @@ class TestText:
         # The rest of the file is there for other stages, and can never be written back as it is.
         (source,) = found.value.lessons
         assert source.text.encode() != data
+
+    @pytest.mark.parametrize(
+        ("data", "line", "column", "message", "help"),
+        [
+            ("hi".encode("utf-16"), 1, 1, "byte 0xff is not UTF-8", "UTF-16"),
+            ("\u4e00\u4e01".encode("utf-16"), 1, 1, "byte 0xff is not UTF-8", "UTF-16"),
+            ("## Hi \u2014 you".encode("utf-16-le"), 1, 2, "byte 0x00 is not text", "UTF-16"),
+            ("## Hi \u2014 you".encode("utf-16-be"), 1, 1, "byte 0x00 is not text", "UTF-16"),
+            (b"\x89PNG\r\n\x1a\n\0\0\0\x0d", 1, 1, "byte 0x89 is not UTF-8", "a binary file"),
+            (b"\x7fELF\x02\x00\x00\xff", 1, 8, "byte 0xff is not UTF-8", "a binary file"),
+            (b"## A\n\nx\0y\0\n", 3, 2, "byte 0x00 is not text", "a binary file"),
+            (bytes(4096), 1, 1, "byte 0x00 is not text", "a binary file"),
+            (b"x" * 5000 + b"\0\xff", 1, 5002, "byte 0xff is not UTF-8", "a binary file"),
+        ],
+    )
+    def test_what_is_no_text_is_read_no_further(
+        self,
+        course: Callable[[Tree], Path],
+        data: bytes,
+        line: int,
+        column: int,
+        message: str,
+        help: str,
+    ) -> None:
+        root = course({"content/lessons/1.1-a.md": data, "content/pages/b.md": data})
+        found = read_course(root)
+        assert [d.rule for d in found.diagnostics] == ["file-encoding"] * 2
+        diagnostic = found.diagnostics[0]
+        assert (diagnostic.span.line, diagnostic.span.column) == (line, column)
+        assert diagnostic.message == message
+        assert diagnostic.help == f"save the file as UTF-8; it looks like {help}"
+        assert (found.value.lessons, found.value.pages) == ((), ())
+        assert found.value.unreadable == ("content/lessons/1.1-a.md", "content/pages/b.md")
 
     def test_wrong_map_and_model_are_reported_too(self, course: Callable[[Tree], Path]) -> None:
         root = course({"content/course.toml": b"\xff", "models/m.xml": b"<a>\n \xfe</a>"})

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.effects import write
 from coursebuild.effects.errors import EffectError, FileChangedError, OutsideProjectError
-from coursebuild.effects.write import PREFIX, remove_leftovers, write_atomic
+from coursebuild.effects.write import PREFIX, check_writable, remove_leftovers, write_atomic
 
 
 def names(folder: Path) -> list[str]:
@@ -33,13 +33,35 @@ def test_makes_a_new_file(tmp_path: Path, durable: bool) -> None:
     assert names(tmp_path) == ["a.md", "b.md"]
 
 
-@pytest.mark.parametrize("mode", [0o600, 0o644, 0o755, 0o440, 0o664])
+@pytest.mark.parametrize("mode", [0o600, 0o644, 0o755, 0o640, 0o664])
 def test_permissions_stay(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "a.md"
     path.write_bytes(b"old")
     path.chmod(mode)
     write_atomic(tmp_path, "a.md", b"new", expected=b"old")
     assert stat.S_IMODE(path.stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("mode", [0o444, 0o555, 0o464, 0])
+def test_an_authors_read_only_file_is_left_alone(tmp_path: Path, mode: int) -> None:
+    """By root too, who may write it; a derived one can be made again."""
+    path = tmp_path / "a.md"
+    path.write_bytes(b"old")
+    (tmp_path / "link.md").symlink_to("a.md")
+    path.chmod(mode)
+    for name in ("a.md", "link.md"):
+        with pytest.raises(EffectError, match=f"^{name} is read-only$") as caught:
+            write_atomic(tmp_path, name, b"new", expected=b"old")
+        assert caught.value.help == (
+            "nothing was written to it; make it writable, and run the command again"
+        )
+        with pytest.raises(EffectError, match=f"^{name} is read-only$"):
+            check_writable(tmp_path, name)
+    assert names(tmp_path) == ["a.md", "link.md"]
+    path.chmod(mode | 0o400)
+    assert path.read_bytes() == b"old"
+    write_atomic(tmp_path, "a.md", b"new", expected=b"old", durable=False)
+    assert path.read_bytes() == b"new"
 
 
 def test_owner_stays(tmp_path: Path) -> None:

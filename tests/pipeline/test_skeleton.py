@@ -23,6 +23,7 @@ from coursebuild.model import (
     Quiz,
     Recording,
     Script,
+    ThematicBreak,
     document_blocks,
     document_has,
 )
@@ -129,4 +130,9 @@ def test_which_blocks_a_document_has(path: Path) -> None:
 
 def test_prose_is_not_in_a_skeleton() -> None:
     whole = document("content/a.md", "Only *prose*, `code` and $x$ here.\n\n- and\n- there\n")
-    assert list(document_blocks(skeleton(whole))) == []
+    assert list(document_blocks(skeleton(whole))) == [ThematicBreak(whole.blocks[0].span)]
+
+
+def test_of_nothing_to_read_there_is_no_skeleton() -> None:
+    for text in ("", "\ufeff\n", "[a]: b\n"):
+        assert list(document_blocks(skeleton(document("content/a.md", text)))) == []

@@ -68,13 +68,57 @@ def test_a_lesson_linked_from_outside_is_never_written(make: Make) -> None:
     assert "OLD" in outside.read_text()
 
 
-@pytest.mark.parametrize("mode", [0o600, 0o444, 0o755])
+@pytest.mark.parametrize("mode", [0o600, 0o644, 0o755])
 def test_permissions_stay(make: Make, mode: int) -> None:
     folder = make(GOOD.replace("hello 3.14159\n", "OLD\n"))
     (folder.root / folder.lesson()).chmod(mode)
     assert folder.main("update").status == 0
     assert folder.text(folder.lesson()) == GOOD
     assert stat.S_IMODE((folder.root / folder.lesson()).stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("mode", [0o444, 0o555, 0o464])
+def test_a_read_only_lesson_is_left_alone(make: Make, mode: int) -> None:
+    """By root too, who may write it."""
+    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
+    folder = make(stale, "## Two\n\n" + block("y.py", "print(2)", "OLD"))
+    path = folder.root / folder.lesson()
+    path.chmod(mode)
+    before = path.stat()
+    done = folder.main("update")
+    assert done.status == 1
+    assert (
+        f"""error[output-not-updatable]: {folder.lesson()} is read-only
+  --> {folder.lesson()}:10:1
+    |
+ 10 | OLD
+    | ^^^
+    = help: nothing was written to it; make it writable, and run the command again
+"""
+        in done.out
+    )
+    after = path.stat()
+    assert (after.st_ino, after.st_mode) == (before.st_ino, before.st_mode)
+    assert folder.text(folder.lesson()) == stale
+    assert "2\n```" in folder.text(folder.lesson(2))
+    assert f"updated {folder.lesson(2)}" in done.out
+    assert f"updated {folder.lesson()}" not in done.out
+
+
+def test_a_dry_run_says_that_a_lesson_is_read_only(make: Make) -> None:
+    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
+    folder = make(stale)
+    (folder.root / folder.lesson()).chmod(0o444)
+    done = folder.main("update", "--dry-run")
+    assert done.status == 1
+    assert f"error[output-not-updatable]: {folder.lesson()} is read-only" in done.out
+    assert "would update" not in done.out
+
+
+def test_a_read_only_lesson_that_is_right_is_no_mistake(make: Make) -> None:
+    folder = make(GOOD)
+    (folder.root / folder.lesson()).chmod(0o444)
+    assert folder.main("update").status == 0
 
 
 def _as_an_ordinary_user() -> None:

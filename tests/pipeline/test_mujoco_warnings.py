@@ -1,0 +1,88 @@
+"""What MuJoCo warns of, and what it gives up, while a model is measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from measurekit import TOML, write
+
+from coursebuild.cli import main
+
+SINGULAR = """\
+<mujoco>
+  <worldbody>
+    <body>
+      <joint axis="0 0 1"/>
+      <joint axis="0 0 1"/>
+      <geom size="0.1" pos="0.3 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+"""MuJoCo warns of its inertia when it is compiled, and in each `mj_forward`."""
+
+
+def test_the_model_is_one_of_which_mujoco_warns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import mujoco
+
+    monkeypatch.chdir(tmp_path)
+    mujoco.MjModel.from_xml_string(SINGULAR)
+    assert "close to singular" in (tmp_path / "MUJOCO_LOG.TXT").read_text()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("bench", "--quick"),
+        pytest.param(("bench", "--record"), marks=pytest.mark.slow),
+        ("diet", "--quick"),
+        ("diet", "--quick", "--fix"),
+    ],
+    ids=" ".join,
+)
+def test_no_log_is_left(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+) -> None:
+    write(tmp_path / "content" / "course.toml", "")
+    write(tmp_path / "models" / "box.xml", SINGULAR)
+    declared = TOML.replace("qvel = [1.0]", "qvel = [1.0, 0.0]")
+    write(tmp_path / "models" / "box.toml", declared)
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 0
+    out, err = capfd.readouterr()
+    assert "box" in out
+    assert "WARNING" not in out + err
+    assert not list(tmp_path.rglob("MUJOCO_LOG*"))
+
+
+CROWDED = f"""\
+<mujoco>
+  <size memory="10K"/>
+  <worldbody>
+    <geom type="plane" size="2 2 1"/>
+    {'<body pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>' * 9}
+  </worldbody>
+</mujoco>
+"""
+"""Its contacts need more memory than it asks for."""
+
+
+def test_a_model_that_mujoco_gives_up_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "content" / "course.toml", "")
+    write(tmp_path / "models" / "box.xml", CROWDED)
+    write(tmp_path / "models" / "box.toml", TOML.replace("qvel = [1.0]\n", ""))
+    assert main(["-C", str(tmp_path), "bench", "--quick"]) == 1
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith(
+        "error[model-error]: the model `box` cannot be measured: mj_stackAlloc: out of memory"
+    )
+    assert told[1] == "  --> models/box.xml:1:1"
+    assert not list(tmp_path.rglob("MUJOCO_LOG*"))
