@@ -13,6 +13,7 @@ usage. Heavy imports happen in the command that needs them.
 
 from __future__ import annotations
 
+import atexit
 import sys
 
 from coursebuild.cli.output import CLEAN, INTERRUPTED, say, write
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from coursebuild.cli.running import run
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
-    return run(given, alone=arguments is None)
+    return _end(run(given, alone=arguments is None), alone=arguments is None)
 
 
 def _end(status: int, *, alone: bool) -> int:
@@ -46,6 +47,7 @@ def _end(status: int, *, alone: bool) -> int:
     if alone:
         from coursebuild.effects.leaving import leave
 
+        atexit._run_exitfuncs()  # of others: what is left open is closed, as ever
         leave(status)
     return status
 

@@ -10,6 +10,7 @@ together with the source again, which whoever unpacks it has read anyway.
 from __future__ import annotations
 
 import copyreg
+import functools
 import hashlib
 import io
 import pickle
@@ -20,7 +21,7 @@ from typing import Any
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.tool import engine_digest, tool_digest
-from coursebuild.model import Document
+from coursebuild.model import DefinedTerm, Document, Lexicon
 from coursebuild.source import Source
 from coursebuild.values import dataclass, replace
 
@@ -71,7 +72,20 @@ def _source() -> Source:
     raise TypeError("a packed value is unpacked with its source")
 
 
-_LEFT_OUT = {**copyreg.dispatch_table, Source: lambda source: (_source, ())}
+def _lexicon(terms: tuple[DefinedTerm, ...], rows: bytes) -> Lexicon:
+    """A lexicon whose rows stay bytes until somebody asks for them."""
+    return Lexicon.away(terms, functools.partial(pickle.loads, rows))
+
+
+def _reduced(lexicon: Lexicon) -> tuple[Any, ...]:
+    return _lexicon, (lexicon.terms, pickle.dumps(lexicon.rows, pickle.HIGHEST_PROTOCOL))
+
+
+_LEFT_OUT = {
+    **copyreg.dispatch_table,
+    Source: lambda source: (_source, ()),
+    Lexicon: _reduced,
+}
 
 
 class _Packer(pickle.Pickler):
@@ -80,7 +94,7 @@ class _Packer(pickle.Pickler):
     dispatch_table = _LEFT_OUT
 
 
-_CLASSES: dict[tuple[str, str], type] = {}
+_MEANT: dict[tuple[str, str], Any] = {}
 """What names mean: to find out takes longer than to make a value of the class."""
 
 
@@ -93,15 +107,13 @@ class _Unpacker(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """What a name means; there is only one source."""
-        found = _CLASSES.get((module, name))
+        found = _MEANT.get((module, name))
         if found is not None:
             return found
         if name == _source.__name__ and module == __name__:
             source = self.source  # not through `self`, which holds all that it has unpacked
             return lambda: source
-        meant = super().find_class(module, name)
-        if isinstance(meant, type):
-            _CLASSES[module, name] = meant
+        meant = _MEANT[module, name] = super().find_class(module, name)
         return meant
 
 

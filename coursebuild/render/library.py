@@ -228,9 +228,11 @@ def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) 
 def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -> CrossReferences:
     """What the documents of a course say of each other."""
     return CrossReferences.of(
-        (owner, mentions_of(owner.document))
-        for owner in owners(course)
-        if owner.document is not None
+        lambda: (
+            (owner, mentions_of(owner.document))
+            for owner in owners(course)
+            if owner.document is not None
+        )
     )
 
 

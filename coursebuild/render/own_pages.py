@@ -34,7 +34,7 @@ def _listed(library: Library) -> Iterator[OwnPage]:
     yield OwnPage(urls.SEARCH, words("search.title"))
     if library.references.terms:
         yield OwnPage(urls.GLOSSARY, words("glossary.title"))
-    if library.references.symbols:
+    if library.references.has_symbols:
         yield OwnPage(urls.SYMBOLS, words("symbols.title"))
     if library.reports.cases:
         yield OwnPage(urls.NUMERICS, words("numerics.title"))

@@ -174,7 +174,7 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(urls.model_page_path(model.name), model.name, _MODEL)
     if library.references.terms:
         yield PageEntry(urls.GLOSSARY, "", _GLOSSARY)
-    if library.references.symbols:
+    if library.references.has_symbols:
         yield PageEntry(urls.SYMBOLS, "", _SYMBOLS)
     if library.reports.cases:
         yield PageEntry(urls.NUMERICS, "", _NUMERICS)

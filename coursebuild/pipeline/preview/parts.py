@@ -176,6 +176,7 @@ class Parts:
         pairs = zip(old, fresh, strict=True)
         if any(self._said(a, course) != self._said(b, course) for a, b in pairs):
             references = references_of(course, lambda document: self.mentions(document, course))
+            _ = references.symbols  # looked up now, where formulas can be typeset
         questions = library.asked
         if any(self._asks(one) != self._asks(two) for one, two in zip(old, fresh, strict=True)):
             now = {owner.path: self._asks(owner) for owner in fresh}

@@ -57,7 +57,7 @@ def glossary_sheet(library: Library) -> Sheet:
     values = {
         "home": place.href(urls.HOME),
         "letters": letters,
-        "symbols": place.href(urls.SYMBOLS) if library.references.symbols else "",
+        "symbols": place.href(urls.SYMBOLS) if library.references.has_symbols else "",
     }
     title, description = library.words("glossary.title"), library.words("glossary.description")
     return Sheet(place.path, "glossary", title, description, "glossary.html", values)

@@ -9,7 +9,7 @@ term is defined and used, which symbols there are and where.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from coursebuild.model import (
@@ -89,17 +89,38 @@ class CrossReferences:
     """Who links to a lesson, by its id, in the order of the course."""
     terms: Mapping[str, GlossaryTerm] = field(default_factory=dict)
     """By id; of two definitions the first."""
-    symbols: tuple[CourseSymbol, ...] = ()
-    """In the order in which they are first used."""
+    has_symbols: bool = False
+    _again: Callable[[], Iterable[tuple[Owner, Mentions]]] = field(
+        default=tuple, repr=False, compare=False
+    )
+    """Gives the documents again."""
+    _symbols: list[CourseSymbol] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """Those of the course, once they were asked for."""
+
+    @property
+    def symbols(self) -> tuple[CourseSymbol, ...]:
+        """In the order in which they are first used.
+
+        They are many, and only the page that lists them needs them.
+        """
+        if self.has_symbols and not self._symbols:
+            rows: dict[str, _Row] = {}
+            for owner, said in self._again():
+                if isinstance(owner, Lesson):
+                    _note_symbols(rows, owner, said.lexicon)
+            self._symbols[:] = [row.made(symbol) for symbol, row in rows.items()]
+        return tuple(self._symbols)
 
     @classmethod
-    def of(cls, documents: Iterable[tuple[Owner, Mentions]]) -> CrossReferences:
-        """All of it, from lessons and pages in the order of the course."""
+    def of(cls, documents: Callable[[], Iterable[tuple[Owner, Mentions]]]) -> CrossReferences:
+        """All of it, from what gives lessons and pages in the order of the course."""
         referrers: dict[str, list[Owner]] = {}
         users: dict[str, list[Owner]] = {}
         defined: dict[str, tuple[DefinedTerm, Owner]] = {}
-        rows: dict[str, _Row] = {}
-        for owner, said in documents:
+        has_symbols = False
+        for owner, said in documents():
             for id in said.lessons:
                 if not (isinstance(owner, Lesson) and owner.id == id):
                     referrers.setdefault(id, []).append(owner)
@@ -107,14 +128,14 @@ class CrossReferences:
                 users.setdefault(id, []).append(owner)
             for term in said.lexicon.terms:
                 defined.setdefault(term.id, (term, owner))
-            if isinstance(owner, Lesson):
-                _note_symbols(rows, owner, said.lexicon)
+            if not has_symbols and isinstance(owner, Lesson):
+                has_symbols = bool(said.lexicon.symbols)
         terms = {
             id: GlossaryTerm(term, owner, tuple(o for o in users.get(id, ()) if o is not owner))
             for id, (term, owner) in defined.items()
         }
-        symbols = tuple(row.made(symbol) for symbol, row in rows.items())
-        return cls({id: tuple(found) for id, found in referrers.items()}, terms, symbols)
+        referred = {id: tuple(found) for id, found in referrers.items()}
+        return cls(referred, terms, has_symbols, documents)
 
 
 @dataclass(slots=True)
@@ -132,10 +153,11 @@ class _Row:
 
 
 def _note_symbols(rows: dict[str, _Row], owner: Owner, lexicon: Lexicon) -> None:
-    for use in lexicon.symbols:
+    symbols, sections, _ = lexicon.rows
+    for use in symbols:
         row = rows.get(use.symbol)
         if row is None:
-            section = lexicon.sections[use.section] if use.section >= 0 else ("", "")
+            section = sections[use.section] if use.section >= 0 else ("", "")
             row = rows[use.symbol] = _Row(section)
         row.owners.append(owner)
         if use.meaning:
