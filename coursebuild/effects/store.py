@@ -164,13 +164,6 @@ class Store:
                 (self.folder / kind / key / name).unlink()
         return [f"{key}/{name}" for _, name in found[:newest]]
 
-    def group_changed(self, kind: str, key: str) -> int:
-        """When a group last got or lost a result, in ns since 1970; 0 where there is none."""
-        try:
-            return os.stat(f"{self.folder}/{kind}/{key}").st_mtime_ns  # noqa: PTH116
-        except OSError:
-            return 0
-
     def shared_group(self, kind: str, key: str) -> list[str]:
         """The keys of a group that the shared cache has."""
         if self.shared is None or self.fresh:

@@ -12,7 +12,7 @@ from coursebuild.diagnostics import Diagnostic, Edit, Severity
 from coursebuild.effects.examples import Obstacle
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.read import read_bytes
-from coursebuild.effects.write import write_atomic
+from coursebuild.effects.write import check_writable, write_atomic
 from coursebuild.model import Course
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
@@ -85,6 +85,8 @@ def _adopt(
         else:
             refused.append(made)
     remarks: list[str] = []
+    for source in edits:  # all or none
+        check_writable(options.root, source.path)
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
         if new != source.text:
@@ -102,4 +104,6 @@ def _settle(options: Options, course: Course, read: Mapping[str, bytes]) -> None
     for extraction in extract_course(course).value:
         data = read.get(extraction.path, extraction.data)
         if data != extraction.data and block_text(data) == extraction.text:
-            write_atomic(options.root, extraction.path, extraction.data, expected=data)
+            write_atomic(
+                options.root, extraction.path, extraction.data, expected=data, durable=False
+            )

@@ -25,8 +25,6 @@ from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.installed import Installed
 from coursebuild.effects.store import Store
 from coursebuild.effects.surroundings import Place
-from coursebuild.pipeline.groups import groups
-from coursebuild.pipeline.recalled import Recalled
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.scripts.dependencies import (
     Dependency,
@@ -48,8 +46,6 @@ from coursebuild.scripts.remembered import REMEMBERED, Record, from_bytes, to_by
 from coursebuild.values import dataclass
 
 _RESULTS, _LAST = "scripts", "last"
-_MANY = 8
-"""Scripts whose results are kept together as well."""
 _MOST_SHARED = 32
 """Results of one group that are fetched from the shared cache."""
 _FETCHERS = 16
@@ -153,39 +149,24 @@ class Memory:
             return {}
         found: dict[str, ScriptRun] = {}
         missing: list[Inputs] = []
-        for some in groups(wanted, lambda inputs: inputs.path):
-            together = Recalled(self.store, _RESULTS, some) if len(wanted) >= _MANY else None
-            for inputs in some:
-                record = self._together(inputs, together) or self.remembered(inputs, together)
-                if record is None:
-                    missing.append(inputs)
-                else:
-                    found[inputs.path] = record.run(self.states.places)
-            if together is not None:
-                together.save()
+        for inputs in wanted:
+            record = self.remembered(inputs)
+            if record is None:
+                missing.append(inputs)
+            else:
+                found[inputs.path] = record.run(self.states.places)
         for record in self._fetch(missing):
             found[record.inputs.path] = record.run(self.states.places)
         self.states.save()
         return found
 
-    def _together(self, inputs: Inputs, together: Recalled | None) -> Record | None:
-        """The result that was recalled with others, if it still holds."""
-        record = None if together is None else together.get(inputs.path)
-        if record is None or not _fits(record, inputs) or not self._holds(record):
-            return None
-        return record
-
-    def remembered(self, inputs: Inputs, together: Recalled | None = None) -> Record | None:
-        """The result kept on this machine that holds now; `together` is told of it."""
+    def remembered(self, inputs: Inputs) -> Record | None:
+        """The result kept on this machine that holds now."""
         group = group_key(inputs)
-        changed = self.store.group_changed(_RESULTS, group)
         for key in self.store.group(_RESULTS, group):
-            data = self.store.peek(_RESULTS, key, packed=False)
-            record = self._read(data, inputs)
-            if data is not None and record is not None and self._holds(record):
+            record = self._read(self.store.peek(_RESULTS, key, packed=False), inputs)
+            if record is not None and self._holds(record):
                 self._note(record, key)
-                if together is not None:
-                    together.add(group, changed, data, record)
                 return record
         return None
 
@@ -287,7 +268,13 @@ class Memory:
         if data is None:
             return None
         record = from_bytes(data)
-        return record if record is not None and _fits(record, inputs) else None
+        fits = (
+            record is not None
+            and record.inputs == inputs
+            and not record.forgotten
+            and record.outcome in REMEMBERED
+        )
+        return record if fits else None
 
     def _fetch(self, wanted: Sequence[Inputs]) -> list[Record]:
         """Results that hold from the shared cache."""
@@ -363,11 +350,6 @@ def longest_first(
 def _watched(trace: Trace) -> tuple[tuple[Divergence, ...], bool, tuple[str, ...]]:
     """What of a trace is no dependency."""
     return trace.divergences, trace.moved, trace.states
-
-
-def _fits(record: Record, inputs: Inputs) -> bool:
-    """Whether it is a result that may be used for these inputs."""
-    return record.inputs == inputs and not record.forgotten and record.outcome in REMEMBERED
 
 
 def _last_key(path: str) -> str:

@@ -62,8 +62,8 @@ class Bearings:
         """Each once: many bindings hold by the same."""
 
     def __len__(self) -> int:
-        """How many are remembered."""
-        return max(len(self._by), len(self._last))
+        """How much is remembered: bindings, and lines."""
+        return len(self._by) + sum(map(len, self._lines))
 
     def clear(self) -> None:
         """Forget all of them."""

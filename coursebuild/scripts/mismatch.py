@@ -57,7 +57,7 @@ def mismatch(
     windows = shown.windows(lines)
     if windows:
         found = succession(shown, before, now) if before else Succession((), ())
-        said = _by_place(shown, binding.text, found, windows) or _by_likeness(
+        said = _by_place(shown, binding.text, found, windows, lines) or _by_likeness(
             shown, binding.text, windows
         )
     elif len(shown.numbers) > 1 and any(line.numbers for line in lines):
@@ -75,7 +75,11 @@ def mismatch(
 
 
 def _by_place(
-    shown: Shown, text: str, found: Succession, windows: Sequence[Window]
+    shown: Shown,
+    text: str,
+    found: Succession,
+    windows: Sequence[Window],
+    lines: Sequence[PrintedLine],
 ) -> _Proposal | None:
     """What is printed where the numbers were; `None` where nobody knows where that was."""
     if not found.before:
@@ -91,6 +95,8 @@ def _by_place(
         places = f"it was printed in {len(now)} places"
         return _Proposal(f"{places}, where now {_listed(different)} are printed", _YOURS)
     (better,) = written
+    if better and not Shown.of(better).is_in(lines):  # its words or its unit stand beside others
+        better = ""
     are, were = ("are", "were") if len(shown.numbers) > 1 else ("is", "was")
     label = f"{different[0]} {are} printed where {was} {were}"
     return _Proposal(label, f"write `{better}`" if better else "", better)

@@ -59,6 +59,9 @@ class Meant:
     def rewritten(self, shown: Shown, text: str) -> str:
         """The binding's text with these numbers in it; empty where digits would be lost."""
         better = shown.rewritten(text, self.window) or ""
+        new = Shown.of(better).numbers if better else ()
+        if any(p.value and not n.value for n, p in zip(new, self.window.numbers, strict=False)):
+            return ""
         if self.likeness is Likeness.POWER and better:
             pairs = zip(Shown.of(better).numbers, shown.numbers, strict=True)
             if any(_digits(new) < _digits(old) for new, old in pairs):

@@ -5,10 +5,11 @@ Entry point: `succession`.
 1. A line is known by its text without its numbers, and by the heading that it stands under: the
    last line above it that has words and no number. Lines of which there are several alike are told
    apart by any line above them that there is only once. What is so known before and now is the same
-   line, wherever it stands; one under a heading that is new is so too, unless its own is gone.
+   line, wherever it stands; one that stood under none may have got one that is new.
 2. Lines that are alike even so, such as the rows of a table, are the same in their order, if there
-   are as many as before and no number of theirs has moved to another one: then rows may have come
-   and gone, and what is printed in place of one is not certain.
+   are as many as before and what each has kept, such as a label, tells it from the others. Lines of
+   a single number are so, if none of the numbers stands in another line now. Else lines may have
+   come and gone, and what is printed in place of one is not certain.
 3. Inside a line numbers are counted.
 """
 
@@ -23,9 +24,6 @@ from coursebuild.scripts.lines import canonical
 from coursebuild.scripts.printed import PrintedLine
 from coursebuild.scripts.shown import Shown, Window
 from coursebuild.values import dataclass
-
-_MOST_ALIKE = 1000
-"""Lines that are alike of which it is looked whether their numbers have moved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +70,11 @@ _Pairs = list[tuple[_Known, _Known]]
 @functools.lru_cache(maxsize=16)
 def _same_lines(before: tuple[str, ...], now: tuple[str, ...]) -> Mapping[int, int]:
     """The line that each line of before is now, where that is certain: indices."""
-    (old, earlier), (new, headings) = _known(before), _known(now)
+    (old, earlier), (new, _) = _known(before), _known(now)
     groups = list(_groups(old, new, lambda line: (line.heading, line.skeleton)))
     left = {line.index for group in groups for line, _ in group}
     taken = {line.index for group in groups for _, line in group}
-    old = [line for line in old if line.index not in left and line.heading in headings]
+    old = [line for line in old if line.index not in left and not line.heading]
     new = [line for line in new if line.index not in taken and line.heading not in earlier]
     groups += filter(_together, _groups(old, new, lambda line: line.skeleton))
     # Of lines that belong together, such as a step and its error below it, all have moved.
@@ -130,20 +128,17 @@ def _together(group: _Pairs) -> bool:
 
 
 def _moved(group: _Pairs) -> bool:
-    """Whether a line has more numbers in common with another one of the group than with its own."""
-    if len(group) > _MOST_ALIKE:
+    """Whether lines may have come, gone or changed places."""
+    if len(group) == 1:
+        return False
+    ones, others = (
+        zip(*(line.values for line in side), strict=True) for side in zip(*group, strict=True)
+    )
+    columns = list(zip(ones, others, strict=True))
+    kept = [old for old, new in columns if old == new]
+    changed = [(old, new) for old, new in columns if old != new]
+    if any(Counter(old) == Counter(new) for old, new in changed):
         return True
-    ones, others = zip(*group, strict=True)
-    return _drawn_away(ones, others) or _drawn_away(others, ones)
-
-
-def _drawn_away(lines: Sequence[_Known], others: Sequence[_Known]) -> bool:
-    where: dict[tuple[int, Decimal], list[int]] = {}
-    for index, other in enumerate(others):
-        for place in enumerate(other.values):
-            where.setdefault(place, []).append(index)
-    for index, line in enumerate(lines):
-        common = Counter(i for place in enumerate(line.values) for i in where.get(place, ()))
-        if common and max(common.values()) > common[index]:
-            return True
-    return False
+    if len(set(zip(*kept, strict=True))) == len(group):
+        return False
+    return len(columns) > 1 or any(not set(old).isdisjoint(new) for old, new in changed)

@@ -102,6 +102,11 @@ binding-mismatch at 12:2 `2.0`
         ("3.9 × 10⁻¹¹", "a 3.9e-11 b 5", "a 4.9e-11 b 5", "4.9e-11 is printed where 3.9e-11", ""),
         ("6.64 %", "a 6.641\nb 2", "a 0.06641\nb 2", "0.06641 is printed where 6.641 was", ""),
         ("2.5", "a 2.5\nb 3", "a nan\nb 3", "nan is printed where 2.5 was", ""),
+        ("2.01", "a 2.00613", "a 0.00314", "0.00314 is printed where 2.00613 was", ""),
+        ("12", "a 12", "a 0.2", "0.2 is printed where 12 was", ""),
+        ("12", "a 12", "a 0", "0 is printed where 12 was", "0"),
+        # with its unit it would be another one
+        ("2.5 J", "a 2.5\nb 3", "a 3.5\nb 4 J", "3.5 is printed where 2.5 was", ""),
         # two places that are one number
         ("2.5", "a 2.5 2.50", "a 3.5 3.50", "3.5 is printed where 2.5 was", "3.5"),
         # the unit chooses the place
@@ -132,13 +137,20 @@ def test_the_number_in_the_same_place_is_proposed(
         ("Euler:\nerr 2.5\nRK4:\nerr 1", "Midpoint:\nerr 7.5\nRK4:\nerr 1", None),
         ("Euler:\nerr 2.5", "Midpoint:\nerr 7.5", None),
         ("err 2.5", "Midpoint:\nerr 7.5", "7.5"),
-        ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", "7.5"),
+        ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", None),
+        ("Euler\nerr 2.5", "Euler\nblew up\nRK4\nerr 7.5", None),
+        ("Euler\nerr 2.5", "Euler\nRK4\nerr 7.5", None),
         ("Euler:\nerr 2.5\nRK4:\nE 1", "Euler:\nE 1\nRK4:\nerr 7.5", None),
         # rows
         ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.1 7.5\n0.2 9", "7.5"),
         ("dt err\n0.1 2.5\n0.2 9", "Errors\ndt err\n0.1 7.5\n0.2 8", "7.5"),
         ("1.5\n2.5\n3.5", "1.6\n2.6\n3.6", "2.6"),
+        ("n err\n0 10 3.5\n0 20 2.5", "n err\n0 10 8\n0 20 7.5", "7.5"),
         # as many rows, but not the same
+        ("n err\n10 3.5\n20 2.5\n40 4.5", "n err\n10 3.1\n30 2.1\n40 4.1", None),
+        ("n err\n10 3.5\n20 2.5", "n err\n30 0.35\n40 0.25", None),
+        ("1 0 2.5\n2 1 9", "2 0 8\n1 1 7.5", None),
+        ("1.5\n2.5\n3.5", "2.6\n1.5\n3.5", None),
         ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5", None),
         ("dt err\n0.1 9\n0.2 2.5", "dt err\n0.2 7.5\n0.3 2.4", None),
         ("dt 0.1\nerr 2.5\ndt 0.2\nerr 9", "dt 0.05\nerr 2.4\ndt 0.1\nerr 7.5", None),

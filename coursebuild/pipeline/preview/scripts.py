@@ -26,8 +26,8 @@ from coursebuild.scripts.held import Bearings
 
 _BATCH = 16
 """Scripts whose results are waited for before they are shown."""
-_HELD = 100_000
-"""Bindings that hold of which that is remembered."""
+_HELD = 500_000
+"""Bindings that held, and lines by which they did, that are remembered: some 50 MB at most."""
 
 
 class SupersededError(Exception):
