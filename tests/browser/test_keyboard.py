@@ -37,6 +37,13 @@ WHERE = """() => {
   }
 }"""
 """Where the focus is; `null` where it has left the page."""
+COME = """(() => {
+  const at = document.activeElement
+  if (!at || at === document.body || at === document.documentElement) return true
+  const { top, bottom } = at.getBoundingClientRect()
+  return bottom > 0 && top < innerHeight
+})()"""
+"""Whether the page has moved to the focus: parts above it that are drawn late push it away."""
 
 
 @pytest.fixture
@@ -73,6 +80,7 @@ def test_every_stop_is_seen_and_none_is_a_trap(
     looked: set[str] = set()
     for _ in range(MOST):
         page.keyboard.press("Tab")
+        until(page, COME)
         stop = page.evaluate(WHERE)
         if stop is None:
             break
