@@ -46,7 +46,11 @@ def arguments_of() -> argparse.Namespace:
     parser.add_argument("--work", type=Path, help="a folder for the courses; default: a new one")
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument("--docs", action="store_true", help=f"put the tables into {DOCS.name}")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    for part in arguments.parts.split(","):
+        if part not in PARTS:
+            parser.error(f"there is no part `{part}`: name some of {', '.join(PARTS)}")
+    return arguments
 
 
 def say(text: str) -> None:
@@ -75,8 +79,13 @@ def main() -> None:
 
 def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
     """All that was asked for, as text."""
-    wanted = arguments.tools.split(",") if arguments.tools else None
-    tools = [t for t in all_tools(places) if wanted is None or t.key in wanted]
+    every = all_tools(places)
+    keys = {tool.key for tool in every}
+    wanted = set(arguments.tools.split(",")) if arguments.tools else keys
+    if wanted - keys:
+        unknown, known = ", ".join(sorted(wanted - keys)), ", ".join(sorted(keys))
+        raise CommandError(f"no tool is called {unknown}: there are {known}")
+    tools = [tool for tool in every if tool.key in wanted]
     report = describe(tools, jcache_version(places))
     if any(tool.key == BASE and tool.version is None for tool in tools):
         raise CommandError(f"{sys.executable} cannot run coursebuild")
