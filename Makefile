@@ -39,6 +39,7 @@ site: $(VENV)/.site
 serve: $(VENV)/.site
 	$(BIN)/coursebuild serve
 
+# What fails is run once more, and printed in full even where it passes then: see tests/conftest.py.
 test: $(VENV)/.dev npm system
 	@PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" \
 	  $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --reruns 1 $(PYTEST_ARGS)
