@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
-
-sys.path.insert(0, str(Path(__file__).parent))  # for what tests share
 
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
 # whoever works on the code meets new ones with every run.

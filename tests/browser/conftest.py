@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))  # for the kit
-
-import quizpage
-from chromium import launch
-from coursekit import Folder
-from hostkit import Host
-from labcourse import LESSON, PENDULUM, TWIN, ZOO
-from plainhost import served
-from readercourse import FILES
-from standardkit import Site, build_both, shared_folder
+from support import quiz_page
+from support.built_sites import Site, build_both, shared_folder
+from support.chromium import launch
+from support.folder_server import served
+from support.lab_course import LESSON, PENDULUM, TWIN, ZOO
+from support.reader_course import FILES
+from support.scratch_course import Folder
+from support.static_host import Host
 
 DRAWING = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
@@ -81,7 +77,7 @@ def sites(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[di
 def quiz_files(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
     """A site with every kind of question."""
     folder = Folder(tmp_path_factory.mktemp("quizzes") / "course")
-    folder.fill([quizpage.LESSON], stores)
+    folder.fill([quiz_page.LESSON], stores)
     folder.write("models/pendulum.xml", PENDULUM)
     done = folder.main("build")
     assert done.status == 0, done.out + done.err

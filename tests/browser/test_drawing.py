@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coursekit import Folder
-from labpage import lab, watched
-from plainhost import served
 from playwright.sync_api import Browser, Page
+
+from support.folder_server import served
+from support.lab_page import lab, watched
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.browser
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from labpage import until
 from playwright.sync_api import Browser, Page
-from standardkit import Site
+
+from support.built_sites import Site
+from support.lab_page import until
 
 pytestmark = pytest.mark.browser
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from coursekit import Folder
-from labcourse import PAGE
-from labpage import (
+from playwright.sync_api import Browser, BrowserContext, Page, Route
+
+from support.lab_course import PAGE
+from support.lab_page import (
     ALL,
     AUTO,
     MOUNT,
@@ -32,7 +33,7 @@ from labpage import (
     until,
     watched,
 )
-from playwright.sync_api import Browser, BrowserContext, Page, Route
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.browser
 

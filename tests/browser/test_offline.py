@@ -9,15 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
-from hostkit import Host
-from labcourse import PAGE
-from labpage import lab, until, watched
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from coursebuild.effects.resources import bundled_files
 from coursebuild.effects.server import PreviewServer
 from coursebuild.render.assets import page_script
+from support.lab_course import PAGE
+from support.lab_page import lab, until, watched
+from support.scratch_course import Folder
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
-from hostkit import Host
 from playwright.sync_api import Browser, Page
 from pypdf import PdfReader
-from readingcourse import LONG, NASTY, URL, build
-from standardkit import Site
+
+from support.built_sites import Site
+from support.reading_courses import LONG, NASTY, URL, build
+from support.scratch_course import Folder
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 

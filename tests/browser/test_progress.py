@@ -6,9 +6,10 @@ import time
 from pathlib import Path
 
 import pytest
-from labpage import comes, until
 from playwright.sync_api import BrowserContext, Route
-from readerpage import (
+
+from support.lab_page import comes, until
+from support.reader_page import (
     KEY,
     PUSH_PAGE,
     SAID,

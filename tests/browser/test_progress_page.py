@@ -6,9 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from labpage import comes
 from playwright.sync_api import Browser, BrowserContext, Page
-from readerpage import (
+
+from support.lab_page import comes
+from support.reader_page import (
     FALL_PAGE,
     KEY,
     PUSH_PAGE,

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import Folder
-from labcourse import PENDULUM
-from labpage import until, watched
 from playwright.sync_api import Browser, BrowserContext, Page, expect
-from quizpage import (
+
+from support.lab_course import PENDULUM
+from support.lab_page import until, watched
+from support.preview_process import serving
+from support.quiz_page import (
     ANGLE,
     KEY,
     LESSON,
@@ -35,7 +36,7 @@ from quizpage import (
     verdict,
     visit,
 )
-from servekit import serving
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.browser
 

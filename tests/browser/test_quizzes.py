@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from labpage import until
 from playwright.sync_api import BrowserContext, Page, expect
-from quizpage import (
+
+from support.lab_page import until
+from support.quiz_page import (
     ANGLE,
     MCQ,
     NUMBER,

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import Folder
-from hostkit import Host
-from labpage import until
 from playwright.sync_api import Browser, Page
-from readingcourse import ARABIC, LONG, NASTY, build
-from standardkit import Site
+
+from support.built_sites import Site
+from support.lab_page import until
+from support.reading_courses import ARABIC, LONG, NASTY, build
+from support.scratch_course import Folder
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 

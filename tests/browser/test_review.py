@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from coursekit import Folder
-from labpage import comes, until
 from playwright.sync_api import BrowserContext
-from readercourse import PUSH
-from readerpage import (
+
+from support.lab_page import comes, until
+from support.reader_course import PUSH
+from support.reader_page import (
     FALL_PAGE,
     PUSH_PAGE,
     SAID,
@@ -16,6 +16,7 @@ from readerpage import (
     question,
     quiet,
 )
+from support.scratch_course import Folder
 
 
 def test_missed_questions_come_back(calm: BrowserContext, site: str) -> None:

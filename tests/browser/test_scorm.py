@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import GOOD, ROOT, Folder
-from plainhost import served
 from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page
+
+from support.folder_server import served
+from support.scratch_course import GOOD, ROOT, Folder
 
 pytestmark = pytest.mark.browser
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import Folder, block
-from labpage import until, watched
-from plainhost import served
 from playwright.sync_api import Browser, BrowserContext, Page
+
+from support.folder_server import served
+from support.lab_page import until, watched
+from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.browser
 

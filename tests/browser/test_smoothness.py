@@ -9,9 +9,10 @@ the best one counts: a page that is too busy is so in all of them.
 from __future__ import annotations
 
 import pytest
-from labcourse import PAGE
-from labpage import SWING, lab, reach, watched
 from playwright.sync_api import BrowserContext, CDPSession, Page
+
+from support.lab_course import PAGE
+from support.lab_page import SWING, lab, reach, watched
 
 pytestmark = pytest.mark.browser
 

@@ -11,9 +11,10 @@ from typing import Any
 from urllib.parse import urljoin, urlsplit
 
 import pytest
-from labpage import until, watched
 from playwright.sync_api import Browser, Page
-from standardkit import Site
+
+from support.built_sites import Site
+from support.lab_page import until, watched
 
 pytestmark = pytest.mark.browser
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from labcourse import PAGE
-from labpage import MOUNT, SWING, comes, until, watched
 from playwright.sync_api import Browser, CDPSession, Page
+
+from support.lab_course import PAGE
+from support.lab_page import MOUNT, SWING, comes, until, watched
 
 pytestmark = pytest.mark.browser
 

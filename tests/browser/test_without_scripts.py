@@ -11,7 +11,6 @@ from html import unescape
 
 import pytest
 from playwright.sync_api import Browser, Page
-from standardkit import Site
 
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.model import (
@@ -46,6 +45,7 @@ from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
 from coursebuild.syntax.document import parse_document
 from coursebuild.vocabulary import CALLOUTS
+from support.built_sites import Site
 
 pytestmark = pytest.mark.browser
 NAMES = ("real", "full")

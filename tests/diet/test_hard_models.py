@@ -8,12 +8,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from dietkit import PATH, fixed, found, names, opened, tried
 
 from coursebuild.measured.diet import IDENTICAL
 from coursebuild.physics.diet.markup import MarkupError
 from coursebuild.physics.diet.model_text import ModelTextError
 from coursebuild.physics.diet.survey import Survey
+from support.surveys import PATH, fixed, found, names, opened, tried
 
 
 def motion(model: mujoco.MjModel, joints: list[str], steps: int = 150) -> bytes:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import pytest
-from dietkit import PATH, PENDULUM, fixed, found, names, opened, scene, tried
 
 from coursebuild.measured.diet import EQUAL, IDENTICAL, UNTOUCHED
+from support.surveys import PATH, PENDULUM, fixed, found, names, opened, scene, tried
 
 # ------------------------------------------------------------------------------ what takes part
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import mujoco
 import pytest
-from dietkit import PATH, PENDULUM, fixed, found, names, opened, scene, tried
 
 from coursebuild.measured.diet import IDENTICAL
 from coursebuild.physics.detector import Status
+from support.surveys import PATH, PENDULUM, fixed, found, names, opened, scene, tried
 
 
 def test_a_model_without_anything_in_vain() -> None:

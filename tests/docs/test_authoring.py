@@ -20,12 +20,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from markdown_files import DOCS, Fence, code_spans, fences, write_files
 
 from coursebuild.cli import main
 from coursebuild.rules import RULES
 from coursebuild.syntax.schemas import SchemaName, json_schema
 from coursebuild.vocabulary import CALLOUTS
+from support.markdown_files import DOCS, Fence, code_spans, fences, write_files
 
 GUIDE = DOCS / "authoring.md"
 FENCES = fences(GUIDE)

@@ -11,10 +11,10 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from markdown_files import DOCS, ROOT, code_spans, fences, links, write_files
 
 from coursebuild.cli import main
 from coursebuild.pipeline.load import load
+from support.markdown_files import DOCS, ROOT, code_spans, fences, links, write_files
 
 README = ROOT / "README.md"
 FENCES = fences(README)

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from runnerkit import Run, job, run_scripts, way
-
 from coursebuild.results import ScriptRun
+from support.runners import Run, job, run_scripts, way
 
 NOBODY = 65534
 

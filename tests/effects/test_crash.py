@@ -1,4 +1,4 @@
-"""Killing the tool at every point of a build, an extraction and an update; see `crash.py`."""
+"""Killing the tool at every point of a build, an extraction and an update."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def names(folder: Path) -> list[str]:
 )
 def test_killed_at_every_call(tmp_path: Path, scenario: str, at_least: int) -> None:
     done = subprocess.run(
-        [sys.executable, Path(__file__).with_name("crash.py"), scenario, tmp_path],
+        [sys.executable, ROOT / "tests/support/killed_writers.py", scenario, tmp_path],
         capture_output=True,
         text=True,
         env=ENVIRONMENT,

@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from probe_scripts import FAILURES, PROBES
-from runnerkit import gone
 
 from coursebuild.effects import workers
 from coursebuild.effects.runner import (
@@ -27,6 +25,8 @@ from coursebuild.effects.runner import (
 )
 from coursebuild.effects.surroundings import library_folder, wanted_packages
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
+from support.probe_scripts import FAILURES, PROBES
+from support.runners import gone
 
 WARM = str(workers._WARM)
 ARGUMENTS = ("a b", "", "*", "é", "--flag=1", "\udc80")

@@ -14,14 +14,12 @@ from typing import Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "labs"))
-from labkit import BALL, Bench, make_lab, request
-
 from coursebuild.effects import lab_engine, lab_files
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_files import engine_digest
 from coursebuild.effects.v8_library import StoppedError
 from coursebuild.effects.versions import engine_version
+from support.lab_values import BALL, Bench, make_lab, request
 
 LOOP = "for (;;) ;"
 SLIDER = {"label": "a", "min": 0, "max": 1, "value": 0}
@@ -210,9 +208,9 @@ def test_stopped_before_it_began(bench: Bench) -> None:
 
 def test_an_interrupt_ends_a_trial_and_the_process() -> None:
     code = (
-        "import sys; sys.path.insert(0, 'tests/labs')\n"
+        "import sys; sys.path.insert(0, 'tests')\n"
         "from pathlib import Path\n"
-        "from labkit import *\n"
+        "from support.lab_values import *\n"
         "bench = Bench(Path('.'))\n"
         "with bench.native, bench.browser:\n"
         "    bench.browser.mistakes([])\n"

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "labs"))
-from labkit import Bench, make_lab
-
 from coursebuild.effects import lab_files
 from coursebuild.effects.v8 import Isolate
+from support.lab_values import Bench, make_lab
 
 TIMERS = Path(lab_files.__file__).with_name("lab_timers.js").read_text(encoding="utf-8")
 SCRIPT = """

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from packkit import KEY, ROOT, files, heard, key
 
 from coursebuild.effects import pack_files, packs
 from coursebuild.effects.packs import Packs
 from coursebuild.effects.store import Store
+from support.store_packs import KEY, ROOT, files, heard, key
 
 ACTS = st.lists(
     st.one_of(

@@ -9,12 +9,12 @@ import time
 from pathlib import Path
 
 import pytest
-from packkit import KEY, files, heard, key
 
 from coursebuild.effects import packs
 from coursebuild.effects.packs import Packs
 from coursebuild.effects.prune import prune
 from coursebuild.effects.store import Store
+from support.store_packs import KEY, files, heard, key
 
 
 def test_a_disk_that_fills_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

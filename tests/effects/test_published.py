@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stagingkit import root as root
-from stagingkit import texts
 
 from coursebuild.effects.published import Published
 from coursebuild.effects.site_swap import MARKER, publish
 from coursebuild.results import KeptFile, OutputFile, SiteFile
+from support.published_sites import root as root
+from support.published_sites import texts
 
 
 class Pages:

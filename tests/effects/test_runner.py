@@ -11,7 +11,6 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from runnerkit import SOURCE_TREE, TOOL, Run, job, run_scripts, way
 
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.runner import (
@@ -21,6 +20,7 @@ from coursebuild.effects.runner import (
     clean_environment,
 )
 from coursebuild.results import Outcome
+from support.runners import SOURCE_TREE, TOOL, Run, job, run_scripts, way
 
 pytestmark = pytest.mark.usefixtures("both_ways")
 

@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import pytest
-from runnerkit import SOURCE_TREE, TOOL, Run, alive, gone, job, run_scripts, wait_for, way
 
 from coursebuild.effects.runner import (
     RunEvent,
@@ -19,6 +18,7 @@ from coursebuild.effects.runner import (
     ScriptServer,
 )
 from coursebuild.results import Outcome
+from support.runners import SOURCE_TREE, TOOL, Run, alive, gone, job, run_scripts, wait_for, way
 
 pytestmark = pytest.mark.usefixtures("both_ways")
 

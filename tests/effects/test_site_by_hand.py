@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stagingkit import MANY, SPARE, TEXTS, Pages, beside, texts
-from stagingkit import links as links
-from stagingkit import pages as pages
-from stagingkit import root as root
-from stagingkit import spared as spared
 
 from coursebuild.effects.site_swap import MARKER, publish
+from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
+from support.published_sites import links as links
+from support.published_sites import pages as pages
+from support.published_sites import root as root
+from support.published_sites import spared as spared
 
 
 def edit(file: Path) -> None:

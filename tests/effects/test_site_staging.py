@@ -11,17 +11,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from stagingkit import MANY, SPARE, TEXTS, Pages, beside, texts
-from stagingkit import links as links
-from stagingkit import pages as pages
-from stagingkit import root as root
-from stagingkit import spared as spared
 
 from coursebuild.effects import locks, site_staging, site_swap
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.site_staging import Staging
 from coursebuild.effects.site_swap import MARKER, publish, recover
 from coursebuild.results import KeptFile
+from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
+from support.published_sites import links as links
+from support.published_sites import pages as pages
+from support.published_sites import root as root
+from support.published_sites import spared as spared
 
 
 def test_what_did_not_change_is_neither_made_nor_linked(

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from labkit import make_lab
 
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
+from support.lab_values import make_lab
 
 SPAN = make_lab().span
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from labkit import BALL, make_lab
 
 from coursebuild.effects import native
 from coursebuild.effects.mjcf import compile_all
@@ -28,6 +27,7 @@ from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import lab_files
 from coursebuild.report.text import Style, lab_line
 from coursebuild.results import LabResult
+from support.lab_values import BALL, make_lab
 
 ROOT = Path(__file__).parents[2]
 ABOUT = About("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)

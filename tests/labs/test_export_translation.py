@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from labkit import Bench, make_lab
-
 from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
 from coursebuild.labs.javascript_tokens import UntranslatableError
 from coursebuild.labs.python_code import expression, statements
 from coursebuild.labs.python_values import Code, Names, Used
+from support.lab_values import Bench, make_lab
 
 NAMES = Names({"n": "num", "on": "bool", "v": "vector", "k": "nat"}, Code("GAIN", "num"))
 

@@ -6,15 +6,12 @@ import math
 import sys
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from coursebuild.effects.v8 import Isolate
 from coursebuild.labs.export_text import helpers

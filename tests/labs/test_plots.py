@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from labkit import make_lab
 
 from coursebuild.labs.plots import plot_svg, tick_texts, ticks
 from coursebuild.model import LabPlot, LabTrace
+from support.lab_values import make_lab
 
 SPAN = make_lab().span
 MOVE = re.compile(r"([ML])(-?[\d.]+) (-?[\d.]+)|(h0)")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 import pytest
-from labkit import BALL, make_lab
 
 from coursebuild.labs.compile import pieces
 from coursebuild.labs.reply import Failure, Trial, read_trial
@@ -20,6 +19,7 @@ from coursebuild.labs.verdict import (
 from coursebuild.model import Lab, Quiz, document_blocks
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
+from support.lab_values import BALL, make_lab
 
 LINES = """{
   "xml": "BALL",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from benchkit import CASE, MACHINE, lost, row, scenario, scene, swing
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from coursebuild.measured.cases import BoundaryLine, FigureLine
 from coursebuild.measured.departures import Departure, case_departures, scene_departures
 from coursebuild.model.scenarios import Bands
 from coursebuild.values import replace
+from support.bench_reports import CASE, MACHINE, lost, row, scenario, scene, swing
 
 BANDS = Bands()
 

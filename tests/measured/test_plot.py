@@ -7,7 +7,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from benchkit import lost, row, scenario, swing
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +16,7 @@ from coursebuild.measured.bench import ScenarioReport, StableRow
 from coursebuild.measured.plot import STYLE, plot_svg
 from coursebuild.measured.points import chart, quantities, telling
 from coursebuild.values import replace
+from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 import pytest
-from benchkit import CASE, lost, row, scenario, scene, swing
 
 from coursebuild.measured.records import (
     RecordError,
@@ -16,6 +15,7 @@ from coursebuild.measured.records import (
     encode_stability,
 )
 from coursebuild.values import replace
+from support.bench_reports import CASE, lost, row, scenario, scene, swing
 
 GOOD = encode_bench(scene())
 

@@ -1,11 +1,11 @@
 import itertools
 
-import high_precision as hp
 import mpmath
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support import high_precision as hp
 
 SEQUENCES = [
     cased

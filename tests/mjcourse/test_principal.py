@@ -1,9 +1,9 @@
-import high_precision as hp
 import mpmath
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support import high_precision as hp
 
 RNG = np.random.default_rng(31)
 

@@ -1,9 +1,9 @@
-import high_precision as hp
 import mpmath
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support import high_precision as hp
 
 ONE = mpmath.mpf(1)
 IDENTITY = [mpmath.mpf(i == j) for i in range(3) for j in range(3)]

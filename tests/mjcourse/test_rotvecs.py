@@ -1,9 +1,9 @@
-import high_precision as hp
 import mpmath
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support import high_precision as hp
 
 ONE = mpmath.mpf(1)
 ALL_ANGLES = (*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, *hp.BEYOND_PI)

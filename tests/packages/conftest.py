@@ -1,16 +1,12 @@
 """Make the helpers of this folder, and the kit of scratch courses, importable."""
 
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "pipeline"))
-
-from collections.abc import Callable
-
 import pytest
-from coursekit import Folder
-from zoo import furnish
+
+from support.question_zoo import furnish
+from support.scratch_course import Folder
 
 
 @pytest.fixture

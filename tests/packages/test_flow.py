@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 
 import pytest
-from archives import formula_mistakes
-from hostile import HOSTILE
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
-from qti_rules import MATHML, QTI, mistakes
 
 from coursebuild.render.packages.flow import Flow, Places
 from coursebuild.render.packages.xml import document, element
+from support.archives import formula_mistakes
+from support.hostile_html import HOSTILE
+from support.qti_rules import MATHML, QTI, mistakes
 
 TAGS = (
     "a abbr b blockquote br button caption code dd del details div dl dt em figure form h3 hr img"

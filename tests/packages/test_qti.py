@@ -7,15 +7,15 @@ from collections.abc import Callable
 from urllib.parse import unquote
 
 import pytest
-from archives import entries, formula_mistakes, mistakes, packaging_schema, referred
-from coursekit import GOOD, Done, Folder
-from hostile import HOSTILE, REFUSED
 from lxml import etree
-from qti_rules import MATHML, QTI
-from qti_rules import mistakes as item_mistakes
-from zoo import ANY, SCRIPT, SVG, quiz
 
 from coursebuild.render.packages.xml import identifier
+from support.archives import entries, formula_mistakes, mistakes, packaging_schema, referred
+from support.hostile_html import HOSTILE, REFUSED
+from support.qti_rules import MATHML, QTI
+from support.qti_rules import mistakes as item_mistakes
+from support.question_zoo import ANY, SCRIPT, SVG, quiz
+from support.scratch_course import GOOD, Done, Folder
 
 Make = Callable[..., Folder]
 ZIP = "quizzes-qti.zip"

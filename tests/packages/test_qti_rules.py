@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from archives import mistakes as schema_mistakes
-from archives import packaging_schema, scorm_schema
-from qti_rules import QTI, mistakes
+
+from support.archives import mistakes as schema_mistakes
+from support.archives import packaging_schema, scorm_schema
+from support.qti_rules import QTI, mistakes
 
 GOOD = f"""\
 <assessmentItem xmlns="{QTI}" xmlns:m="http://www.w3.org/1998/Math/MathML" identifier="q" title="t"

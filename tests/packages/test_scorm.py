@@ -9,13 +9,13 @@ from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from archives import entries, mistakes, referred, scorm_schema
-from coursekit import GOOD, Folder
 from lxml import etree
-from zoo import ANY, SCRIPT, quiz
 
 from coursebuild.render.links import check_links
 from coursebuild.results import OutputFile
+from support.archives import entries, mistakes, referred, scorm_schema
+from support.question_zoo import ANY, SCRIPT, quiz
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 ZIP = "course-scorm.zip"

@@ -6,7 +6,6 @@ from typing import Any
 
 import mujoco
 import pytest
-from benchruns import FAMILY, MODELS, of_problem, orders, row
 
 from coursebuild.measured.bench import ScenarioReport
 from coursebuild.model import Declarations
@@ -15,6 +14,7 @@ from coursebuild.physics.problems import problem_named
 from coursebuild.physics.scene import scenes
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
+from support.bench_runs import FAMILY, MODELS, of_problem, orders, row
 
 
 def course_box() -> tuple[Any, Declarations | None]:

@@ -6,10 +6,10 @@ from typing import Any
 
 import mujoco
 import pytest
-from benchruns import measured
 
 from coursebuild.physics.bench import measure_scene
 from coursebuild.physics.scene import SceneError
+from support.bench_runs import measured
 
 STIFF = """\
 <mujoco>

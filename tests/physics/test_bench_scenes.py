@@ -6,9 +6,9 @@ from typing import Any
 
 import mujoco
 import pytest
-from benchruns import measured, orders, row
 
 from coursebuild.measured.bench import ScenarioReport
+from support.bench_runs import measured, orders, row
 
 SERVO = """\
 <mujoco>

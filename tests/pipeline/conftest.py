@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the kit
-
-from coursekit import Folder
+from support.scratch_course import Folder
 
 
 @pytest.fixture

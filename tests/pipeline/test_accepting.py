@@ -6,8 +6,8 @@ import json
 import signal
 from collections.abc import Callable
 
-from coursekit import GOOD, Folder, block
-from servekit import Events, serving
+from support.preview_process import Events, serving
+from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import Done, Folder, block, ended, wait_until_alone
 
 from coursebuild.effects.versions import engine_version
+from support.scratch_course import Done, Folder, block, ended, wait_until_alone
 
 HERE = engine_version()
 OTHER = "9.1.0"

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from coursekit import GOOD, Folder, block
-from livekit import Live
-from livekit import live as live
 
 from coursebuild.effects.errors import EffectError
 from coursebuild.pipeline.preview import behind as module
 from coursebuild.pipeline.preview.behind import Behind
 from coursebuild.pipeline.preview.scripts import SupersededError
 from coursebuild.scripts import bindings
+from support.live_course import Live
+from support.live_course import live as live
+from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
 Start = Callable[[Folder], Live]

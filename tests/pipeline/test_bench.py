@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from measurekit import BOX, TOML, Fake, asked, bench_course, options, swing, write
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.measured.bench import ScenarioReport
@@ -19,6 +18,7 @@ from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes
 from coursebuild.values import replace
+from support.measured_course import BOX, TOML, Fake, asked, bench_course, options, swing, write
 
 
 @pytest.fixture

@@ -11,12 +11,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from coursekit import ROOT
-from measurekit import BOX, PATH, TOML, bench_course, write
 
 from coursebuild.cli import main
 from coursebuild.measured.records import decode_bench, encode_bench
 from coursebuild.values import replace
+from support.measured_course import BOX, PATH, TOML, bench_course, write
+from support.scratch_course import ROOT
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import FIRST, GOOD, SECOND, Folder, block, without_seconds
+
+from support.scratch_course import FIRST, GOOD, SECOND, Folder, block, without_seconds
 
 Make = Callable[..., Folder]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from coursekit import Folder, block
+from support.scratch_course import Folder, block
 
 Make = Callable[..., Folder]
 

@@ -6,8 +6,6 @@ import importlib
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
-from test_many_lessons import options
 
 from coursebuild.effects import pool
 from coursebuild.effects.store import Store
@@ -16,6 +14,7 @@ from coursebuild.pipeline import kept, reading
 from coursebuild.pipeline.kept import fonts_beside
 from coursebuild.render import fonts as cutting
 from coursebuild.render.fonts import Face, FontJob
+from support.scratch_course import Folder
 
 
 @pytest.mark.parametrize("name", [*building._FOLLOWING, *reading._HEAVY])
@@ -33,7 +32,7 @@ def test_the_largest_font_is_cut_beside(
     forks: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = Folder(tmp_path)
-    store = options(folder).store
+    store = folder.options().store
     here: list[str] = []
 
     def cut(job: FontJob) -> bytes:
@@ -78,7 +77,7 @@ def test_a_font_that_cannot_be_cut_is_told_of_where_it_is_asked_for(
 
     monkeypatch.setattr(kept, "cut_font", refuse)
     with (
-        fonts_beside(options(Folder(tmp_path)).store, [job("ab")]) as subset,
+        fonts_beside(Folder(tmp_path).options().store, [job("ab")]) as subset,
         pytest.raises(ValueError, match="ab"),
     ):
         subset(job("ab"))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from coursekit import GOOD, Folder
-from livekit import Live
-from livekit import live as live
+
+from support.live_course import Live
+from support.live_course import live as live
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 NOTHING = {

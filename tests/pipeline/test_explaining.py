@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import HELLO, ROOT, Folder, block
+
+from support.scratch_course import HELLO, ROOT, Folder, block
 
 Make = Callable[..., Folder]
 

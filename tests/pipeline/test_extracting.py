@@ -6,7 +6,8 @@ import json
 from collections.abc import Callable
 
 import pytest
-from coursekit import GOOD, Folder, block
+
+from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from skeletonkit import MAP, PARTS, document, library_of, with_documents
 
 from coursebuild.checks.course import check_course
 from coursebuild.measured.shown import Reports
@@ -25,6 +24,7 @@ from coursebuild.scripts.compare import verify
 from coursebuild.scripts.extract import extract
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
+from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
 
 PROSE = ["Plain words.\n\n", "More of *them*, `code`.\n\n", "- a\n- b\n\n", "***\n\n", "\n"]
 SECOND = "".join(PARTS[:9])

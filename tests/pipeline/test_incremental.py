@@ -5,11 +5,11 @@ from __future__ import annotations
 import shutil
 
 import pytest
-from editkit import LESSON, NORUN, QUIZ, Course, drawn
-from editkit import course as course
-from editkit import nothing_is_held as nothing_is_held
 
 from coursebuild.effects.store import Store
+from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
+from support.edited_course import course as course
+from support.edited_course import nothing_is_held as nothing_is_held
 
 
 def lesson(id: str) -> str:

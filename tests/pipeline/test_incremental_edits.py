@@ -8,11 +8,12 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from coursekit import Folder
-from editkit import LESSON, NORUN, QUIZ, Course
-from editkit import nothing_is_held as nothing_is_held
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from support.edited_course import LESSON, NORUN, QUIZ, Course
+from support.edited_course import nothing_is_held as nothing_is_held
+from support.scratch_course import Folder
 
 
 def prose(course: Course, id: str, text: str) -> None:

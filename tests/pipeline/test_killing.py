@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder, block, ended, wait_until_alone
+
+from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone
 
 Make = Callable[..., Folder]
 
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 DIED = 137
 STRUCTURAL = ("rename", "replace", "link", "exchange", "fsync")
 """Calls that are all tried; of the others, of which there are many alike, some."""
@@ -27,7 +28,7 @@ NEW = OLD.replace("gone.py", "new.py").replace("print(1)", "print(1)  # edited")
 
 
 class Mortals:
-    """Commands that die at a given call; see `mortal.py`."""
+    """Commands that die at a given call; see `support/killed_commands.py`."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.process = process
@@ -46,7 +47,7 @@ def mortals(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mortals]:
     folder = Folder(tmp_path_factory.mktemp("mortals"))
     folder.tmp.mkdir()
     process = subprocess.Popen(
-        [sys.executable, str(HERE / "mortal.py")],
+        [sys.executable, str(ROOT / "tests/support/killed_commands.py")],
         env=folder.environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from simlabkit import RIGHT, Make, checked, course, fence
+from support.lab_lessons import RIGHT, Make, checked, course, fence
 
 
 def test_a_lab_in_which_everything_holds(make: Make) -> None:

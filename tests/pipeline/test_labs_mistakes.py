@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import GOOD, Folder
-from simlabkit import BALL, CART, checked, fence
+
+from support.lab_lessons import BALL, CART, checked, fence
+from support.scratch_course import GOOD, Folder
 
 # What is wrong, its rule, and the lab; `‸` stands where the message must point.
 MISTAKES = [

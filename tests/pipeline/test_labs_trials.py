@@ -10,13 +10,13 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
-from coursekit import Folder, block, ended, wait_until_alone
-from simlabkit import BALL, RIGHT, Make, checked, course, fence
 
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.native import NativeEngine
 from coursebuild.pipeline import labs as pipeline_labs
+from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
+from support.scratch_course import Folder, block, ended, wait_until_alone
 
 
 class TestKept:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import GOOD, ROOT, Folder, block
-from livekit import Builds, Live, differences, share
-from livekit import builds as builds
-from livekit import live as live
 
 from coursebuild.effects.runner import ScriptServer
 from coursebuild.results import ScriptJob, ScriptRun
+from support.live_course import Builds, Live, differences, share
+from support.live_course import builds as builds
+from support.live_course import live as live
+from support.scratch_course import GOOD, ROOT, Folder, block
 
 Make = Callable[..., Folder]
 FULL = ROOT / "tests/courses/full/course"

@@ -6,10 +6,11 @@ import itertools
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder, block
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from livekit import Builds, Live, differences
+
+from support.live_course import Builds, Live, differences
+from support.scratch_course import GOOD, Folder, block
 
 
 class Author:

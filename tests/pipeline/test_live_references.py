@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from coursekit import Folder
-from livekit import Builds, Live
-from livekit import builds as builds
-from livekit import live as live
+from support.live_course import Builds, Live
+from support.live_course import builds as builds
+from support.live_course import live as live
+from support.scratch_course import Folder
 
 ONE, TWO = "content/lessons/1.1-one.md", "content/lessons/1.2-two.md"
 

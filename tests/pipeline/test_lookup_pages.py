@@ -7,7 +7,8 @@ from collections.abc import Callable
 from html import unescape
 
 import pytest
-from coursekit import Folder
+
+from support.scratch_course import Folder
 
 Make = Callable[..., Folder]
 HEAD = '[course]\ntitle = "<b>Course</b>"\n\n[[level]]\nid = "1"\ntitle = "One"\n'

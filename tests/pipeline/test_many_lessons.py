@@ -7,14 +7,13 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
-from coursekit import Folder, block
 
 from coursebuild.pipeline import documents
 from coursebuild.pipeline.build import build, prepare
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.render.exports import tags
 from coursebuild.results import KeptFile, OutputFile, made
+from support.scratch_course import Folder, block
 
 FEW, MANY = 12, 96
 TEXT = 20_000
@@ -40,17 +39,13 @@ def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
     folder.write("content/course.toml", "\n".join(entries))
 
 
-def options(folder: Folder, jobs: int = 1) -> Options:
-    return Options(folder.root.resolve(), jobs, True)
-
-
 def peak(folder: Folder) -> int:
     """The most bytes of Python's that a build holds at once, files that it makes included."""
     gc.collect()
     gc.freeze()  # else what other tests left decides how long garbage lies about
     tracemalloc.start()
     try:
-        with prepare(options(folder), Progress(quiet=True)) as prepared:
+        with prepare(folder.options(), Progress(quiet=True)) as prepared:
             assert prepared.report.ok, prepared.report.diagnostics
             for file in prepared.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
@@ -86,7 +81,7 @@ def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, aga
         write_course(folder, count)
         folder.borrow(stores)
         if again:
-            build(options(folder), Path("public"))
+            build(folder.options(), Path("public"))
             folder.replace("content/lessons/1.2-l2.md", "See [there]", "See again [there]")
         peaks[count].append(peak(folder))
     slope = (min(peaks[MANY]) - min(peaks[FEW])) / (MANY - FEW)
@@ -102,7 +97,7 @@ def test_pages_are_drawn_in_copies_of_what_was_read_here(
         folder = Folder(tmp_path / f"jobs{jobs}")
         write_course(folder, documents._MANY - 1, 300)
         folder.borrow(stores)
-        assert build(options(folder, jobs), Path("public")).ok
+        assert build(folder.options(jobs), Path("public")).ok
         sites.append(folder.tree("public"))
     assert sites[0] == sites[1]
 
@@ -112,11 +107,11 @@ def test_a_course_whose_store_is_whole_or_damaged(tmp_path: Path, stores: Path) 
     folder = Folder(tmp_path / "course")
     write_course(folder, 40, 300)
     folder.borrow(stores)
-    assert build(options(folder), Path("public")).ok
+    assert build(folder.options(), Path("public")).ok
     clean = folder.tree("public")
 
     def again() -> dict[str, bytes]:
-        with prepare(options(folder), Progress(quiet=True)) as prepared:
+        with prepare(folder.options(), Progress(quiet=True)) as prepared:
             assert prepared.report.ok, prepared.report.diagnostics
             made = {
                 f.path: f.data if isinstance(f, OutputFile) else f.make() for f in prepared.files

@@ -7,10 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from coursekit import GOOD, Folder
-from recordkit import BOX, NUMERICS, PAGE, Course
-from reportkit import case
-from servekit import serving
 
 from coursebuild.effects.versions import engine_version
 from coursebuild.measured.records import (
@@ -21,6 +17,10 @@ from coursebuild.measured.records import (
 )
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.scenes import scene_digest
+from support.model_reports import case
+from support.preview_process import serving
+from support.recorded_course import BOX, NUMERICS, PAGE, Course
+from support.scratch_course import GOOD, Folder
 
 
 @pytest.fixture

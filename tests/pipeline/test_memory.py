@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from deskkit import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from coursebuild.pipeline.remember import longest_first
 from coursebuild.results import Outcome, ScriptJob, Trace
+from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 
 
 @pytest.fixture

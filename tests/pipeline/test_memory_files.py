@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from deskkit import JOB, LOOKED, PATH, Desk
 
 from coursebuild.results import Outcome, Trace
+from support.fake_runs import JOB, LOOKED, PATH, Desk
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from measurekit import TOML, write
 
 from coursebuild.cli import main
+from support.measured_course import TOML, write
 
 SINGULAR = """\
 <mujoco>

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from coursekit import GOOD, Folder
-from livekit import Builds, Live, differences
-from livekit import builds as builds
-from livekit import live as live
 
 from coursebuild.pipeline.preview import behind
 from coursebuild.pipeline.preview.pages import Pages
+from support.live_course import Builds, Live, differences
+from support.live_course import builds as builds
+from support.live_course import live as live
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 OTHER = GOOD.replace("hello.py", "other.py")

@@ -8,10 +8,10 @@ import sys
 from collections.abc import Callable
 
 import pytest
-from coursekit import FIRST, ROOT, Folder, block
 
 from coursebuild.effects.conditions import _SAYS_NOTHING
 from coursebuild.effects.surroundings import _PASSED_ON
+from support.scratch_course import FIRST, ROOT, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-from coursekit import ROOT
-
-sys.path.insert(0, str(ROOT / "tests" / "measured"))
-
-from benchkit import lost, scenario, scene, swing
 
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.plots import plot_file, write_plots
 from coursebuild.values import replace
+from support.bench_reports import lost, scenario, scene, swing
 
 
 def test_one_scenario_goes_into_the_file_that_was_named(tmp_path: Path) -> None:

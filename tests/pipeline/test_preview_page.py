@@ -6,10 +6,11 @@ import json
 from collections.abc import Callable, Iterator
 
 import pytest
-from chromium import launch
-from coursekit import GOOD, ROOT, Folder
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
-from servekit import Preview, serving
+
+from support.chromium import launch
+from support.preview_process import Preview, serving
+from support.scratch_course import GOOD, ROOT, Folder
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser

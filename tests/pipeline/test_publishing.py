@@ -10,7 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder, block
+
+from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -8,7 +8,17 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 
 import pytest
-from coursekit import DRIFTED, FIRST, GOOD, SECOND, Done, Folder, block, without_seconds
+
+from support.scratch_course import (
+    DRIFTED,
+    FIRST,
+    GOOD,
+    SECOND,
+    Done,
+    Folder,
+    block,
+    without_seconds,
+)
 
 Make = Callable[..., Folder]
 

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import ROOT, Folder
+
+from support.scratch_course import ROOT, Folder
 
 Make = Callable[..., Folder]
 FULL = ROOT / "tests/courses/full/course"

@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable
 
 import pytest
-from coursekit import ROOT, Folder, block, wait_until_alone
+
+from support.scratch_course import ROOT, Folder, block, wait_until_alone
 
 Make = Callable[..., Folder]
 

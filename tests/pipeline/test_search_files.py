@@ -7,7 +7,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
+
+from support.scratch_course import Folder
 
 WORDS = ("gyroscope", "lagrangian", "quaternion", "impulse", "friction", "damping")
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from coursekit import Folder, block
+
+from support.scratch_course import Folder, block
 
 Make = Callable[..., Folder]
 

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder
-from servekit import Preview, serving
+
+from support.preview_process import Preview, serving
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from coursekit import GOOD, Folder, block
-from servekit import PATIENT, serving
+from support.preview_process import PATIENT, serving
+from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -8,8 +8,9 @@ import time
 from collections.abc import Callable
 
 import pytest
-from coursekit import GOOD, SILENT, Folder, block, ended, wait_until_alone
-from servekit import serving
+
+from support.preview_process import serving
+from support.scratch_course import GOOD, SILENT, Folder, block, ended, wait_until_alone
 
 Make = Callable[..., Folder]
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import Folder, block
 from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.shards import read_shard, read_timings, split, write_timings
+from support.scratch_course import Folder, block
 
 Make = Callable[..., Folder]
 names = st.lists(st.text(max_size=6), max_size=30)

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from coursekit import GOOD, Folder
-from recordkit import PAGE, Course
-from servekit import serving
 
 from coursebuild.measured.records import bench_path, encode_bench
+from support.preview_process import serving
+from support.recorded_course import PAGE, Course
+from support.scratch_course import GOOD, Folder
 
 SCENARIOS = '[[scenario]]\nname = "swing"\n\n[[scenario]]\nname = "awkward"\n'
 FENCES = """## Speed

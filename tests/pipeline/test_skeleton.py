@@ -6,10 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from coursekit import ROOT
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from skeletonkit import MAP, PARTS, document, library_of, with_documents
 
 from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.checks.course import check_course
@@ -40,6 +38,8 @@ from coursebuild.scripts.extract import extract
 from coursebuild.scripts.findings import script_findings
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
+from support.scratch_course import ROOT
+from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
 
 FIXTURES = sorted((ROOT / "tests" / "fixtures").rglob("*.md")) + sorted(
     (ROOT / "tests" / "courses").rglob("*.md")

@@ -18,7 +18,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import (
+
+from support.scratch_course import (
     GOOD,
     SILENT,
     Folder,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from coursekit import DRIFTED, GOOD, Folder, block
+
+from support.scratch_course import DRIFTED, GOOD, Folder, block
 
 Make = Callable[..., Folder]
 

@@ -13,7 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from coursekit import GOOD, Folder, block, command, ended
+
+from support.scratch_course import GOOD, Folder, block, command, ended
 
 Make = Callable[..., Folder]
 

@@ -5,7 +5,6 @@ What standards ask of pages, axe and the Nu checker, is in `tests/browser/test_s
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))  # for the kit
-
-from chromium import launch
-from labpage import until, watched
-from plainhost import served
-from reportkit import reports
-
 from coursebuild.render import SiteOptions
+from support.chromium import launch
+from support.folder_server import served
+from support.lab_page import until, watched
+from support.model_reports import reports
 
 pytestmark = pytest.mark.browser
 

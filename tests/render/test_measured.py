@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from reportkit import box, case, diet, finding, reports, row, scenario, scene
-
 from coursebuild.measured.shown import Reports
 from coursebuild.render import SiteOptions
 from coursebuild.render.figures import bounded, exact, factor, percent, power, sentence, size
+from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
 
 Make = Callable[..., Any]
 

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 
 import pytest
-from benchkit import awkward, lost, row, scenario, scene, setting, swing
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,6 +23,7 @@ from coursebuild.report.measured import bench_report, cases_values
 from coursebuild.report.table import Column, cells_of, table
 from coursebuild.source import Source
 from coursebuild.values import replace
+from support.bench_reports import awkward, lost, row, scenario, scene, setting, swing
 
 EXPECTED = Path(__file__).parent
 

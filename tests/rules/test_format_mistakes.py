@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from scratch import SECOND, Case, Layout, put, read_cases
 
 from coursebuild.cli import main
 from coursebuild.rules import RULES
+from support.rule_cases import SECOND, Case, Layout, put, read_cases
 
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "mistakes"
 MARK = "‸"

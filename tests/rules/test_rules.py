@@ -18,7 +18,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
-from scratch import Case, Layout, parts, put, read_cases
 
 from coursebuild.effects.store import Store
 from coursebuild.pipeline.build import build
@@ -29,6 +28,7 @@ from coursebuild.pipeline.update import update
 from coursebuild.report import Style, diagnostic_text
 from coursebuild.report.catalogue import Example, ExampleFile, catalogue_page
 from coursebuild.rules import RULES
+from support.rule_cases import Case, Layout, parts, put, read_cases
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "tests/fixtures/rules"

@@ -3,7 +3,6 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_lessons import course, document, ran, told
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import (
@@ -20,6 +19,7 @@ from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.held import Bearings
+from support.sample_lessons import course, document, ran, told
 
 PRINTED = """\
 an L-shaped body: [0.073333 0.026667 0.      ] m

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from sample_lessons import (
+
+from coursebuild.results import DriftKind
+from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,
 )
-from sample_verdicts import seen, verdict
-
-from coursebuild.results import DriftKind
+from support.sample_verdicts import seen, verdict
 
 ENERGY = """\
 conservation over 20 s:

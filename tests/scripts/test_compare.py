@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from sample_lessons import (
+
+from coursebuild.model import Comparison, Filter
+from coursebuild.scripts.compare import compare
+from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
@@ -12,10 +15,7 @@ from sample_lessons import (
     recording,
     within,
 )
-from sample_verdicts import matches, seen, verdict
-
-from coursebuild.model import Comparison, Filter
-from coursebuild.scripts.compare import compare
+from support.sample_verdicts import matches, seen, verdict
 
 # ---------------------------------------------------------------------------------------- modes
 

@@ -7,17 +7,17 @@ from decimal import Decimal
 
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_lessons import (
+
+from coursebuild.model import Comparison
+from coursebuild.results import DriftKind
+from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
     within,
 )
-from sample_verdicts import matches, seen, verdict
-
-from coursebuild.model import Comparison
-from coursebuild.results import DriftKind
+from support.sample_verdicts import matches, seen, verdict
 
 WORDS = st.sampled_from(
     ["a", "b c", "x=1.5", "1.5", "2", "-0.0", "nan", "...", "", "  ", "e-3", "|"]

@@ -6,17 +6,17 @@ import random
 import time
 
 import pytest
-from sample_lessons import (
+
+from coursebuild.model import Comparison
+from coursebuild.results import DriftKind, Verdict
+from coursebuild.scripts.compare import compare
+from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
     recording,
 )
-
-from coursebuild.model import Comparison
-from coursebuild.results import DriftKind, Verdict
-from coursebuild.scripts.compare import compare
 
 
 def quickly(seconds: float, recorded: str, printed: str, comparison: Comparison) -> Verdict:

@@ -1,13 +1,13 @@
 from __future__ import annotations
 
 import pytest
-from sample_lessons import DIGITS, EXACT, course, document, ran, recording, table, told
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Comparison
 from coursebuild.scripts.bindings import Printed, leaning_on
 from coursebuild.scripts.compare import compare, verify
 from coursebuild.scripts.drift import classes, drift_diagnostic
+from support.sample_lessons import DIGITS, EXACT, course, document, ran, recording, table, told
 
 
 def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagnostic:

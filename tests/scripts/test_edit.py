@@ -6,13 +6,13 @@ import re
 from dataclasses import replace
 
 import pytest
-from sample_edits import body, edited, refused
-from sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, VOLATILE, recording
 
 from coursebuild.diagnostics import Edit
 from coursebuild.model import Comparison, Filter
 from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.source import Source
+from support.sample_edits import body, edited, refused
+from support.sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, VOLATILE, recording
 
 # ------------------------------------------------------------------------------------ new text
 

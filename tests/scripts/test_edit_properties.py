@@ -6,13 +6,21 @@ import re
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from sample_edits import edited
-from sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, VOLATILE, recording, within
 
 from coursebuild.diagnostics import Diagnostic, Edit
 from coursebuild.model import Comparison, Filter
 from coursebuild.scripts.compare import compare
 from coursebuild.scripts.edit import updated_body
+from support.sample_edits import edited
+from support.sample_lessons import (
+    DIGITS,
+    DIGITS_ELLIPSIS,
+    ELLIPSIS,
+    EXACT,
+    VOLATILE,
+    recording,
+    within,
+)
 
 CHARACTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\x00\n\r")
 LINES = st.one_of(

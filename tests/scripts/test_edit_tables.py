@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_edits import edited
-from sample_lessons import DIGITS, EXACT, VOLATILE, table, told, within
 
 from coursebuild.diagnostics import Diagnostic, Edit
 from coursebuild.model import Comparison, Filter
 from coursebuild.scripts.compare import compare
 from coursebuild.scripts.edit import updated_body
+from support.sample_edits import edited
+from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, told, within
 
 HEAD = "| a | b | c |\n| --- | --- | --- |\n"
 

@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_lessons import course, document, told
 
 from coursebuild.model import Document
 from coursebuild.results import ScriptJob
 from coursebuild.scripts.extract import Extraction, extract, jobs
+from support.sample_lessons import course, document, told
 
 
 def block(path: str, code: str = "pass", keys: str = "") -> str:

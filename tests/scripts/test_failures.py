@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 import pytest
-from sample_lessons import course, document, ran, recording, told
 
 from coursebuild.results import Outcome
 from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.failures import failure, in_lessons, silence
+from support.sample_lessons import course, document, ran, recording, told
 
 
 def extractions() -> tuple[Extraction, ...]:

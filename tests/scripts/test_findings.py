@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-from sample_lessons import course, document, ran, told
-
 from coursebuild.model import Document
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.extract import extract
 from coursebuild.scripts.findings import script_findings
+from support.sample_lessons import course, document, ran, told
 
 LESSON = """\
 ```python file=examples/a.py

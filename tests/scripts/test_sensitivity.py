@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 import pytest
-from sample_lessons import (
+
+from coursebuild.measured.sensitivity import Doubt, Flip, Sensitivity, Standing
+from coursebuild.model import Comparison, Filter, Recording
+from coursebuild.results import Outcome, ScriptRun, Trace
+from coursebuild.scripts.numbers import scan
+from coursebuild.scripts.sensitivity import noise, rounded, sensitivity, worth_moving
+from coursebuild.values import replace
+from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,
     EXACT,
@@ -18,14 +25,7 @@ from sample_lessons import (
     table,
     within,
 )
-from sample_lessons import told as told_text
-
-from coursebuild.measured.sensitivity import Doubt, Flip, Sensitivity, Standing
-from coursebuild.model import Comparison, Filter, Recording
-from coursebuild.results import Outcome, ScriptRun, Trace
-from coursebuild.scripts.numbers import scan
-from coursebuild.scripts.sensitivity import noise, rounded, sensitivity, worth_moving
-from coursebuild.values import replace
+from support.sample_lessons import told as told_text
 
 TRACE = Trace((), (), (), ("mujoco",), "")
 

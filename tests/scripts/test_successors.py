@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_lessons import course, document, ran, told
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.scripts.bindings import Printed, check_bindings
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.held import Bearings
+from support.sample_lessons import course, document, ran, told
 
 PENDULUM = "period   2.006 s\nhalf     1.003 s\n"
 

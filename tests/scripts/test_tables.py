@@ -3,11 +3,11 @@ from __future__ import annotations
 import time
 
 import pytest
-from sample_lessons import DIGITS, EXACT, VOLATILE, table, within
 
 from coursebuild.model import Comparison, Filter
 from coursebuild.results import Verdict
 from coursebuild.scripts.compare import compare
+from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, within
 
 PRINTED = """\
 integrators

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from sample_lessons import (
+from coursebuild.results import Outcome
+from coursebuild.scripts.compare import verify
+from support.sample_lessons import (
     DIGITS,
     course,
     document,
     ran,
 )
-
-from coursebuild.results import Outcome
-from coursebuild.scripts.compare import verify
 
 
 def test_every_recording_gets_a_verdict() -> None:

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chromium import launch
 from playwright.sync_api import sync_playwright
+
+from support.chromium import launch
 
 ROOT = Path(__file__).resolve().parents[2]
 ICON = (ROOT / "templates" / "icon.svg").read_text(encoding="utf-8")

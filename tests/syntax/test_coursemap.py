@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mapkit import parse, told
 
 from coursebuild.model import Comparison, Filter, Mode, Silence, Status
 from coursebuild.vocabulary import CALLOUTS
+from support.course_maps import parse, told
 
 ROOT = Path(__file__).parents[2]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from mapkit import HEAD, LEVEL, lesson, parse, told
+
+from support.course_maps import HEAD, LEVEL, lesson, parse, told
 
 LESSON = LEVEL + '[[level.lesson]]\nid = %s\nslug = %s\ntitle = "T"\nstatus = %s\n%s\n'
 PATH = "a path relative to the project, as in `content/pages/about.md`"

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Meta, Struct
-from nodekit import shown
 
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax.course_schema import CourseFile
@@ -22,6 +21,7 @@ from coursebuild.syntax.quiz_schema import QuizFile
 from coursebuild.syntax.schemas import SchemaName, json_schema
 from coursebuild.syntax.toml_text import parse_toml
 from coursebuild.syntax.wording import JSON, TOML
+from support.positioned_nodes import shown
 
 
 class Disc(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="disc"):

@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fixture_cases import Case, read_cases, rewritten
-from tree_dump import dump
 
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from coursebuild.vocabulary import CALLOUTS
+from support.fixture_cases import Case, read_cases, rewritten
+from support.tree_dump import dump
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "syntax"
 FILES = sorted(FOLDER.glob("*.md"))

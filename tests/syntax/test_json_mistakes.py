@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from jsonkit import parse
-from nodekit import shown
 
 from coursebuild.syntax.json_text import MAX_DEPTH
+from support.json_texts import parse
+from support.positioned_nodes import shown
 
 DOUBLE = "to write a backslash, double it: "
 READ = f"is read as a control character [{DOUBLE}"

@@ -8,12 +8,12 @@ import re
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from jsonkit import parse
-from nodekit import plain, shown, tree
 
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax.json_text import parse_json
 from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from support.json_texts import parse
+from support.positioned_nodes import plain, shown, tree
 
 
 def walk(node: Node) -> list[Node]:

@@ -6,7 +6,6 @@ import json
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from labfence import parse, text_of, told
 
 from coursebuild.model import (
     Lab,
@@ -20,6 +19,7 @@ from coursebuild.model import (
 )
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
+from support.lab_fences import parse, text_of, told
 
 COMPLETE = r"""{
   "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,

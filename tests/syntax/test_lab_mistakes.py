@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from labfence import parse, text_of, told
+
+from support.lab_fences import parse, text_of, told
 
 LAB = '{"model": "m", %s}'
 SLIDER = LAB % '"controls": [{"label": "a", "min": 0, "max": 2, "value": 1, %s}]'

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mapkit import LEVEL, lesson, parse
 
 from coursebuild.syntax.prerequisites import circles
+from support.course_maps import LEVEL, lesson, parse
 
 
 def test_a_circle_points_at_each_of_its_steps() -> None:

@@ -8,7 +8,6 @@ import json
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from quizfence import MCQ, Plain, fence, parse
 
 from coursebuild.model import (
     Block,
@@ -28,6 +27,7 @@ from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from coursebuild.syntax.quiz import parse_quiz
 from coursebuild.vocabulary import CALLOUTS
+from support.quiz_fences import MCQ, Plain, fence, parse
 
 
 def words(blocks: tuple[Block, ...]) -> str:

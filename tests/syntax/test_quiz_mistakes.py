@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from quizfence import MCQ, parse, told
 
 from coursebuild.model import ChoiceQuestion, OutputQuestion
+from support.quiz_fences import MCQ, parse, told
 
 QUESTION = '{"id": "x", "questions": [\n%s]}'
 

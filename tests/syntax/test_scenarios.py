@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nodekit import shown
 
 from coursebuild.diagnostics import Parsed
 from coursebuild.model import Declarations, Measured
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
+from support.positioned_nodes import shown
 
 COMPLETE = """\
 # the arm

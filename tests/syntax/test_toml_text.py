@@ -9,7 +9,6 @@ import tomllib
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from nodekit import plain, shown, tree
 
 from coursebuild.source import Source
 from coursebuild.syntax.nodes import (
@@ -19,6 +18,7 @@ from coursebuild.syntax.nodes import (
     StringNode,
 )
 from coursebuild.syntax.toml_text import parse_toml
+from support.positioned_nodes import plain, shown, tree
 
 DATES = (datetime.date, datetime.time)
 

@@ -6,9 +6,10 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from coursekit import block
-from labpage import watched
 from playwright.sync_api import BrowserContext, Locator, Page, expect
+
+from support.lab_page import watched
+from support.scratch_course import block
 
 PATH = "lessons/1.1-one.html"
 MCQ, SEVERAL, NUMBER, ANGLE, PREDICT, OPEN, OUTPUT, ORDER, BARE = range(9)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from nodekit import shown
-
 from coursebuild.diagnostics import Parsed
 from coursebuild.model import Course
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
+from support.positioned_nodes import shown
 
 
 def parse(text: str) -> Parsed[Course | None]:

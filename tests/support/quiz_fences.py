@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nodekit import shown
-
 from coursebuild.diagnostics import Parsed, diagnose
 from coursebuild.model import Block, Inline, Paragraph, Quiz, Text
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.quiz import parse_quiz
+from support.positioned_nodes import shown
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """Runs commands in forked children that end themselves at a given call of the system.
 
-    python mortal.py < requests > replies
+    python killed_commands.py < requests > replies
 
 A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N}`. The child runs the
 command in this folder and ends itself, without any cleaning up, just before its call number N that

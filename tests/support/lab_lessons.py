@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from coursekit import GOOD, Folder
+from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
 

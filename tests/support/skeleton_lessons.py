@@ -5,8 +5,6 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
-from coursekit import ROOT, block
-
 from coursebuild.model import Course, Document
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import PublishedLabs
@@ -16,6 +14,7 @@ from coursebuild.results import Results
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from coursebuild.vocabulary import CALLOUTS
+from support.scratch_course import ROOT, block
 
 KINDS = frozenset(kind.name for kind in CALLOUTS)
 MAP = """

@@ -5,8 +5,9 @@ from __future__ import annotations
 import datetime
 import json
 
-from labpage import watched
 from playwright.sync_api import BrowserContext, Locator, Page
+
+from support.lab_page import watched
 
 KEY = "coursebuild.progress.motion"
 PUSH_PAGE = "lessons/1.1-push.html"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from nodekit import shown
-
 from coursebuild.diagnostics import Parsed
 from coursebuild.model import Block, Inline, Lab, Paragraph, Text
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.lab import parse_lab
+from support.positioned_nodes import shown
 
 
 class Plain:

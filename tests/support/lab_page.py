@@ -10,8 +10,9 @@ from collections.abc import Callable
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-from chromium import SLOW
 from playwright.sync_api import BrowserContext, Locator, Page, Request, Route
+
+from support.chromium import SLOW
 
 SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
 """The labs of the page, by number."""

@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "measured"))
-
-from benchkit import MACHINE, awkward, swing
-from benchkit import row as row
-from benchkit import scenario as scenario
-from benchkit import scene as scene
 
 from coursebuild.measured.bench import SceneCard, SceneReport
 from coursebuild.measured.cases import (
@@ -30,6 +21,10 @@ from coursebuild.measured.diet import (
     Saving,
 )
 from coursebuild.measured.shown import Reports
+from support.bench_reports import MACHINE, awkward, swing
+from support.bench_reports import row as row
+from support.bench_reports import scenario as scenario
+from support.bench_reports import scene as scene
 
 CARD = SceneCard(
     bodies=3, geoms=5, freedom=6, possible=7, touched=2, mjcf=12_345, mjb=98_765_432, browser=151.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from coursekit import Folder
+from support.scratch_course import Folder
 
 SCRIPT = "```python file=examples/fall.py\nprint('drift  +6.6 %')\nprint('<b>&amp;')\n```\n\n"
 MODEL = """\

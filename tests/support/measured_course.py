@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-from coursekit import ROOT
-
-sys.path.insert(0, str(ROOT / "tests" / "measured"))
-
-from benchkit import swing
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.store import Store
@@ -19,6 +12,7 @@ from coursebuild.measured.bench import ScenarioReport
 from coursebuild.pipeline.measuring import Loaded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import Scene
+from support.bench_reports import swing
 
 BOX = """\
 <mujoco>

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from coursebuild.cli import main
 from coursebuild.effects.pack_files import Pack, open_pack
+from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]
 SLUGS = ("one", "two", "three", "four", "five", "six")
@@ -125,6 +126,10 @@ class Folder:
         return count
 
     # --- commands
+
+    def options(self, jobs: int = 1) -> Options:
+        """To call a command as a function."""
+        return Options(self.root.resolve(), jobs, quiet=True)
 
     def main(self, *arguments: str, cwd: Path | None = None) -> Done:
         """Run a command in this process."""

@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import Any
-
-from coursekit import ROOT, Folder
-
-sys.path.insert(0, str(ROOT / "tests" / "render"))
-
-from reportkit import box, case, diet, finding
 
 from coursebuild.effects.versions import engine_version
 from coursebuild.measured.bench import SceneReport
@@ -27,6 +20,8 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import scene_digest
+from support.model_reports import box, case, diet, finding
+from support.scratch_course import Folder
 
 BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
 PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'

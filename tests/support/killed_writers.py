@@ -1,6 +1,6 @@
 """Kills what writes files at every call of the system that it makes, and looks at what is left.
 
-    python crash.py SCENARIO FOLDER
+    python killed_writers.py SCENARIO FOLDER
 
 A scenario is prepared afresh in FOLDER and run in a forked child that ends itself, without any
 cleaning up, at its first call that changes something on the disk; then again at its second; and so

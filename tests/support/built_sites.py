@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from coursekit import ROOT, Folder
-from hostkit import Host
+
+from support.scratch_course import ROOT, Folder
+from support.static_host import Host
 
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
 

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from coursekit import Folder
 
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.preview.behind import Behind
 from coursebuild.pipeline.preview.live import LiveCourse
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.serve import live_course
+from support.scratch_course import Folder
 
 COPIES = (".br", ".gz")
 OURS = (".coursebuild-site", "files.json", "service-worker.js")

@@ -12,9 +12,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from coursekit import Folder, ended, wait_until_alone
-
 from coursebuild.effects.server import PREFIX
+from support.scratch_course import Folder, ended, wait_until_alone
 
 PATIENT = """
 import sys

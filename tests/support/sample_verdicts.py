@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from sample_lessons import EXACT, recording
-
 from coursebuild.model import Comparison, Filter
 from coursebuild.results import Change, DriftKind, Verdict
 from coursebuild.scripts.compare import compare
+from support.sample_lessons import EXACT, recording
 
 
 def verdict(

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from coursekit import Folder, block
 
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from support.scratch_course import Folder, block
 
 HEAD = """
 [course]

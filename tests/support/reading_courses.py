@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from coursekit import Folder
+from support.scratch_course import Folder
 
 LONG = "Donaudampfschifffahrtselektrizitätenhauptbetriebswerkbauunterbeamtengesellschaft"
 URL = "https://example.org/a/very/long/address/that/cannot/be/broken/" + "x" * 120

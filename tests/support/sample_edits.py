@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from sample_lessons import EXACT, document, recording, recordings, told
-
 from coursebuild.diagnostics import Diagnostic, Edit
 from coursebuild.model import Comparison, Filter, Recording
 from coursebuild.scripts.compare import compare
 from coursebuild.scripts.edit import apply_edits, updated_body
+from support.sample_lessons import EXACT, document, recording, recordings, told
 
 
 def edited(

@@ -1,0 +1,1 @@
+"""What tests share: courses, hosts, browsers, and readers of fixtures."""
