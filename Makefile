@@ -1,5 +1,6 @@
 # make site    the environment, the tool and the course in public/
-# make test    all set-up, then every test
+# make quick   the tests that need no browser, no lab engine and no whole site
+# make test    all set-up, then every test of a change
 # make help    the rest
 
 PYTHON ?= python3
@@ -11,6 +12,8 @@ BIN := $(VENV)/bin
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+# Compiled modules, and with them the compiled assertions of tests, are kept from run to run.
+unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
@@ -23,12 +26,14 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site serve test lint format types npm system clean distclean
+.PHONY: help site serve quick test test-slow lint format types npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/'
 	@echo 'make serve      the same, then serve it and rebuild on every change'
+	@echo 'make quick      run the tests that need no browser, no lab engine and no whole site'
 	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
+	@echo 'make test-slow  measure pages, look for leaks, try random cases that are new each time'
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types'
 	@echo 'make clean      remove what was built; make distclean also what was installed'
@@ -39,10 +44,18 @@ site: $(VENV)/.site
 serve: $(VENV)/.site
 	$(BIN)/coursebuild serve
 
-# What fails is run once more, and printed in full even where it passes then: see tests/conftest.py.
+PYTEST = PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(BIN)/python -m pytest
+PARALLEL = -n $(WORKERS) --dist worksteal
+
+quick: $(VENV)/.dev
+	@$(PYTEST) $(PARALLEL) -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
+
 test: $(VENV)/.dev npm system
-	@PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" \
-	  $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --reruns 1 $(PYTEST_ARGS)
+	@$(PYTEST) $(PARALLEL) -m 'not slow' $(PYTEST_ARGS)
+
+# One after the other, since some of them measure; property tests get new examples in every run.
+test-slow: $(VENV)/.dev npm system
+	@$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile free $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

