@@ -7,7 +7,7 @@ and those that read them don't import each other.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Literal, TypeAlias
 
 from coursebuild.model import Comparison, Recording
@@ -293,29 +293,6 @@ class OutputFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
-    """A piece of a file that need not be made where the file had it when it was published last."""
-
-    key: str
-    """A hash of all that its bytes depend on."""
-    make: Callable[[], bytes]
-    """Gives its bytes."""
-    seen: Callable[[bytes], object] = len
-    """Is given them wherever they come from, before what follows is asked for."""
-
-
-def made(pieces: Iterable[bytes | Piece]) -> Iterator[bytes]:
-    """The bytes of pieces, all of which are made."""
-    for piece in pieces:
-        if isinstance(piece, Piece):
-            data = piece.make()
-            piece.seen(data)
-            yield data
-        else:
-            yield piece
-
-
-@dataclass(frozen=True, slots=True)
 class KeptFile:
     """A file of the site that need not be made where it was published under the same key before."""
 
@@ -325,7 +302,7 @@ class KeptFile:
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
     """Gives its bytes; called at most once, and not at all where the published file is whole."""
-    pieces: Callable[[], Iterable[bytes | Piece]] | None = None
+    pieces: Callable[[], Iterable[bytes]] | None = None
     """Gives them one after the other, where all at once would take too much room."""
 
 

@@ -11,18 +11,14 @@ the only module that counts lines.
 3. An `Excerpt` is what a parser of an inner language reads (a fence's JSON, a quiz's Markdown):
    prefixes, indentation and escapes are gone from its text, and its pieces say where each part
    came from.
-
-The text of a source may be away: it is read when it is asked for, and not kept. So a course of any
-length can be held, of which few places are ever shown.
 """
 
 from __future__ import annotations
 
 import hashlib
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any
 
 from coursebuild.patterns import pattern
 from coursebuild.values import dataclass, field
@@ -40,18 +36,6 @@ def key_of(*texts: str) -> str:
     return text_digest("\0".join(texts)).hex()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Away:
-    """How to read what is away, and what is known of it without."""
-
-    read: Callable[[], Any]
-    digest: bytes
-
-    def __call__(self) -> Any:
-        """What is away."""
-        return self.read()
-
-
 @dataclass(frozen=True, slots=True)
 class Source:
     """One text file of a course."""
@@ -63,40 +47,11 @@ class Source:
     _line_starts: list[int] = field(
         default_factory=list, init=False, repr=False, compare=False, hash=False
     )
-    _read: Callable[[], str] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """Gives the text, where it is away."""
 
     @property
     def digest(self) -> bytes:
-        """SHA-256 of the text; where that is away, it need not be read for this."""
-        read = self._read
-        return read.digest if isinstance(read, _Away) else text_digest(self.text)
-
-    @classmethod
-    def away(cls, path: str, read: Callable[[], str], digest: bytes | None = None) -> Source:
-        """A source whose text is read each time it is asked for; it must be the same each time.
-
-        `digest` is that of the text, where it is known.
-        """
-        source = object.__new__(cls)
-        object.__setattr__(source, "path", path)
-        object.__setattr__(source, "_line_starts", [])
-        object.__setattr__(source, "_read", read if digest is None else _Away(read, digest))
-        return source
-
-    def present(self) -> Source:
-        """The same with its text, for who looks at it often or elsewhere."""
-        return self if self._read is None else Source(self.path, self.text)
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> str:
-            """The text that is away: its slot is empty."""
-            if name == "text":
-                return self._read()
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        """SHA-256 of the text."""
+        return text_digest(self.text)
 
     @property
     def line_starts(self) -> list[int]:
@@ -108,8 +63,6 @@ class Source:
             else:
                 sizes = [len(line) + 1 for line in text.split("\n")]
                 starts = list(accumulate(sizes[:-1], initial=0))
-            if self._read is not None:
-                return starts
             self._line_starts.extend(starts)
         return self._line_starts
 
@@ -201,42 +154,11 @@ class Excerpt:
     text: str
     pieces: tuple[tuple[int, int], ...] = field(repr=False)
     """(offset in the text, offset in the source), growing; the first is at text offset 0."""
-    _read: Callable[[], Excerpt] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """Gives the excerpt with its text, where that is away."""
-
-    @property
-    def is_away(self) -> bool:
-        """Whether it is read each time."""
-        return self._read is not None
 
     @property
     def digest(self) -> bytes:
-        """SHA-256 of the text; where that is away, it need not be read for this."""
-        read = self._read
-        return read.digest if isinstance(read, _Away) else text_digest(self.text)
-
-    @classmethod
-    def away(
-        cls, source: Source, read: Callable[[], Excerpt], digest: bytes | None = None
-    ) -> Excerpt:
-        """An excerpt that is read each time it is asked for; it must be the same each time.
-
-        `digest` is that of its text, where it is known.
-        """
-        excerpt = object.__new__(cls)
-        object.__setattr__(excerpt, "source", source)
-        object.__setattr__(excerpt, "_read", read if digest is None else _Away(read, digest))
-        return excerpt
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> object:
-            """What is away: its slot is empty."""
-            if name in ("text", "pieces"):
-                return getattr(self._read(), name)
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        """SHA-256 of the text."""
+        return text_digest(self.text)
 
     @classmethod
     def of_lines(cls, source: Source, lines: Iterable[tuple[str, int]]) -> Excerpt:

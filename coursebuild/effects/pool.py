@@ -85,16 +85,14 @@ class Pool(Generic[Ask, Answer]):
         answer: Callable[[Ask], Answer],
         count: int,
         begin: Callable[[], None] = lambda: None,
-        files: tuple[int, ...] = (),
     ) -> None:
         """Fork `count` copies now; with none, or where that fails, all is answered here.
 
         `begin` is called in each copy before its first request. Of the files that are open here
-        only these descriptors, and the first three, are open in the copies.
+        only the first three are open in the copies.
         """
         self._answer = answer
         self._begin = begin
-        self._files = files
         self._copies: list[_Copy | None] = []
         try:
             gc.freeze()  # what there is now is not looked through in the copies
@@ -214,7 +212,7 @@ class Pool(Generic[Ask, Answer]):
         try:
             process = os.fork()
             if process == 0:
-                _serve(self._begin, self._answer, inward, outward, self._files, before)
+                _serve(self._begin, self._answer, inward, outward, before)
             self._copies.append(_Copy(process, requests, answers))
         except OSError:
             os.close(requests)
@@ -266,7 +264,6 @@ def _serve(
     answer: Callable[[Any], Any],
     inward: int,
     outward: int,
-    files: tuple[int, ...],
     blocked: Collection[int],
 ) -> NoReturn:
     """What a copy does until its input ends; `blocked`: signals that it is to block then."""
@@ -276,7 +273,7 @@ def _serve(
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        _close_others(inward, outward, *files)
+        _close_others(inward, outward)
         begin()
         while (data := _read(inward)) is not None:
             try:

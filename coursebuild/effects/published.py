@@ -1,6 +1,6 @@
 """What was published last: by its key and its stat, a file of the site that need not be made again.
 
-Entry points: `Published.read(root, place)`, `Published.is_whole`, `Published.earlier`,
+Entry points: `Published.read(root, place)`, `Published.is_whole`,
 `write_published`.
 
 The record lies in `.coursebuild/`, since a site holds nothing that changes from build to build
@@ -14,17 +14,14 @@ import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.effects.splicing import Earlier
 from coursebuild.values import dataclass, field, replace
 
 RECORDS = ".coursebuild/published"
 """The folder in a course where the records are."""
-_NONE = "-"
-"""In the place of no places."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +39,12 @@ class Entry:
     inode: int
     mode: int
     """Its kind and permissions when it was last looked at: they may be changed."""
-    places: str = ""
-    """Where its pieces are; see `splicing`."""
 
     @classmethod
-    def of(cls, key: str, digest: str, status: os.stat_result, places: str = "") -> Entry:
+    def of(cls, key: str, digest: str, status: os.stat_result) -> Entry:
         """The entry of a file that was just written, or linked."""
         numbers = status.st_size, status.st_mtime_ns, status.st_ino, status.st_mode
-        return cls(key, digest, *numbers, places)
+        return cls(key, digest, *numbers)
 
     def fits(self, status: os.stat_result) -> bool:
         """Whether a file is the one that was written, as it was then."""
@@ -96,31 +91,12 @@ class Published:
             return False
         return entry.fits(status)
 
-    @contextlib.contextmanager
-    def earlier(self, path: str) -> Iterator[Earlier | None]:
-        """The file there, whatever its key, where pieces can be taken out of it."""
-        entry = self.entries.get(path)
-        if entry is None or not entry.places:
-            yield None
-            return
-        try:
-            # Whatever somebody has put there: neither a link's aim, nor a pipe that is waited for.
-            flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-            fd = os.open(f"{self.place}/{path}", flags)
-        except OSError:
-            yield None
-            return
-        try:
-            yield Earlier(fd, entry.places) if entry.fits(os.fstat(fd)) else None
-        finally:
-            os.close(fd)
-
 
 def write_published(root: Path, place: Path, entries: Mapping[str, Entry]) -> None:
     """Keep a record; one that cannot be written only costs time."""
     body = "".join(
         f"{entry.key} {entry.digest} {entry.size} {entry.modified} {entry.inode} {entry.mode}"
-        f" {entry.places or _NONE} {path}\n"
+        f" {path}\n"
         for path, entry in sorted(entries.items())
     )
     data = f"{hashlib.sha256(body.encode()).hexdigest()}\n{body}".encode()
@@ -147,6 +123,5 @@ def _file(root: Path, place: Path) -> Path:
 
 
 def _parsed(line: str) -> tuple[str, Entry]:
-    key, digest, size, modified, inode, mode, places, path = line.split(" ", 7)
-    known = "" if places == _NONE else places
-    return path, Entry(key, digest, int(size), int(modified), int(inode), int(mode), known)
+    key, digest, size, modified, inode, mode, path = line.split(" ", 6)
+    return path, Entry(key, digest, int(size), int(modified), int(inode), int(mode))

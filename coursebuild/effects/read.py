@@ -15,14 +15,12 @@ Entry points: `find_root`, `read_course`, `read_bytes`.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
 from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
@@ -78,11 +76,8 @@ def find_root(chosen: Path | None, start: Path) -> Path:
     )
 
 
-def read_course(root: Path, aside: Aside | None = None) -> Parsed[CourseFiles]:
-    """Read the map, the lessons, the pages and the models of a course.
-
-    The texts of lessons and pages are put aside, where somebody says where.
-    """
+def read_course(root: Path) -> Parsed[CourseFiles]:
+    """Read the map, the lessons, the pages and the models of a course."""
     root = root.resolve()
     reader = _Reader(root)
     files = [*reader.walk("content"), *reader.walk("models")]
@@ -96,8 +91,8 @@ def read_course(root: Path, aside: Aside | None = None) -> Parsed[CourseFiles]:
     declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]
     found = CourseFiles(
         map=reader.map(),
-        lessons=reader.sources(lessons, aside),
-        pages=reader.sources(pages, aside),
+        lessons=reader.sources(lessons),
+        pages=reader.sources(pages),
         models=tuple(
             MjcfModel(source.path.removeprefix("models/").removesuffix(".xml"), source)
             for source in reader.sources(models)
@@ -127,12 +122,10 @@ def read_bytes(root: Path, path: str) -> bytes:
         raise EffectError(f"{path} cannot be read: {reason(error)}") from None
 
 
-def read_sources(
-    root: Path, paths: list[str], aside: Aside | None = None
-) -> Parsed[tuple[Source, ...]]:
+def read_sources(root: Path, paths: list[str]) -> Parsed[tuple[Source, ...]]:
     """Further text files of the project, such as pages that lie outside of `content/`."""
     reader = _Reader(root.resolve())
-    return Parsed(reader.sources(paths, aside), tuple(reader.diagnostics))
+    return Parsed(reader.sources(paths), tuple(reader.diagnostics))
 
 
 class _Reader:
@@ -223,8 +216,8 @@ class _Reader:
         else:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
 
-    def sources(self, paths: list[str], aside: Aside | None = None) -> tuple[Source, ...]:
-        """The files that hold text, decoded; those that are UTF-8 are put aside."""
+    def sources(self, paths: list[str]) -> tuple[Source, ...]:
+        """The files that hold text, decoded."""
         found = []
         for path in paths:
             if path in self.unreadable:
@@ -236,7 +229,7 @@ class _Reader:
             except EffectError as error:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
             else:
-                source = self._decode(path, data, aside)
+                source = self._decode(path, data)
                 found += [] if source is None else [source]
         return tuple(found)
 
@@ -249,7 +242,7 @@ class _Reader:
         except OSError:  # told by who looks closer
             return None
 
-    def _decode(self, path: str, data: bytes, aside: Aside | None) -> Source | None:
+    def _decode(self, path: str, data: bytes) -> Source | None:
         """The text of a file; `None` where it holds none."""
         is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _STRAY
         wrong, why = -1 if is_text else data.find(b"\0"), "is not text"  # though it is UTF-8
@@ -258,8 +251,6 @@ class _Reader:
         except UnicodeDecodeError as error:
             text, wrong, why = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
             is_text = is_text and b"\0" not in data
-        if wrong < 0 and aside is not None:
-            return Source.away(path, aside.put(data).text, hashlib.sha256(data).digest())
         source = Source(path, text)
         if wrong >= 0:
             at = len(data[:wrong].decode("utf-8"))

@@ -4,9 +4,7 @@ Entry points: `writing`; `write_file`, for one.
 
 1. Copies of this process make files and write them, some at a time; of what they did comes back
    what the record of the site holds.
-2. What was put aside they can read as it was when they were made. Files that are made of something
-   that is not open in them are made here.
-3. What a copy did not finish, because it died, is written here anew.
+2. What a copy did not finish, because it died, is written here anew.
 """
 
 from __future__ import annotations
@@ -14,14 +12,12 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeAlias
 
-from coursebuild.effects.aside import AsideError, for_copies
-from coursebuild.effects.published import Entry, Published
-from coursebuild.effects.splicing import Spliced
-from coursebuild.results import KeptFile, OutputFile, Piece, SiteFile
+from coursebuild.effects.published import Entry
+from coursebuild.results import KeptFile, OutputFile, SiteFile
 
 _MANY = 128
 """Files for which copies of this process are worth their start."""
@@ -31,46 +27,38 @@ _PARTS = 4
 """Of its part of all that is left, a copy is asked for one of so many."""
 _MOST = 4
 """Copies: more would wait for the disk."""
-_Facts: TypeAlias = tuple[str, int, int, int, int, str]
+_Facts: TypeAlias = tuple[str, int, int, int, int]
 """What the record of the site holds of a file besides its key; see `Entry`."""
 
 
 @contextmanager
 def writing(
-    folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int, old: Published | None = None
+    folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int
 ) -> Iterator[Callable[[], dict[str, Entry]]]:
     """Gives what writes files with their keys into a folder; its own folders are there.
 
-    What that gives is the record of the files, by path. `old` is the site that is there, of whose
-    files pieces are taken.
+    What that gives is the record of the files, by path.
     """
     here = os.getpid()
 
-    def one(file: SiteFile, again: bool) -> _Facts | None:
+    def one(file: SiteFile, again: bool) -> _Facts:
         target = f"{folder}/{file.path}"
         if again:
             Path(target).unlink(missing_ok=True)
-        with nullcontext() if old is None else old.earlier(file.path) as earlier:
-            spliced = Spliced(earlier)
-            try:
-                digest = write_file(target, spliced.pieces(_pieces(file)))
-            except AsideError:
-                Path(target).unlink(missing_ok=True)
-                return None
+        digest = write_file(target, _pieces(file))
         status = os.lstat(target)
-        numbers = status.st_size, status.st_mtime_ns, status.st_ino, status.st_mode
-        return digest, *numbers, spliced.places
+        return digest, status.st_size, status.st_mtime_ns, status.st_ino, status.st_mode
 
     # What takes longest comes first, lest one copy be at it when the others have no more to do.
     order = sorted(range(len(files)), key=lambda index: not _is_long(files[index][0]))
     long = sum(_is_long(file) for file, _ in files)
 
-    def some(which: slice) -> list[_Facts | None]:
+    def some(which: slice) -> list[_Facts]:
         again = os.getpid() == here
         return [one(files[index][0], again) for index in order[which]]
 
     def alone() -> dict[str, Entry]:
-        return {file.path: _entry(key, one(file, False)) for file, key in files}
+        return {file.path: Entry(key, *one(file, False)) for file, key in files}
 
     if jobs == 1 or len(files) < _MANY:
         yield alone
@@ -80,17 +68,13 @@ def writing(
     if not can_fork():
         yield alone
         return
-    opened, begin = for_copies()
-    with Pool(some, min(jobs, _MOST), begin, opened) as pool:
+    with Pool(some, min(jobs, _MOST)) as pool:
 
         def together() -> dict[str, Entry]:
             shares = _shares(len(files), max(1, pool.count), long)
             answers, _ = pool.run((None, share) for share in shares)
             found = dict(zip(order, (facts for answer in answers for facts in answer), strict=True))
-            return {
-                file.path: _entry(key, found[index] or one(file, True))
-                for index, (file, key) in enumerate(files)
-            }
+            return {file.path: Entry(key, *found[index]) for index, (file, key) in enumerate(files)}
 
         yield together
 
@@ -112,12 +96,7 @@ def _is_long(file: SiteFile) -> bool:
     return isinstance(file, KeptFile) and file.pieces is not None
 
 
-def _entry(key: str, facts: _Facts | None) -> Entry:
-    assert facts is not None, "what was put aside here can be read here"
-    return Entry(key, *facts)
-
-
-def _pieces(file: SiteFile) -> Iterable[bytes | Piece]:
+def _pieces(file: SiteFile) -> Iterable[bytes]:
     """The bytes of a file, at once or one after the other."""
     if isinstance(file, OutputFile):
         return (file.data,)

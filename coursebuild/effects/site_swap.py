@@ -270,7 +270,7 @@ class _Site:
                 entries[path] = linked
             else:
                 new.append((file, key))
-        with writing(folder, new, jobs, self.old) as written, stage():
+        with writing(folder, new, jobs) as written, stage():
             entries |= written()
         made = [file.path for file, _ in new]
         if self.listed is not None:

@@ -6,7 +6,7 @@ Entry points: `Store.kept(kind, key, make)`; `Store.load` and `Store.keep`, its 
    together. It begins with the hash of its name and of what follows: one that was cut, flipped or
    put under another name is told of, removed, and made again instead of served.
 2. It is written beside its place and renamed there, so that processes at work at the same time see
-   whole entries only. Small ones, of which a course has many, lie in a few files (`packs`).
+   whole entries only.
 3. What is not there is looked for in the shared cache (`shared`), if there is one, and what is made
    is sent there.
 4. When a command ends, now and then, what was not used for longest is removed until the store is
@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING
 
 from coursebuild.effects.errors import reason
 from coursebuild.effects.locks import make_private_folder, try_lock
-from coursebuild.effects.packs import Packs
 from coursebuild.effects.prune import HASH, TEMPORARY, prune_if_due, remove_abandoned
 
 if TYPE_CHECKING:
@@ -84,7 +83,6 @@ class Store:
         self._tell: Callable[[str], None] = self._waiting.append
         self._written = 0
         self._tidied: set[Path] = set()
-        self._packs = Packs(self.folder, size)
 
     def listen(self, tell: Callable[[str], None]) -> None:
         """Be told what is wrong with the store, a line each; also what was found before."""
@@ -96,9 +94,7 @@ class Store:
         if self.shared is not None:
             self.shared.listen(self.say)
 
-    def kept(
-        self, kind: str, key: str, make: Callable[[], bytes], *, packed: bool = False
-    ) -> bytes:
+    def kept(self, kind: str, key: str, make: Callable[[], bytes], *, local: bool = False) -> bytes:
         """The result of this kind and key: from the store, or made now and kept."""
         found = self.load(kind, key)
         if found is not None:
@@ -108,7 +104,7 @@ class Store:
             before = self._load_here(f"{kind}/{key}")
             if before is not None and before != made:
                 self.say(f"{_short(f'{kind}/{key}')} was made again and is not what was kept")
-        self.keep(kind, key, made, packed=packed)
+        self.keep(kind, key, made, local=local)
         return made
 
     def load(self, kind: str, key: str) -> bytes | None:
@@ -121,25 +117,17 @@ class Store:
             found = self._load_shared(name)
         return found
 
-    def peek(self, kind: str, key: str, *, packed: bool = True) -> bytes | None:
-        """What this machine keeps under a key, though everything is to be made again.
+    def peek(self, kind: str, key: str) -> bytes | None:
+        """What this machine keeps under a key, though everything is to be made again."""
+        return self._load_here(f"{kind}/{key}")
 
-        What is never `packed` is not looked for in packs.
-        """
-        return self._load_here(f"{kind}/{key}", packed)
-
-    def keep(
-        self, kind: str, key: str, data: bytes, *, local: bool = False, packed: bool = False
-    ) -> None:
+    def keep(self, kind: str, key: str, data: bytes, *, local: bool = False) -> None:
         """Put a result into the store; one that cannot be written only costs time.
 
-        A `local` one says something of this machine, and is not shared. A `packed` one is one of
-        many, made in less time than a file; it is not shared either, nor is it one of a group.
+        A `local` one says something of this machine, or is made faster than fetched: it is not
+        shared.
         """
         name = f"{kind}/{key}"
-        if packed:
-            self._pack(name, _seal(name, data), data)
-            return
         entry = sealed(name, data)
         self._write_here(name, entry)
         if self.shared is not None and not local:
@@ -175,7 +163,6 @@ class Store:
         """Wait until the shared cache has what was made, and keep the store within its limit."""
         if self.shared is not None:
             self.shared.flush()
-        self._packs.close()
         if self._written:
             prune_if_due(self.folder, self.size, self._written)
             self._written = 0
@@ -191,14 +178,7 @@ class Store:
 
     # --- here
 
-    def _load_here(self, name: str, may_be_packed: bool = True) -> bytes | None:
-        packed = self._packs.get(name) if may_be_packed else None
-        if packed is not None:
-            data = unsealed(name, packed)
-            if data is None:
-                self._packs.lose(name)
-                self._say_damaged(name)
-            return data
+    def _load_here(self, name: str) -> bytes | None:
         path = f"{self.folder}/{name}"
         try:
             entry, changed = _read(path)
@@ -208,25 +188,10 @@ class Store:
         if data is None:
             with contextlib.suppress(OSError):
                 os.unlink(path)  # noqa: PTH108
-            self._say_damaged(name)
+            self.say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
             return None
         _note_use(path, changed)
         return data
-
-    def _say_damaged(self, name: str) -> None:
-        self.say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
-
-    def _pack(self, name: str, *entry: bytes) -> None:
-        try:
-            self._packs.put(name, *entry)
-        except OSError as error:
-            self._say_unwritable(error)
-            return
-        with self._lock:
-            self._written += sum(map(len, entry))
-
-    def _say_unwritable(self, error: OSError) -> None:
-        self.say(f"results cannot be kept in {FOLDER}: {reason(error)}")
 
     def _write_here(self, name: str, entry: bytes) -> None:
         path = self.folder / name
@@ -239,7 +204,7 @@ class Store:
                 _write(path, entry)
             self._tidy(path.parent)
         except OSError as error:
-            self._say_unwritable(error)
+            self.say(f"results cannot be kept in {FOLDER}: {reason(error)}")
             return
         with self._lock:
             self._written += len(entry)

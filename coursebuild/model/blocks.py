@@ -6,9 +6,8 @@ Entry points: the union `Block`, and `Document`.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
 from decimal import Decimal
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from coursebuild.model.inlines import Inline, Label
 from coursebuild.model.interactive import Lab, Quiz
@@ -325,52 +324,7 @@ class Document:
         default_factory=list, init=False, repr=False, compare=False, hash=False
     )
     """What `document_blocks` gives, once it was asked for."""
-    _load: Callable[[], Document] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """Gives the document with its blocks, where they are away."""
-    _code: Callable[[Script], Callable[[], Excerpt]] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """Says how to get the code of a script again, where blocks are away."""
-    _scripts: list[Script] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """What `document_scripts` gives, once it was asked for and blocks are away."""
     _kinds: frozenset[type] | None = field(
         default=None, init=False, repr=False, compare=False, hash=False
     )
     """What `document_has` knows, once it was asked."""
-
-    @property
-    def is_away(self) -> bool:
-        """Whether its blocks are fetched each time."""
-        return self._load is not None
-
-    @classmethod
-    def away(
-        cls,
-        source: Source,
-        load: Callable[[], Document],
-        code: Callable[[Script], Callable[[], Excerpt]] | None = None,
-    ) -> Document:
-        """A document whose blocks are fetched each time they are asked for.
-
-        They are equal each time, but need not be the same objects. `code` says how to get the code
-        of a script of it again, so that scripts can be held without it.
-        """
-        document = object.__new__(cls)
-        object.__setattr__(document, "source", source)
-        object.__setattr__(document, "_load", load)
-        object.__setattr__(document, "_code", code)
-        object.__setattr__(document, "_scripts", None)
-        object.__setattr__(document, "_kinds", None)
-        return document
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> object:
-            """Blocks that are away: their slots are empty."""
-            if name in ("blocks", "footnotes", "lexicon", "_all"):
-                return getattr(self._load(), name)
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

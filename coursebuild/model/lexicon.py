@@ -6,10 +6,7 @@ document's skeleton.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
-
-from coursebuild.values import dataclass, field
+from coursebuild.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +51,6 @@ class Equation:
     """Of one with a label: `3`."""
 
 
-Rows: TypeAlias = "tuple[tuple[SymbolUse, ...], tuple[tuple[str, str], ...], tuple[Equation, ...]]"
-"""The symbols, sections and equations of a `Lexicon`."""
-_ROWS = ("symbols", "sections", "equations")
-
-
 @dataclass(frozen=True, slots=True)
 class Lexicon:
     """See the module; everything in the order of the text."""
@@ -69,31 +61,6 @@ class Lexicon:
     sections: tuple[tuple[str, str], ...] = ()
     """Anchors and texts of the headings under which symbols stand first."""
     equations: tuple[Equation, ...] = ()
-    _load: Callable[[], Rows] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """Gives the rows, where they are away."""
-
-    @property
-    def rows(self) -> Rows:
-        """All but the terms: many, of which hardly any build needs one."""
-        return self._load() if self._load else (self.symbols, self.sections, self.equations)
-
-    @classmethod
-    def away(cls, terms: tuple[DefinedTerm, ...], load: Callable[[], Rows]) -> Lexicon:
-        """One whose rows are made each time they are asked for."""
-        lexicon = object.__new__(cls)
-        object.__setattr__(lexicon, "terms", terms)
-        object.__setattr__(lexicon, "_load", load)
-        return lexicon
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> object:
-            """Rows that are away: their slots are empty."""
-            if name in _ROWS:
-                return self._load()[_ROWS.index(name)]
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def numbers(self) -> dict[str, str]:

@@ -34,8 +34,6 @@ from coursebuild.model.interactive import (
     Quiz,
 )
 from coursebuild.patterns import pattern
-from coursebuild.source import Excerpt
-from coursebuild.values import replace
 
 _HOLDERS = frozenset((BlockQuote, Callout, ListBlock, Lab, Quiz, Recording))
 """Blocks that may have others in them."""
@@ -108,8 +106,6 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
 
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
-    if document._load is not None:
-        document = document._load()
     known = document._all
     if not known:
         known += walk_blocks(document.blocks)
@@ -145,15 +141,8 @@ def document_has(document: Document, *kinds: type[Block] | type[AnyQuestion]) ->
 
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
-    """The complete scripts of a document; where its blocks are away, so is the code of these."""
-    known = document._scripts
-    if known is None:
-        known = [block for block in document_blocks(document) if isinstance(block, Script)]
-        if document._code is not None:
-            source, code = document.source, document._code
-            known = [replace(s, code=Excerpt.away(source, code(s), s.code.digest)) for s in known]
-            object.__setattr__(document, "_scripts", known)
-    return tuple(known)
+    """The complete scripts of a document."""
+    return tuple(block for block in document_blocks(document) if isinstance(block, Script))
 
 
 def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.site_swap import check_out, publish
 from coursebuild.pipeline.check import no_lessons, scripts_ahead
@@ -101,10 +100,9 @@ def prepare(options: Options, progress: Progress, make: Make | None = None) -> I
 
     `make` puts other files together than those of the site.
     """
-    aside = Aside(options.store.folder)
     with (
         scripts_ahead(options) as run_all,
-        Documents(options.store, options.jobs, progress.stage, aside, _FOLLOWING) as documents,
+        Documents(options.store, options.jobs, progress.stage, _FOLLOWING) as documents,
     ):
         yield _prepared(options, progress, documents, make, run_all)
 
@@ -123,7 +121,6 @@ def _prepared(
         documents.ahead,
         documents.course_map,
         documents.declarations,
-        documents.aside,
         documents.check,
     )
     if loaded.course is None:

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.foresight import RunAll, early_server
 from coursebuild.effects.locks import project_lock
 from coursebuild.model import Course, Status
@@ -72,15 +71,13 @@ def _check(
     sensitivity: bool,
 ) -> Report:
     began = time.monotonic()
-    aside = Aside(options.store.folder)
-    with Documents(options.store, options.jobs, progress.stage, aside) as documents:
+    with Documents(options.store, options.jobs, progress.stage) as documents:
         loaded = load(
             options.root,
             documents.parse,
             documents.ahead,
             documents.course_map,
             documents.declarations,
-            documents.aside,
             documents.check,
         )
     course = loaded.course

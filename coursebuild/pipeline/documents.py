@@ -6,8 +6,6 @@ Entry point: `Documents`, a context manager, which gives outlines (`parse`) and 
 1. `ahead` is told which texts there are. The outlines of texts that were read before come from the
    store; the others are read, in copies of this process where there are many.
 2. `draw` draws pages: each in the copy that has read its document, which has it still.
-3. Where texts are put aside, so are the skeletons: what is held of a document is then its name, its
-   key and what is wrong in it.
 """
 
 from __future__ import annotations
@@ -20,18 +18,13 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.faces import course_face
-from coursebuild.pipeline.groups import groups
-from coursebuild.pipeline.outlines import Outline, Task, pack, parted, unpack, unpacked
+from coursebuild.pipeline.outlines import Outline, Task, pack, unpack, unpacked
 from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Drawn, Later, Read, Request
-from coursebuild.pipeline.shelf import Shelf
-from coursebuild.pipeline.together import Together
 from coursebuild.source import Source, key_of
-from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.pool import Pool
@@ -51,8 +44,6 @@ _CHECKED = "checked"
 """The kind of the entry that says in what nothing was wrong."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
-_FEW = 16
-"""Texts whose outlines are kept together, about."""
 _AT_ONCE = 256
 """Texts whose outlines are waited for before more are read."""
 
@@ -65,25 +56,18 @@ class Documents:
         store: Store,
         jobs: int,
         stage: Stage = _silent,
-        aside: Aside | None = None,
         following: Sequence[str] = (),
     ) -> None:
         """`jobs` copies of this process at most; `stage` is told when long work begins.
 
-        `aside` is where skeletons are put; without it they stay in memory. `following` are modules
-        that will be needed later, and are imported while copies read.
+        `following` are modules that will be needed later, and are imported while copies read.
         """
-        self.aside = aside
-        self._shelf = Shelf(aside) if aside is not None else None
-        self._together = Together(store, aside) if aside is not None else None
         self._store = store
         self._stage = stage
         self._jobs = jobs
         self._following = following
         self._tasks: dict[str, Task] = {}
         self._outlines: dict[str, Outline] = {}
-        self._put: dict[str, Kept] = {}
-        """Where outlines lie that may be kept together, by the keys of their texts."""
         self._face: tuple[Course, str | None] | None = None
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
@@ -120,21 +104,14 @@ class Documents:
 
         found = check_course(course)
         if face and not found:
-            self._store.keep(_CHECKED, key, face, packed=True)
+            self._store.keep(_CHECKED, key, face, local=True)
         return found
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the outlines of sources, of which it is said which are lessons."""
         tasks = [Task.of(source, callouts, lesson) for source, lesson in sources]
         self._tasks.update((task.source.path, task) for task in tasks)
-        together = self._together if len(tasks) >= _MANY else None
-        missing: list[Task] = []
-        changed: list[tuple[Task, ...]] = []
-        for group in groups(tasks, lambda task: task.source.path, _FEW):
-            known = together.get(group) if together is not None else {}
-            missing += [task for task in group if not self._has(task, known.get(task.key))]
-            if any(task.key not in known for task in group):
-                changed.append(group)
+        missing = [task for task in tasks if not self._has(task)]
         if len(missing) >= _MANY:
             from coursebuild.pipeline.reading import prepare_to_read
 
@@ -142,18 +119,11 @@ class Documents:
         rest = iter(missing)
         while at_once := tuple(islice(rest, _AT_ONCE)):
             self._read(at_once)
-        if together is not None:
-            for group in changed:
-                together.keep(group, self._put)
-        self._put.clear()
 
-    def _has(self, task: Task, known: Kept | None) -> bool:
-        """Whether there is the outline of a text: at a place, or in the store by itself."""
-        data = known() if known is not None else None
-        outline = None if data is None else self._opened(data, task, known)
-        if outline is None and not self._store.fresh:
-            data = self._store.peek(OUTLINES, task.key)
-            outline = None if data is None else self._opened(data, task)
+    def _has(self, task: Task) -> bool:
+        """Whether the outline of a text is in the store."""
+        data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
+        outline = None if data is None else unpacked(data, task.source)
         if outline is not None:
             self._outlines[task.source.path] = outline
         return outline is not None
@@ -161,7 +131,7 @@ class Documents:
     def _read(self, tasks: Sequence[Task]) -> None:
         answers, readers = self._work("reading lessons and pages", self._requests(tasks))
         for task, data, reader in zip(tasks, answers, readers, strict=True):
-            outline = self._opened(data, task)
+            outline = unpacked(data, task.source)
             assert outline is not None
             self._outlines[task.source.path] = outline
             if reader is not None:
@@ -212,7 +182,7 @@ class Documents:
         if isinstance(found, Parsed):
             return found
         parsed = parse(source)
-        self._store.keep(kind, key, pack(parsed), packed=True)
+        self._store.keep(kind, key, pack(parsed), local=True)
         return parsed
 
     def task(self, path: str) -> Task:
@@ -235,30 +205,6 @@ class Documents:
     def drawn(self, page: Draw) -> Drawn:
         """A page, its body, and what it is found by, drawn here and now."""
         return self._here().draw(page)
-
-    def _opened(self, data: bytes, task: Task, kept: Kept | None = None) -> Outline | None:
-        """An outline, put aside where that is wanted; `None` where the bytes are none.
-
-        `kept`: where they lie already.
-        """
-        if self._shelf is None:
-            return unpacked(data, task.source)
-        parts = parted(data, task.source)
-        if parts is None:
-            return None
-        outline, skeleton = parts
-        kept = self._shelf.aside.put(data) if kept is None else kept
-        if outline.lasting:
-            self._put[task.key] = kept
-        there = kept.part(len(data) - len(skeleton), len(skeleton))
-        return replace(outline, skeleton=self._shelf.document(task.source, there, self._again))
-
-    def _again(self, source: Source) -> Document:
-        """The skeleton of a document that was put aside, and cannot be used."""
-        task = self._tasks[source.path]
-        if task.source is not source:  # it was read again since
-            task = Task.of(source, task.callouts, task.lesson)
-        return self._here().outline(task).skeleton
 
     def _work(
         self, name: str, requests: Iterator[tuple[int | None, Request]]

@@ -41,7 +41,7 @@ class CompiledTemplates:
 
     def keep(self, name: str, data: bytes) -> None:
         """Keep the code of a template."""
-        self._store.keep(_TEMPLATES, self._key(name), data, packed=True)
+        self._store.keep(_TEMPLATES, self._key(name), data, local=True)
 
     def _key(self, name: str) -> str:
         return hashlib.sha256(f"{tool_digest()}\0{name}".encode()).hexdigest()
@@ -56,7 +56,7 @@ def words_for(store: Store, texts: tuple[tuple[str, str], ...], language: str) -
     from coursebuild.render.assets import strings_for
 
     words = strings_for(texts, language)
-    store.keep(_WORDS, key, json.dumps(dict(words.entries)).encode(), packed=True)
+    store.keep(_WORDS, key, json.dumps(dict(words.entries)).encode(), local=True)
     return words
 
 
@@ -138,4 +138,4 @@ class KeptBindings:
         """Keep what was found."""
         if self._now != self._before:
             data = " ".join(sorted(self._now)).encode("ascii")
-            self._store.keep(_BINDINGS, self._key, data, packed=True)
+            self._store.keep(_BINDINGS, self._key, data, local=True)

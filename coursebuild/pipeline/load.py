@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import Course, Declarations, Document, Lesson, Level, Page, Status
@@ -65,11 +64,10 @@ def load(
     ahead: Ahead | None = None,
     course_map: ParseMap | None = None,
     declarations: ParseDeclarations | None = None,
-    aside: Aside | None = None,
     check: Check | None = None,
 ) -> Loaded:
-    """Read and parse everything below `root`; texts are put aside, where it is said where."""
-    read = read_course(root, aside)
+    """Read and parse everything below `root`."""
+    read = read_course(root)
     if parse is None:
         from coursebuild.syntax.document import parse_document
 
@@ -83,7 +81,7 @@ def load(
 
         check = check_course
     found = list(read.diagnostics)
-    loader = _Loader(root, read.value, found, parse, ahead, course_map, aside, check)
+    loader = _Loader(root, read.value, found, parse, ahead, course_map, check)
     declared = loader.declared(declarations)
     course = loader.course(declared)
     return Loaded(course, tuple(loader.found))
@@ -100,14 +98,12 @@ class _Loader:
         parse: Parse,
         ahead: Ahead | None,
         course_map: ParseMap,
-        aside: Aside | None,
         check: Check,
     ) -> None:
         self.root = root
         self.parse = parse
         self.ahead = ahead
         self.course_map = course_map
-        self.aside = aside
         self.check = check
         self.files = files
         self.found = found
@@ -242,7 +238,7 @@ class _Loader:
         paths = (page.path for page in pages)
         away = [path for path in paths if path not in self.files.unreadable]
         away = [p for p in away if p not in self.sources and (self.root / p).exists()]
-        read = read_sources(self.root, away, self.aside)
+        read = read_sources(self.root, away)
         self.found += read.diagnostics
         if read.value:
             self._announce((), read.value)

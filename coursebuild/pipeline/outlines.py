@@ -1,7 +1,7 @@
 """What is known of a document without its text, kept from build to build.
 
-Entry points: `Task`, a text; `Outline`; `packed` and `unpacked`, an outline as bytes, and `parted`,
-whose skeleton stays bytes; `pack` and `unpack`, any value whose places are in one source.
+Entry points: `Task`, a text; `Outline`; `packed` and `unpacked`, an outline as bytes; `pack` and
+`unpack`, any value whose places are in one source.
 
 An outline as bytes holds no text of the document but that of its scripts and the like: it is put
 together with the source again, which whoever unpacks it has read anyway.
@@ -10,20 +10,18 @@ together with the source again, which whoever unpacks it has read anyway.
 from __future__ import annotations
 
 import copyreg
-import functools
 import hashlib
 import io
 import pickle
 import struct
-import sys
 from collections.abc import Iterable
 from typing import Any
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.tool import engine_digest, tool_digest
-from coursebuild.model import DefinedTerm, Document, Lexicon
+from coursebuild.model import Document
 from coursebuild.source import Source
-from coursebuild.values import dataclass, replace
+from coursebuild.values import dataclass
 
 _LENGTH = struct.Struct("<I")
 
@@ -72,20 +70,7 @@ def _source() -> Source:
     raise TypeError("a packed value is unpacked with its source")
 
 
-def _lexicon(terms: tuple[DefinedTerm, ...], rows: bytes) -> Lexicon:
-    """A lexicon whose rows stay bytes until somebody asks for them."""
-    return Lexicon.away(terms, functools.partial(pickle.loads, rows))
-
-
-def _reduced(lexicon: Lexicon) -> tuple[Any, ...]:
-    return _lexicon, (lexicon.terms, pickle.dumps(lexicon.rows, pickle.HIGHEST_PROTOCOL))
-
-
-_LEFT_OUT = {
-    **copyreg.dispatch_table,
-    Source: lambda source: (_source, ()),
-    Lexicon: _reduced,
-}
+_LEFT_OUT = {**copyreg.dispatch_table, Source: lambda source: (_source, ())}
 
 
 class _Packer(pickle.Pickler):
@@ -134,34 +119,13 @@ def unpack(data: bytes, source: Source) -> Any:
 
 def packed(outline: Outline) -> bytes:
     """An outline as bytes."""
-    head = pack((outline.diagnostics, outline.imports, outline.lasting, outline.face))
-    return _LENGTH.pack(len(head)) + head + pack(outline.skeleton)
-
-
-def parted(data: bytes, source: Source) -> tuple[Outline, bytes] | None:
-    """The outline of a source without blocks, and its skeleton as `pack` made it.
-
-    `None` where the bytes are none.
-    """
-    if len(data) < _LENGTH.size:
-        return None
-    end = _LENGTH.size + _LENGTH.unpack_from(data)[0]
-    head = unpack(data[_LENGTH.size : end], source)
-    if not isinstance(head, tuple) or len(head) != 4:
-        return None
-    diagnostics, imports, lasting, face = head
-    # The names of modules are the same few in all lessons.
-    imports = tuple((path, tuple(map(sys.intern, modules))) for path, modules in imports)
-    return Outline(Document(source, (), ()), diagnostics, imports, lasting, face), data[end:]
+    return pack(outline)
 
 
 def unpacked(data: bytes, source: Source) -> Outline | None:
     """The outline of a source; `None` where the bytes are none."""
-    parts = parted(data, source)
-    if parts is None:
-        return None
-    skeleton = unpack(parts[1], source)
-    return replace(parts[0], skeleton=skeleton) if isinstance(skeleton, Document) else None
+    found = unpack(data, source)
+    return found if isinstance(found, Outline) else None
 
 
 def all_imports(outlines: Iterable[Outline]) -> dict[str, frozenset[str]]:

@@ -19,7 +19,6 @@ from typing import Literal, TypeAlias, assert_never
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.archives import check_archive, write_archive
-from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.read import read_bytes
@@ -122,14 +121,13 @@ class _Asked:
 
 
 class _Items:
-    """The items of all quizzes: bytes of each document, put aside until they are written."""
+    """The items of all quizzes: made bytes of each document."""
 
     def __init__(self, library: Library, documents: Documents, options: Options) -> None:
         self._library = library
         self._documents = documents
         self._options = options
-        self._aside = documents.aside or Aside(options.store.folder)
-        self._last: tuple[Kept, tuple[MadeQuiz, ...]] | None = None
+        self._last: tuple[bytes, tuple[MadeQuiz, ...]] | None = None
         self.diagnostics: list[Diagnostic] = []
 
     def files(self) -> Iterator[SiteFile]:
@@ -140,7 +138,7 @@ class _Items:
         made = self._made(documents)
         for asked in documents:
             kept = made[asked.key]
-            for quiz in self._unpacked(kept(), asked.source):
+            for quiz in self._unpacked(kept, asked.source):
                 self.diagnostics += (_reduced(loss) for loss in quiz.losses)
                 if quiz.items:
                     yield from (self._later(asked, kept, path) for path in qti.quiz_paths(quiz))
@@ -151,12 +149,12 @@ class _Items:
             yield qti.style_file()
             yield qti.manifest(self._library.course, listed)
 
-    def _later(self, asked: _Asked, kept: Kept, path: str) -> KeptFile:
+    def _later(self, asked: _Asked, kept: bytes, path: str) -> KeptFile:
         return KeptFile(path, asked.key, functools.partial(self._file, asked.source, kept, path))
 
-    def _file(self, source: Source, kept: Kept, path: str) -> bytes:
+    def _file(self, source: Source, kept: bytes, path: str) -> bytes:
         if self._last is None or self._last[0] is not kept:
-            self._last = kept, self._unpacked(kept(), source)
+            self._last = kept, self._unpacked(kept, source)
         return qti.quiz_file(self._last[1], path)
 
     def _pictures(self, found: set[str]) -> Iterator[SiteFile]:
@@ -180,20 +178,20 @@ class _Items:
                 key = page_key(library.course, self._documents, document.source.path, sheet)
                 yield _Asked(document.source, key, page)
 
-    def _made(self, asked: list[_Asked]) -> dict[str, Kept]:
+    def _made(self, asked: list[_Asked]) -> dict[str, bytes]:
         """The items of documents, kept or made now, by the keys of these."""
-        store, made, new = self._options.store, dict[str, Kept](), list[_Asked]()
+        store, made, new = self._options.store, dict[str, bytes](), list[_Asked]()
         for one in asked:
             data = None if store.fresh else store.peek(ITEMS, one.key)
             if data is None or not isinstance(unpack(data, one.source), tuple):
                 new.append(one)
             else:
-                made[one.key] = self._aside.put(data)
+                made[one.key] = data
         for start in range(0, len(new), _AT_ONCE):
             some = new[start : start + _AT_ONCE]
             later = [Later(a.source.path, functools.partial(self._request, a)) for a in some]
             for one, data in zip(some, self._documents.draw(later), strict=True):
-                made[one.key] = self._aside.put(data)
+                made[one.key] = data
         return made
 
     def _request(self, asked: _Asked) -> Ask:

@@ -49,7 +49,7 @@ class PageKeys:
         if self._around is not None and (self._changed or self._before):
             rows = (f"{key} {row}" for row, key in self._now.items())
             data = "\n".join((self._around, *rows)).encode()
-            self._store.keep(_KIND, self._name, data, packed=True)
+            self._store.keep(_KIND, self._name, data, local=True)
 
     def _load(self) -> dict[str, str]:
         data = None if self._store.fresh else self._store.peek(_KIND, self._name)

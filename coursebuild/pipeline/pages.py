@@ -5,10 +5,9 @@ Entry point: `Pages`.
 1. Every page has a sheet, all that it shows of the course, and a key: a hash of its sheet, of its
    document's text, and of the tool.
    Where nothing has changed of what sheets are made of, the key is known without (`page_keys`).
-2. What the records of some pages say together is kept (`page_facts`). Where one of the pages has
-   changed, their records come from the store; a page that has none is drawn.
-3. From that alone it is known whether all links lead somewhere, and which characters and
-   styles the pages use.
+2. The records of pages come from the store; a page that has none is drawn.
+3. From records alone it is known whether all links lead somewhere, and which characters and
+   styles the pages use (`page_facts`).
 4. A body is fetched, and framed, when its file is written.
 
 Of a page no more is held than its key and how its sheet is made: a course may have any number.
@@ -20,17 +19,16 @@ import functools
 import hashlib
 import itertools
 import operator
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from coursebuild.effects.aside import Aside, Kept
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.faces import results_face
 from coursebuild.pipeline.outlines import Task
-from coursebuild.pipeline.page_facts import Facts, Gathered, Known, groups, pack, unpack
+from coursebuild.pipeline.page_facts import Facts
 from coursebuild.pipeline.page_keys import PageKeys
 from coursebuild.pipeline.records import (
     part,
@@ -56,9 +54,6 @@ if TYPE_CHECKING:
     from coursebuild.render.exports.page import Beside
     from coursebuild.render.exports.parts import LessonPart, OpenChapter
 
-_SITE = "site"
-"""The kind of the entries that say what the records of some pages say together."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
@@ -78,7 +73,11 @@ class _Wanted:
 @dataclass(frozen=True, slots=True)
 class _Page:
     wanted: _Wanted
-    known: Known
+    indexed: bool
+    entry: Entry | None
+    """Where it is searched."""
+    ids: tuple[str, ...]
+    """Its anchors."""
 
 
 class Pages:
@@ -88,12 +87,11 @@ class Pages:
         self._library = library
         self._documents = documents
         self._store = store
-        self._aside = documents.aside or Aside(store.folder)
         self._facts = Facts()
         self._by_path: dict[str, _Wanted] = {}
         self._beside: tuple[str, Beside] | None = None
         """What the page that was asked for last gives: two files are made of it."""
-        self._sheets: dict[str, Kept] = {}
+        self._sheets: dict[str, bytes] = {}
         """Of the pages without a known key, by site path, until these are drawn."""
         keys = PageKeys(store, self._around())
         self._pages = self._made(page_list(library), keys)
@@ -108,12 +106,12 @@ class Pages:
     @property
     def indexed(self) -> Iterator[str]:
         """Site paths of the pages that search engines should list."""
-        return (page.wanted.path for page in self._pages if page.known.indexed)
+        return (page.wanted.path for page in self._pages if page.indexed)
 
     @property
     def searched(self) -> tuple[Entry, ...]:
         """The pages that are searched, in order."""
-        entries = (page.known.entry for page in self._pages)
+        entries = (page.entry for page in self._pages)
         return tuple(entry for entry in entries if entry is not None)
 
     def found_by(self, path: str) -> tuple[bytes, bytes]:
@@ -134,7 +132,7 @@ class Pages:
             return False
         for path, led in itertools.groupby(sorted(self._facts.anchors), operator.itemgetter(0)):
             if path in pages:
-                ids = pages[path].known.ids
+                ids = frozenset(pages[path].ids)
                 if not all(has(ids, anchor) for _, anchor in led):
                     return False
         return True
@@ -216,15 +214,16 @@ class Pages:
             data = sheet_bytes(sheet)
             key = page_key(self._library.course, self._documents, path, data)
             keys.add(page.path, task, key)
-            self._sheets[page.path] = self._aside.put(data)
+            self._sheets[page.path] = data
         return _Wanted(page, key, path)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
         path = wanted.document
         task = self._documents.task(path) if path is not None else None
-        kept = self._sheets.pop(wanted.path, None)
-        sheet = sheet_bytes(wanted.page.sheet(self._library)) if kept is None else kept()
+        sheet = self._sheets.pop(wanted.path, None)
+        if sheet is None:
+            sheet = sheet_bytes(wanted.page.sheet(self._library))
         return Draw(sheet, task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
@@ -250,75 +249,45 @@ class Pages:
 
     def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> list[_Page]:
         """The pages with what their records say; they are drawn where they have none."""
-        chunks: list[tuple[tuple[_Wanted, ...], tuple[_Page, ...] | None]] = []
-        packed: dict[str, bytes] = {}
+        pages: list[_Wanted] = []
+        records: dict[str, PageRecord] = {}
         new: list[_Wanted] = []
 
-        def is_new(page: _Wanted) -> bool:
-            packed[page.key] = self._known(page.key)
-            if unpack_record(packed[page.key]) is not None:
-                return False
-            new.append(page)
-            return True
-
         def missing() -> Iterator[Later]:  # sheets are made while pages are drawn
-            for group in groups(entries, lambda page: page.path):
-                pages: list[_Wanted] = []
-                whole = True
-                for entry in group:
-                    page = self._wanted(entry, keys)
-                    pages.append(page)
-                    if page.path in self._sheets and is_new(page):
-                        whole = False
-                        yield self._later(page)
-                chunk = tuple(pages)
-                known = self._gathered(chunk) if whole else None
-                chunks.append((chunk, known))
-                if known is None:
-                    left = (page for page in chunk if page.key not in packed)
-                    yield from (self._later(page) for page in left if is_new(page))
+            for entry in entries:
+                page = self._wanted(entry, keys)
+                pages.append(page)
+                record = self._known(page.key)
+                if record is None:
+                    new.append(page)
+                    yield self._later(page)
+                else:
+                    self._sheets.pop(page.path, None)
+                    records[page.path] = record
 
         for page, data in zip(new, self._documents.draw(missing()), strict=True):
-            packed[page.key] = data
+            record = unpack_record(data)
+            assert record is not None
+            records[page.path] = record
         self.drawn = tuple(page.path for page in new)
         """Site paths of the pages that were drawn just now."""
-        made: list[_Page] = []
-        for chunk, known in chunks:
-            made += self._gather(chunk, packed) if known is None else known
-        return made
+        return [self._noted(page, records[page.path]) for page in pages]
 
     def _later(self, page: _Wanted) -> Later:
         return Later(page.document, functools.partial(self._request, page))
 
-    def _gathered(self, pages: tuple[_Wanted, ...]) -> tuple[_Page, ...] | None:
-        """These pages, where an earlier build has gathered what their records say."""
-        data = None if self._store.fresh else self._store.peek(_SITE, self._name(pages))
-        gathered = unpack(data, len(pages))
-        return None if gathered is None else self._noted(pages, gathered)
+    def _noted(self, page: _Wanted, record: PageRecord) -> _Page:
+        """A page, now that it is known what it says."""
+        self._facts.add(record)
+        entry, draft = None, record.draft
+        if record.search is not None:
+            entry = Entry(draft.path, draft.kind, draft.title, *record.search)
+        return _Page(page, draft.indexed, entry, record.ids)
 
-    def _gather(self, pages: tuple[_Wanted, ...], packed: Mapping[str, bytes]) -> tuple[_Page, ...]:
-        """These pages, by their records, for the next build as well."""
-        gathered = Gathered.of([self._record(packed[page.key]) for page in pages])
-        self._store.keep(_SITE, self._name(pages), pack(gathered), packed=True)
-        return self._noted(pages, gathered)
-
-    def _noted(self, pages: tuple[_Wanted, ...], gathered: Gathered) -> tuple[_Page, ...]:
-        """These pages, now that it is known what they say."""
-        self._facts.update(gathered)
-        return tuple(map(_Page, pages, gathered.known(self._aside)))
-
-    def _known(self, key: str) -> bytes:
-        """A packed record; empty where there is none."""
+    def _known(self, key: str) -> PageRecord | None:
+        """The record of a page that was drawn before."""
         kept = None if self._store.fresh else self._store.peek(PAGES, key)
-        return b"" if kept is None else part(kept)[0]
-
-    def _name(self, pages: tuple[_Wanted, ...]) -> str:
-        return key_of("records of pages", tool_digest(), *(page.key for page in pages))
-
-    def _record(self, packed: bytes) -> PageRecord:
-        record = unpack_record(packed)
-        assert record is not None
-        return record
+        return None if kept is None else unpack_record(part(kept)[0])
 
     def _framed(self, page: _Wanted, frames: Frames) -> bytes:
         data = self._store.peek(PAGES, page.key)

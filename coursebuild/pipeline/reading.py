@@ -4,9 +4,8 @@ Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
 
 1. `Read`: the text is parsed and its formulas are typeset; the outline is kept in the store.
 2. `Draw`: a page is drawn from its sheet and its document; body and record are kept in the store.
-3. The document and its formulas stay for the drawing; where there is no room for more of them, the
-   oldest are put aside. Those that an earlier build has read, or another process, are parsed again,
-   and their MathML comes from the store.
+3. The document and its formulas stay for the drawing. Those that an earlier build has read, or
+   another process, are parsed again, and their MathML comes from the store.
 
 What draws is imported when there is something to draw.
 """
@@ -17,7 +16,6 @@ import gc
 import hashlib
 import importlib
 import json
-from collections import OrderedDict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self, assert_never
 
@@ -25,7 +23,6 @@ from markupsafe import Markup
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.aside import Aside, AsideError, Kept
 from coursebuild.effects.resources import template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import engine_digest, tool_digest
@@ -34,7 +31,7 @@ from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.faces import outline_face
 from coursebuild.pipeline.kept import CompiledTemplates, words_for
-from coursebuild.pipeline.outlines import Outline, Task, pack, packed, unpack
+from coursebuild.pipeline.outlines import Outline, Task, pack, packed
 from coursebuild.pipeline.records import join, pack_record, pack_value
 from coursebuild.pipeline.requests import (
     EXPORTS,
@@ -56,7 +53,7 @@ from coursebuild.render.record import record
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
-from coursebuild.source import Source, key_of
+from coursebuild.source import key_of
 from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
@@ -64,10 +61,6 @@ if TYPE_CHECKING:
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
-ROOM = 6 << 20
-"""Bytes that documents may take which wait to be drawn, about."""
-_COST = 9
-"""Bytes that a parsed document takes for each character of its text, about, with its MathML."""
 _FORMULAS = 1024
 """Formulas that are remembered."""
 _COLLECT = 512
@@ -106,7 +99,7 @@ def prepare_to_read(sample: Task) -> None:
     from coursebuild.syntax.document import parse_document
 
     # Much is made only when it is needed for the first time.
-    read = parse_document(sample.source.present(), sample.callouts, lesson=sample.lesson).value
+    read = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
     mark_now("python", 'f"{x}"\n')
     imports("x\n")
     if document_formulas(read):
@@ -121,11 +114,8 @@ class Reader:
     def __init__(self, store: Store) -> None:
         self._store = store
         self._engine: MathEngine | None = None
-        self._waiting: OrderedDict[str, _Whole] = OrderedDict()
-        self._room = ROOM
-        self._aside: Aside | None = None
-        self._put: dict[str, Kept] = {}
-        """Documents that wait as well, by the key of their text."""
+        self._waiting: dict[str, _Whole] = {}
+        """Documents that were read and not drawn yet, by the key of their text."""
         self._read_texts = 0
         self._formulas: dict[Formula, str | MathError] = {}
         self._tools: dict[str, Tools] = {}
@@ -189,8 +179,8 @@ class Reader:
         outline = self._outline(whole)
         data = packed(outline)
         if outline.lasting:  # that a formula took too long may not happen again
-            self._store.keep(OUTLINES, task.key, data, packed=True)
-        self._wait(task.key, whole)
+            self._store.keep(OUTLINES, task.key, data, local=True)
+        self._waiting[task.key] = whole
         self._read_texts += 1
         if self._read_texts % _RENEW == 0:
             self._rest()
@@ -202,39 +192,12 @@ class Reader:
         """A document with its formulas."""
         known = self._waiting.pop(task.key, None)
         if known is not None:
-            self._room += _COST * len(known.document.source.text)
             return known
-        source = task.source.present()
-        put = self._fetched(task.key, source)
-        if put is not None:
-            return put
         from coursebuild.syntax.document import parse_document
 
-        parsed = parse_document(source, task.callouts, lesson=task.lesson)
+        parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
         formulas = document_formulas(parsed.value)
         return _Whole(parsed.value, parsed.diagnostics, self._typeset(formulas))
-
-    def _wait(self, key: str, whole: _Whole) -> None:
-        """Let a document wait for its page to be drawn; the oldest makes room."""
-        self._waiting[key] = whole
-        self._room -= _COST * len(whole.document.source.text)
-        while self._room < 0 and self._waiting:
-            name, oldest = self._waiting.popitem(last=False)
-            self._room += _COST * len(oldest.document.source.text)
-            if self._aside is None or not self._aside.here:
-                self._aside = Aside(self._store.folder)
-            self._put[name] = self._aside.put(pack(oldest))
-
-    def _fetched(self, key: str, source: Source) -> _Whole | None:
-        """A document that was put aside here."""
-        put = self._put.pop(key, None)
-        if put is None:
-            return None
-        try:
-            found = unpack(put(), source)
-        except AsideError:  # by the process that this one is a copy of
-            return None
-        return found if isinstance(found, _Whole) else None
 
     def _typeset(self, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
         """MathML, from the store where these formulas were typeset together before."""
@@ -256,7 +219,7 @@ class Reader:
             fresh = iter(self._started().typeset(new))
             made = [next(fresh) if found is None else found for found in known]
             if all(isinstance(one, str) for one in made):
-                self._store.keep(_MATHML, key, json.dumps(made).encode(), packed=True)
+                self._store.keep(_MATHML, key, json.dumps(made).encode(), local=True)
         while len(self._formulas) > _FORMULAS:
             del self._formulas[next(iter(self._formulas))]
         found = dict(zip(formulas, made, strict=True))
@@ -298,12 +261,12 @@ class Reader:
         packed_record = pack_record(drawn.record)
         data = join(packed_record, drawn.body, drawn.searched)
         made = drawn.exports
-        self._store.keep(EXPORTS, request.key, pack_value(made.beside), packed=True)
+        self._store.keep(EXPORTS, request.key, pack_value(made.beside), local=True)
         if made.part is not None:
-            self._store.keep(PARTS, request.key, pack_value(made.part.chapter), packed=True)
-            self._store.keep(SECTIONS, request.key, pack_value(made.part.section), packed=True)
+            self._store.keep(PARTS, request.key, pack_value(made.part.chapter), local=True)
+            self._store.keep(SECTIONS, request.key, pack_value(made.part.section), local=True)
         # At last, since a page that is there is not drawn again.
-        self._store.keep(PAGES, request.key, data, packed=True)
+        self._store.keep(PAGES, request.key, data, local=True)
         return packed_record
 
     def _ask(self, request: Draw) -> bytes:
@@ -316,7 +279,7 @@ class Reader:
         language, base_url = request.language, request.base_url
         made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
         data = pack(made)
-        self._store.keep(ITEMS, request.key, data, packed=True)
+        self._store.keep(ITEMS, request.key, data, local=True)
         return data
 
     def _tools_for(self, language: str) -> Tools:
@@ -347,5 +310,5 @@ class _Marks:
         if found is not None:
             return tuple(map(Markup, json.loads(found)))
         lines = mark_now(language, code)
-        self._store.keep(_CODE, key, json.dumps(lines).encode(), packed=True)
+        self._store.keep(_CODE, key, json.dumps(lines).encode(), local=True)
         return lines

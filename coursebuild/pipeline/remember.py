@@ -164,7 +164,7 @@ class Memory:
         """The result kept on this machine that holds now."""
         group = group_key(inputs)
         for key in self.store.group(_RESULTS, group):
-            record = self._read(self.store.peek(_RESULTS, key, packed=False), inputs)
+            record = self._read(self.store.peek(_RESULTS, key), inputs)
             if record is not None and self._holds(record):
                 self._note(record, key)
                 return record
@@ -173,12 +173,12 @@ class Memory:
     def results(self, inputs: Inputs) -> list[Record]:
         """All results kept on this machine for these inputs, newest first."""
         keys = self.store.group(_RESULTS, group_key(inputs))
-        records = (self._read(self.store.peek(_RESULTS, key, packed=False), inputs) for key in keys)
+        records = (self._read(self.store.peek(_RESULTS, key), inputs) for key in keys)
         return [record for record in records if record is not None]
 
     def last(self, path: str) -> Record | None:
         """What became of the last run of a script, without what it printed."""
-        data = self.store.peek(_LAST, _last_key(path), packed=False)
+        data = self.store.peek(_LAST, _last_key(path))
         record = None if data is None else from_bytes(data.partition(b"\n")[2])
         return record if record is not None and record.inputs.path == path else None
 
@@ -309,7 +309,7 @@ class Memory:
             return
         key = _last_key(record.inputs.path)
         head = f"{result}\n".encode()
-        before = self.store.peek(_LAST, key, packed=False)
+        before = self.store.peek(_LAST, key)
         if result and before is not None and before.startswith(head):
             return
         bare = Record(

@@ -19,7 +19,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import kept_distributions, library_files
 from coursebuild.effects.prepared import prepared_copy
@@ -179,15 +178,15 @@ class _Site:
         return names, {file.path: file.data for file in (*made, *copies)}
 
     def _copy(self, data: _Data, path: str, suffix: str) -> bytes:
-        # In a pack: a copy of this process does not live until a shared cache has it.
-        keep = functools.partial(self._kept_copy, packed=True)
+        # Local: a copy of this process does not live until a shared cache has it.
+        keep = functools.partial(self._kept_copy, local=True)
         return kept_copy(data.file(path), suffix, keep)
 
     def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:
         return compressed_files(files, self._kept_copy)
 
-    def _kept_copy(self, key: str, make: Callable[[], bytes], *, packed: bool = False) -> bytes:
-        return prepared_copy(key) or self.store.kept("compressed", key, make, packed=packed)
+    def _kept_copy(self, key: str, make: Callable[[], bytes], *, local: bool = False) -> bytes:
+        return prepared_copy(key) or self.store.kept("compressed", key, make, local=local)
 
     def _labs(self) -> list[SiteFile]:
         files = self.library.labs.files
@@ -199,7 +198,7 @@ class _Site:
             search_words(self.library),
             lambda path: pages.found_by(path)[0],
             lambda path: pages.found_by(path)[1],
-            _Cells(self.store, self.documents.aside or Aside(self.store.folder)),
+            _Cells(self.store),
         )
         return files.files()
 
@@ -276,7 +275,7 @@ class _Site:
             imports=self._imports,
             declarations=pages.facts.declarations,
             taken=taken,
-            keep=functools.partial(self.store.kept, _CHAPTERS, packed=True),
+            keep=functools.partial(self.store.kept, _CHAPTERS, local=True),
             note=self._note(),
         )
         return Exports(self.library, pages, around).files(names)
@@ -289,7 +288,7 @@ class _Site:
         def get() -> bytes | None:
             return None if store.fresh else store.peek(_NOTED, name)
 
-        return Note(get, functools.partial(store.keep, _NOTED, name, packed=True))
+        return Note(get, functools.partial(store.keep, _NOTED, name, local=True))
 
 
 class _Data:
@@ -325,8 +324,8 @@ class _Data:
     def _made(self) -> tuple[Names, tuple[str, ...]]:
         names, self._files = self._make()
         listing = names, tuple(self._files)
-        self._store.keep(_SHARED_DATA, self.key, pickle.dumps(self._files), packed=True)
-        self._store.keep(_SHARED, self.key, pickle.dumps(listing), packed=True)
+        self._store.keep(_SHARED_DATA, self.key, pickle.dumps(self._files), local=True)
+        self._store.keep(_SHARED, self.key, pickle.dumps(listing), local=True)
         return listing
 
     def _load(self, kind: str) -> Any:
@@ -338,20 +337,18 @@ class _Data:
 
 
 class _Cells:
-    """Parts of the index of the search, in the store; those that are made now are put aside too."""
+    """Parts of the index of the search, in the store."""
 
-    def __init__(self, store: Store, aside: Aside) -> None:
+    def __init__(self, store: Store) -> None:
         self._store = store
-        self._aside = aside
 
     def get(self, key: str) -> bytes | None:
         """What an earlier build made."""
         return None if self._store.fresh else self._store.peek(_CELLS, key)
 
-    def put(self, key: str, data: bytes) -> Callable[[], bytes]:
-        """Keep it for the next build, and for this one."""
-        self._store.keep(_CELLS, key, data, packed=True)
-        return self._aside.put(data)
+    def put(self, key: str, data: bytes) -> None:
+        """Keep it for the next build."""
+        self._store.keep(_CELLS, key, data, local=True)
 
 
 class _Imports:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Course, Document, Lesson, Page, Script, document_scripts
@@ -33,22 +32,8 @@ class Extraction:
 
     @classmethod
     def of(cls, script: Script, owner: str) -> Extraction:
-        """That of a script; where its code is away, the text is too."""
-        if not script.code.is_away:
-            return cls(script.path, _text(script), script, owner)
-        extraction = object.__new__(cls)
-        object.__setattr__(extraction, "path", script.path)
-        object.__setattr__(extraction, "script", script)
-        object.__setattr__(extraction, "owner", owner)
-        return extraction
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> str:
-            """The text that is away: its slot is empty."""
-            if name == "text":
-                return _text(self.script)
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        """That of a script."""
+        return cls(script.path, _text(script), script, owner)
 
     @property
     def data(self) -> bytes:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.cli import main
-from coursebuild.effects.pack_files import Pack, open_pack
+from coursebuild.effects.prune import HASH
 from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]
@@ -113,17 +113,15 @@ class Folder:
         )
 
     def spoil(self) -> int:
-        """Damage the end of every packed entry of the store; gives how many there are."""
-        count = 0
-        for path in (self.root / ".coursebuild" / "packs").iterdir():
-            pack = Pack(str(path), 0.0)
-            open_pack(pack)
-            with path.open("r+b") as file:
-                for _, start, size in pack:
-                    file.seek(start + size - 7)
-                    file.write(b"garbage")
-                    count += 1
-        return count
+        """Damage the end of every entry of the store; gives how many there are."""
+        entries = [
+            path
+            for path in (self.root / ".coursebuild").glob("*/*")
+            if path.is_file() and not path.parent.is_symlink() and HASH.fullmatch(path.name)
+        ]
+        for path in entries:
+            path.write_bytes(path.read_bytes()[:-7] + b"garbage")
+        return len(entries)
 
     # --- commands
 

@@ -8,13 +8,11 @@ Source: PKWARE, APPNOTE 6.3.
 
 from __future__ import annotations
 
-import functools
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
-from coursebuild.results import Piece
 from coursebuild.values import dataclass
 
 
@@ -24,8 +22,6 @@ class File:
 
     path: str
     make: Callable[[], bytes]
-    key: str = ""
-    """A hash of all that its bytes depend on, where that is known."""
 
 
 _LOCAL = struct.Struct("<4s5H3L2H")
@@ -42,22 +38,13 @@ Deflated: TypeAlias = tuple[int, int, bytes]
 """Checksum and size of a file, and its compressed bytes."""
 
 
-def packed(
-    files: Iterable[File], compressed: Callable[[File], Deflated]
-) -> Iterator[bytes | Piece]:
-    """The archive, a file at a time: those whose key is known are pieces."""
-    seen: list[bytes] = []
+def packed(files: Iterable[File], compressed: Callable[[File], Deflated]) -> Iterator[bytes]:
+    """The archive, a file at a time."""
     listing: list[bytes] = []
     at = 0
     for file in files:
-        entry = functools.partial(_entry, file, compressed)
-        if file.key:
-            yield Piece(file.key, entry, seen.append)
-        else:
-            data = entry()
-            seen.append(data)
-            yield data
-        data = seen.pop()
+        data = _entry(file, compressed)
+        yield data
         _, _, *numbers, _ = _LOCAL.unpack_from(data)
         name = file.path.encode()
         listing.append(_CENTRAL.pack(b"PK\1\2", 20, 20, *numbers, 0, 0, 0, 0, 0, at) + name)

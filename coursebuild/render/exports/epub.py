@@ -113,9 +113,8 @@ class Epub:
         self,
         facts: Callable[[Lesson], Chapter],
         picture: Callable[[str], bytes],
-        key: Callable[[Lesson], str] = lambda lesson: "",
     ) -> Iterator[File]:
-        """The files in order; `picture` gives the bytes at a site path, `key` is of a chapter.
+        """The files in order; `picture` gives the bytes at a site path.
 
         Those of chapters are made by whoever calls, see `chapter`.
         """
@@ -132,7 +131,7 @@ class Epub:
         for part in self._levels:
             yield File(f"EPUB/{_level_name(part)}", functools.partial(self._level, part))
             for lesson in part.lessons:
-                yield File(self.file_of(lesson), bytes, key(lesson))
+                yield File(self.file_of(lesson), bytes)
         for path, name in self._pictures.items():
             yield File(f"EPUB/{name}", functools.partial(picture, path))
 

@@ -30,7 +30,7 @@ from coursebuild.render.exports.twin import twin_of
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
-from coursebuild.results import KeptFile, OutputFile, Piece, SiteFile, made
+from coursebuild.results import KeptFile, OutputFile, SiteFile
 from coursebuild.source import key_of
 from coursebuild.values import dataclass
 
@@ -155,18 +155,15 @@ class Exports:
             texts = (before, *map(_shown, book.texts(self._library)), after)
             keys = (t if isinstance(t, str) else self._page_key(t) for t in texts)
             key = key_of("book", places, *keys)
-            pieces = functools.partial(self._book, book, texts, places)
+            pieces = functools.partial(self._book, book, texts)
             yield KeptFile(book.path, key, functools.partial(_joined, pieces), pieces)
 
-    def _book(
-        self, book: Book, texts: tuple[str | Lesson, ...], places: str
-    ) -> Iterator[bytes | Piece]:
+    def _book(self, book: Book, texts: tuple[str | Lesson, ...]) -> Iterator[bytes]:
         for text in texts:
             if isinstance(text, str):
                 yield text.encode("utf-8", "replace")
             else:
-                key = key_of("section", book.path, places, self._page_key(text))
-                yield Piece(key, functools.partial(self._section, book, text))
+                yield self._section(book, text)
 
     def _section(self, book: Book, lesson: Lesson) -> bytes:
         part = self._source.section(urls.lesson_path(lesson))
@@ -190,7 +187,7 @@ class Exports:
             urls.EPUB, key, functools.partial(_joined, self._epub_pieces), self._epub_pieces
         )
 
-    def _epub_pieces(self) -> Iterator[bytes | Piece]:
+    def _epub_pieces(self) -> Iterator[bytes]:
         around = self._around
         epub = Epub(self._library, around.style, around.declarations)
         links = key_of(epub.places, self._library.course.language)
@@ -208,7 +205,7 @@ class Exports:
             lesson = by_path.get(file.path)
             return deflate(file.make()) if lesson is None else chapters.deflated(lesson)
 
-        return packed(epub.files(chapters.facts(), around.picture, key), pack)
+        return packed(epub.files(chapters.facts(), around.picture), pack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,8 +223,8 @@ def _shown(text: str | Lesson) -> str | Lesson:
     return visible(text) if isinstance(text, str) else text
 
 
-def _joined(pieces: Callable[[], Iterator[bytes | Piece]]) -> bytes:
-    return b"".join(made(pieces()))
+def _joined(pieces: Callable[[], Iterator[bytes]]) -> bytes:
+    return b"".join(pieces())
 
 
 class OnDemand:

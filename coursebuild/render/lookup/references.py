@@ -153,7 +153,7 @@ class _Row:
 
 
 def _note_symbols(rows: dict[str, _Row], owner: Owner, lexicon: Lexicon) -> None:
-    symbols, sections, _ = lexicon.rows
+    symbols, sections = lexicon.symbols, lexicon.sections
     for use in symbols:
         row = rows.get(use.symbol)
         if row is None:

@@ -55,8 +55,8 @@ class Shelf(Protocol):
     def get(self, key: str) -> bytes | None:
         """What was kept under a key, if it is still there."""
 
-    def put(self, key: str, data: bytes) -> Callable[[], bytes]:
-        """Keep something, for this build at least; what it gives gives it back."""
+    def put(self, key: str, data: bytes) -> None:
+        """Keep something for later builds."""
 
 
 class SearchFiles:
@@ -86,7 +86,7 @@ class SearchFiles:
         for number, entry in enumerate(entries):
             self._members[self._plan.bucket(entry.path)].append(number)
         self._numbers = functools.lru_cache(_MOST)(self._numbers_of)
-        self._made: dict[tuple[int, int], Callable[[], bytes]] = {}
+        self._made: dict[tuple[int, int], bytes] = {}
         self._group: tuple[int, list[list[bytes]]] = (-1, [])
         self._last: tuple[int, bytes] = (-1, b"")
         digests = [self._digests(bucket) for bucket in range(self._plan.buckets)]
@@ -159,7 +159,7 @@ class SearchFiles:
     def _cell(self, bucket: int, group: int) -> bytes:
         made = self._made.get((bucket, group))
         if made is not None:
-            return made()
+            return made
         known = self._shelf.get(self._key(bucket, str(group)))
         if known is not None and known.count(b"\0") == len(self._plan.groups[group]) - 1:
             return known
@@ -170,7 +170,8 @@ class SearchFiles:
         pages = (self._terms(self._entries[number].path) for number in self._members[bucket])
         found = index.cells(self._plan, pages)
         for group, data in enumerate(found.groups):
-            self._made[bucket, group] = self._shelf.put(self._key(bucket, str(group)), data)
+            self._made[bucket, group] = data
+            self._shelf.put(self._key(bucket, str(group)), data)
         self._shelf.put(self._key(bucket, "digests"), found.digests)
         return found
 

@@ -65,12 +65,11 @@ class SearchedPages:
 
 
 class _Memory:
-    """Keeps what is made, as long as it is needed."""
+    """Keeps nothing from build to build."""
 
     def get(self, key: str) -> bytes | None:
         """Nothing was made before."""
         return None
 
-    def put(self, key: str, data: bytes) -> Callable[[], bytes]:
-        """As it is."""
-        return lambda: data
+    def put(self, key: str, data: bytes) -> None:
+        """Nothing is kept."""
