@@ -20,6 +20,8 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from coursebuild.checks.formulas import course_formulas
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.store import kept
@@ -43,7 +45,6 @@ from coursebuild.render.record import record
 from coursebuild.render.site import SiteOptions, render_site
 from coursebuild.results import Formula, MathError, Results
 from coursebuild.syntax.document import parse_document
-from coursebuild.values import replace
 
 
 def timed(

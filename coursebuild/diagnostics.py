@@ -12,9 +12,10 @@ import enum
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
+from msgspec import Struct
+
 from coursebuild.rules import RULES
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -29,24 +30,21 @@ class Severity(enum.Enum):
     WARNING = "warning"
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(Struct, frozen=True):
     """A further remark, and where it points (if anywhere)."""
 
     message: str
     span: Span | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(Struct, frozen=True):
     """Replace what stands in `span` by `text`."""
 
     span: Span
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Diagnostic(Struct, frozen=True):
     """One mistake or doubt, at one place."""
 
     rule: str
@@ -92,8 +90,7 @@ def diagnose(
     return Diagnostic(rule, span, message, label, help, tuple(notes), tuple(edits))
 
 
-@dataclass(frozen=True, slots=True)
-class Parsed(Generic[T_co]):
+class Parsed(Struct, Generic[T_co], frozen=True):
     """What a stage made of its input, and what it has to say about it."""
 
     value: T_co

@@ -10,9 +10,10 @@ import enum
 from collections.abc import Callable, Iterable
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model import Comparison, Recording
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 
 class Outcome(enum.Enum):
@@ -33,8 +34,7 @@ class Outcome(enum.Enum):
     """The author said not to run it."""
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptJob:
+class ScriptJob(Struct, frozen=True):
     """A script to run: everything that the runner needs to know."""
 
     path: str
@@ -62,8 +62,7 @@ class Sign(enum.Enum):
     """Bodies lay deep in each other when they were looked at, of which MuJoCo does not warn."""
 
 
-@dataclass(frozen=True, slots=True)
-class Divergence:
+class Divergence(Struct, frozen=True):
     """A simulation of a script that was lost on the way."""
 
     sign: Sign
@@ -81,8 +80,7 @@ class Divergence:
     """Of a contact: the names of its geoms, or what stands for them, as words."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trace:
+class Trace(Struct, frozen=True):
     """What a script looked at while it ran: all that its result depends on, beside its text.
 
     Project paths are POSIX and relative to the root. Each tuple is sorted, without repeats.
@@ -112,8 +110,7 @@ class Trace:
     its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptRun:
+class ScriptRun(Struct, frozen=True):
     """What a script did."""
 
     path: str
@@ -143,8 +140,7 @@ class DriftKind(enum.Enum):
     EXTRA = "extra lines"
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(Struct, frozen=True):
     """One difference.
 
     For a number `relative_error` and `digits` say how far apart the two values are.
@@ -163,8 +159,7 @@ class Change:
     """Leading significant digits that agree."""
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Struct, frozen=True):
     """The comparison of one recorded output with a run."""
 
     recording: Recording
@@ -177,16 +172,14 @@ class Verdict:
     """Unified diff of recorded against ran, empty where nothing differs."""
 
 
-@dataclass(frozen=True, slots=True)
-class Formula:
+class Formula(Struct, frozen=True):
     """A formula to typeset."""
 
     tex: str
     display: bool
 
 
-@dataclass(frozen=True, slots=True)
-class MathError:
+class MathError(Struct, frozen=True):
     """Why a formula does not parse.
 
     `position` is an offset in code points into the TeX, `None` where unknown.
@@ -196,8 +189,7 @@ class MathError:
     position: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class CompileResult:
+class CompileResult(Struct, frozen=True):
     """What compiling a piece of MJCF gave; `error` is empty when it compiled."""
 
     error: str
@@ -206,8 +198,7 @@ class CompileResult:
     facts: ModelFacts | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ModelFacts:
+class ModelFacts(Struct, frozen=True):
     """What a compiled model holds, for its page and for checking the names that labs use."""
 
     bodies: int
@@ -231,8 +222,7 @@ class ModelFacts:
     sensors: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class StaticForm:
+class StaticForm(Struct, frozen=True):
     """What a page shows of a lab before it starts, on paper and without JavaScript."""
 
     picture: bytes
@@ -249,8 +239,7 @@ class StaticForm:
     """SVG elements, one a plot."""
 
 
-@dataclass(frozen=True, slots=True)
-class LabResult:
+class LabResult(Struct, frozen=True):
     """A lab as it was tried, and what its page needs."""
 
     span: Span
@@ -284,16 +273,14 @@ class LabResult:
     """Why there is no script, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class OutputFile:
+class OutputFile(Struct, frozen=True):
     """A file of the site: its path there (POSIX, relative) and its bytes."""
 
     path: str
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class KeptFile:
+class KeptFile(Struct, frozen=True):
     """A file of the site that need not be made where it was published under the same key before."""
 
     path: str
@@ -309,8 +296,7 @@ class KeptFile:
 SiteFile: TypeAlias = OutputFile | KeptFile
 
 
-@dataclass(frozen=True, slots=True)
-class FileFacts:
+class FileFacts(Struct, frozen=True):
     """What a list of a site's files says of one."""
 
     path: str
@@ -321,8 +307,7 @@ class FileFacts:
     """Bytes."""
 
 
-@dataclass(frozen=True, slots=True)
-class FileList:
+class FileList(Struct, frozen=True):
     """A file of the site that is made of what all others are."""
 
     path: str
@@ -333,8 +318,7 @@ class FileList:
     """Gives its bytes; the other files come sorted by path."""
 
 
-@dataclass(frozen=True, slots=True)
-class Results:
+class Results(Struct, frozen=True):
     """All that running a course found."""
 
     runs: tuple[ScriptRun, ...]

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """One entry of the catalogue."""
 
     name: str

@@ -18,10 +18,12 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
+from functools import cached_property
 from itertools import accumulate
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass, field
 
 _NEWLINE = pattern(r"\r\n|\r|\n")
 
@@ -36,35 +38,29 @@ def key_of(*texts: str) -> str:
     return text_digest("\0".join(texts)).hex()
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(Struct, frozen=True, dict=True):
     """One text file of a course."""
 
     path: str
     """POSIX path relative to the course's root."""
     text: str
     """The decoded text, line ends as on disk."""
-    _line_starts: list[int] = field(
-        default_factory=list, init=False, repr=False, compare=False, hash=False
-    )
+
+    def __repr__(self) -> str:
+        return f"Source({self.path!r})"
 
     @property
     def digest(self) -> bytes:
         """SHA-256 of the text."""
         return text_digest(self.text)
 
-    @property
+    @cached_property
     def line_starts(self) -> list[int]:
         """Offsets at which lines begin; a line ends with LF, CRLF or CR, as in CommonMark."""
-        if not self._line_starts:
-            text = self.text
-            if "\r" in text:
-                starts = [0, *[m.end() for m in _NEWLINE.finditer(text)]]
-            else:
-                sizes = [len(line) + 1 for line in text.split("\n")]
-                starts = list(accumulate(sizes[:-1], initial=0))
-            self._line_starts.extend(starts)
-        return self._line_starts
+        if "\r" in self.text:
+            return [0, *[m.end() for m in _NEWLINE.finditer(self.text)]]
+        sizes = [len(line) + 1 for line in self.text.split("\n")]
+        return list(accumulate(sizes[:-1], initial=0))
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset, both from 1; columns count code points."""
@@ -90,11 +86,10 @@ class Source:
         return Excerpt.of_lines(self, lines)
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+class Span(Struct, frozen=True):
     """A half-open range `[start, end)` of offsets into a source."""
 
-    source: Source = field(repr=False)
+    source: Source
     start: int
     end: int
 
@@ -146,13 +141,12 @@ def _text_offset(piece: tuple[int, int]) -> int:
     return piece[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Excerpt:
+class Excerpt(Struct, frozen=True):
     """Text out of a source; its pieces say where each part of the text stands."""
 
-    source: Source = field(repr=False)
+    source: Source
     text: str
-    pieces: tuple[tuple[int, int], ...] = field(repr=False)
+    pieces: tuple[tuple[int, int], ...]
     """(offset in the text, offset in the source), growing; the first is at text offset 0."""
 
     @property

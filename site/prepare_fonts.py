@@ -13,8 +13,9 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from msgspec.structs import replace
+
 from coursebuild.render import cutting, fonts, woff2
-from coursebuild.values import replace
 
 OFTEN = (
     *range(0x20, 0x7F),

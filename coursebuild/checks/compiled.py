@@ -15,6 +15,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from msgspec import Struct
+
 from coursebuild.checks.benches import check_keyframes, declared_scenarios
 from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
@@ -22,13 +24,11 @@ from coursebuild.model import Bench, Course, Lab, Mjcf, document_blocks, documen
 from coursebuild.patterns import pattern
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass
 
 _PART = pattern(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
-class MjcfText:
+class MjcfText(Struct, frozen=True):
     """A text to compile, and where it comes from."""
 
     block: Mjcf | Lab

@@ -15,6 +15,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
+from msgspec import Struct
+
 from coursebuild.checks.model_places import model_place
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import (
@@ -52,7 +54,6 @@ from coursebuild.model import (
 from coursebuild.model.equations import equation_ids
 from coursebuild.patterns import pattern
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
 _Name: TypeAlias = (
@@ -63,8 +64,7 @@ _HTML_ID = pattern(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
 _HTML_ANCHOR = pattern(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
-@dataclass(frozen=True, slots=True)
-class Places:
+class Places(Struct, frozen=True):
     """Everything that a link may lead to."""
 
     lessons: Mapping[str, Document | None]
@@ -208,8 +208,7 @@ def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterat
         yield from _anchor(place, link[1][1:], document, "this page", anchors_of)
 
 
-@dataclass(frozen=True, slots=True)
-class _Named:
+class _Named(Struct, frozen=True):
     """What a link calls by its name."""
 
     rule: str

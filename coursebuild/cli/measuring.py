@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 def bench(arguments: argparse.Namespace) -> int:
     """Report speed against error of the course's models."""
+    from msgspec.structs import replace
+
     from coursebuild.pipeline.plots import plot_file, write_plots
     from coursebuild.report.measured import bench_report, bench_values
-    from coursebuild.values import replace
 
     options = options_of(arguments)
     plot = None if arguments.plot is None else plot_file(arguments.plot)

@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 Edge: TypeAlias = tuple[str, str]
 _Point: TypeAlias = str | tuple[str, str, int]
@@ -36,8 +36,7 @@ _STRAIGHT = 20.0
 """How much more an arrow counts between two of which each has no other on that side."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedNode:
+class PlacedNode(Struct, frozen=True):
     """A node with the middle of its place."""
 
     id: str
@@ -45,8 +44,7 @@ class PlacedNode:
     layer: int
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedEdge:
+class PlacedEdge(Struct, frozen=True):
     """An edge, by the places that it goes through from layer to layer."""
 
     start: str
@@ -54,8 +52,7 @@ class PlacedEdge:
     xs: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(Struct, frozen=True):
     """A graph laid out; its left edge is at 0."""
 
     nodes: tuple[PlacedNode, ...]

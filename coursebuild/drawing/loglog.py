@@ -8,17 +8,17 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+from msgspec import Struct
+
 from coursebuild.drawing.marks import markup_text, text_width
 from coursebuild.drawing.scales import log_ticks
-from coursebuild.values import dataclass
 
 SIZE = 12.0
 """Of letters, in the units of the drawing."""
 TICK_SIZE = 11.0
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(Struct, frozen=True):
     """A rectangle on the drawing, and the powers of ten at its edges."""
 
     left: float

@@ -9,7 +9,7 @@ import functools
 from collections.abc import Sequence
 from html import escape
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 _REMEMBERED = 1024
 """Texts: those of a drawing stand in others as well, in several sizes."""
@@ -74,8 +74,7 @@ def apart(wanted: Sequence[float], gap: float, top: float, bottom: float) -> lis
     return places
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
+class Box(Struct, frozen=True):
     """A rectangle that is taken."""
 
     left: float

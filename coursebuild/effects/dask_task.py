@@ -16,10 +16,10 @@ import io
 import platform
 import tempfile
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+from msgspec.structs import replace
 
 from coursebuild.effects.runner import run_scripts
 from coursebuild.effects.versions import engine_version, package_version, python_version

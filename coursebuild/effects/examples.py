@@ -23,9 +23,10 @@ import stat
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from msgspec import Struct, field
+
 from coursebuild.effects.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.effects.write import remove_leftovers, resolve_inside, write_atomic
-from coursebuild.values import dataclass, field
 
 FOLDER = "examples"
 MANIFEST = f"{FOLDER}/.extracted.json"
@@ -46,8 +47,7 @@ class Obstacle(enum.Enum):
     """A folder stands at its path, or a file where its folder should be."""
 
 
-@dataclass(frozen=True, slots=True)
-class Blocked:
+class Blocked(Struct, frozen=True):
     """A path that was left alone."""
 
     path: str
@@ -60,8 +60,7 @@ class Blocked:
     """Of an edited one: the lesson's block was changed as well since the file was extracted."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExamplesReport:
+class ExamplesReport(Struct, frozen=True):
     """What became of each script; paths in sorted order."""
 
     written: tuple[str, ...]

@@ -31,8 +31,9 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, Generic, NoReturn, Self, TypeVar
 
+from msgspec import Struct, field
+
 from coursebuild.effects import v8_start
-from coursebuild.values import dataclass, field
 
 Ask = TypeVar("Ask")
 Answer = TypeVar("Answer")
@@ -66,8 +67,7 @@ def beside(make: Callable[[], Answer]) -> Iterator[Callable[[], Answer]]:
         yield lambda: pool.run([(None, None)])[0][0]
 
 
-@dataclass(eq=False, slots=True)
-class _Copy:
+class _Copy(Struct, eq=False):
     process: int
     requests: int
     answers: int

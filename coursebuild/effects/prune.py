@@ -16,8 +16,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.effects.locks import is_abandoned
-from coursebuild.values import dataclass
 
 TEMPORARY = ".new-"
 """Names of files that are being written begin so."""
@@ -33,8 +34,7 @@ _ROOM = 0.9
 """Part of the limit that is left full, so that not every command has to remove something."""
 
 
-@dataclass(frozen=True, slots=True)
-class _File:
+class _File(Struct, frozen=True):
     used: float
     size: int
     path: str

@@ -17,15 +17,16 @@ import stat
 from collections.abc import Mapping
 from pathlib import Path
 
+from msgspec import Struct, field
+from msgspec.structs import replace
+
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.values import dataclass, field, replace
 
 RECORDS = ".coursebuild/published"
 """The folder in a course where the records are."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """A published file."""
 
     key: str
@@ -62,8 +63,7 @@ class Entry:
         return self if status.st_mode == self.mode else replace(self, mode=status.st_mode)
 
 
-@dataclass(frozen=True, slots=True)
-class Published:
+class Published(Struct, frozen=True):
     """The record of one site."""
 
     place: Path

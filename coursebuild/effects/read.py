@@ -20,12 +20,13 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
 from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
 from coursebuild.source import Source
-from coursebuild.values import dataclass
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
@@ -35,8 +36,7 @@ _STRAY = 0.1
 _OUTSIDE = "is reached through a link that leads out of the project"
 
 
-@dataclass(frozen=True, slots=True)
-class CourseFiles:
+class CourseFiles(Struct, frozen=True):
     """A course as it lies on the disk; sorted; paths are POSIX and relative to the root."""
 
     map: Source | None

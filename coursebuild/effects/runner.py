@@ -27,6 +27,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.effects import supervisor
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.notes import Notes
@@ -35,11 +37,9 @@ from coursebuild.effects.surroundings import clean_environment as clean_environm
 from coursebuild.effects.watching import STDERR_KEPT
 from coursebuild.effects.workers import ForkServer, ServerLostError, Worker, spawn_worker
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign, Trace
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class RunStarted:
+class RunStarted(Struct, frozen=True):
     """A script was handed to a supervisor."""
 
     path: str
@@ -47,8 +47,7 @@ class RunStarted:
     """How many scripts are run in all."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunFinished:
+class RunFinished(Struct, frozen=True):
     """A script is through, one way or another."""
 
     run: ScriptRun

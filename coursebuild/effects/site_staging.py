@@ -26,17 +26,17 @@ from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.effects.locks import is_abandoned, try_lock
 from coursebuild.effects.published import RECORDS, Entry
-from coursebuild.values import dataclass
 
 _SPARE = f"{RECORDS}/spare"
 """Of a course, whatever the place: a course has one, most often."""
 _FOLDER = os.O_RDONLY | os.O_CLOEXEC | os.O_DIRECTORY | os.O_NOFOLLOW
 
 
-@dataclass(frozen=True, slots=True)
-class Staging:
+class Staging(Struct, frozen=True):
     """A folder beside the place; open and locked as long as its builder lives."""
 
     path: Path

@@ -29,6 +29,8 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 
+from msgspec import Struct, field
+
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
 from coursebuild.effects.exchange import exchange
 from coursebuild.effects.published import Entry, Published, write_published
@@ -47,7 +49,6 @@ from coursebuild.effects.site_staging import (
 )
 from coursebuild.patterns import pattern
 from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
-from coursebuild.values import dataclass, field
 
 _NO_PATH = pattern(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """A part of a path that is empty or stands for a folder, a control character, a backslash."""
@@ -197,8 +198,7 @@ def _key(file: SiteFile) -> str:
     return file.key
 
 
-@dataclass(frozen=True, slots=True)
-class _Kept:
+class _Kept(Struct, frozen=True):
     """What is in a folder before the site is written into it."""
 
     files: Mapping[str, Entry] = field(default_factory=dict)
@@ -206,8 +206,7 @@ class _Kept:
     folders: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
-class _Site:
+class _Site(Struct, frozen=True):
     """The site that is to be, and the one that is there."""
 
     old: Published

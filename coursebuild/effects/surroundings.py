@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 _PASSED_ON = (
     "PATH",
@@ -60,8 +60,7 @@ before it. None does anything that a script could see."""
 _IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]+([^\n#;]+)", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """An interpreter and what is installed for it, where scripts run that do not run here."""
 
     name: str

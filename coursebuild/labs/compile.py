@@ -18,9 +18,10 @@ import json
 from collections.abc import Iterator
 from typing import Any, Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model import Lab, LabControl, LabPlot
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a piece inside the lab's JSON: `("controls", 2, "set")`."""
@@ -28,8 +29,7 @@ Entry: TypeAlias = tuple[str | int, ...]
 _NAMES = "{model, data, mj, sim, ctx, lib}"
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A piece of lab code."""
 
     entry: Entry
@@ -51,8 +51,7 @@ class Piece:
         return _setter(self.code) if self.takes_value else _statements(self.code)
 
 
-@dataclass(frozen=True, slots=True)
-class LabModule:
+class LabModule(Struct, frozen=True):
     """A lab, ready to be run."""
 
     name: str

@@ -14,13 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 Element: TypeAlias = Literal["f64", "f32", "int"]
 
 
-@dataclass(frozen=True, slots=True)
-class ArrayField:
+class ArrayField(Struct, frozen=True):
     """An array of the model or the data: what it holds, and whether NumPy sees rows."""
 
     element: Element

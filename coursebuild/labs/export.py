@@ -15,6 +15,8 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 
+from msgspec import Struct
+
 from coursebuild.labs import export_text as text
 from coursebuild.labs.export_text import About
 from coursebuild.labs.javascript import parse_expression, parse_statements
@@ -31,15 +33,13 @@ from coursebuild.labs.python_context import field_types
 from coursebuild.labs.python_library import LIBRARY
 from coursebuild.labs.python_values import Code, Names, Type, Used
 from coursebuild.model import Lab, LabControl
-from coursebuild.values import dataclass
 
 _PLACE = re.compile(r"\{\{control:\d+\}\}")
 _HALVES = re.compile("[\ud800-\udfff]")
 """Halves of characters, which no file can hold."""
 
 
-@dataclass(frozen=True, slots=True)
-class Export:
+class Export(Struct, frozen=True):
     """A script."""
 
     name: str

@@ -9,17 +9,17 @@ import json
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
+from msgspec import Struct
+
 from coursebuild.labs.python_library import LIBRARY
 from coursebuild.labs.python_values import NUMBERS, Type
 from coursebuild.model import Lab, LabControl
-from coursebuild.values import dataclass
 
 _WIDTH = 88
 _LONGEST = 100
 
 
-@dataclass(frozen=True, slots=True)
-class About:
+class About(Struct, frozen=True):
     """What a script says of where it comes from, and how long it runs."""
 
     name: str

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
 class UntranslatableError(Exception):
@@ -23,8 +23,7 @@ class UntranslatableError(Exception):
 Kind: TypeAlias = Literal["number", "string", "template", "name", "punctuator", "end"]
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(Struct, frozen=True):
     """A token; for a string `text` is what it holds, for all others how it is written."""
 
     kind: Kind

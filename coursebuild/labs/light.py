@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.labs.shapes import Array
-from coursebuild.values import dataclass
 
 _AMBIENT, _FRONT, _ABOVE = 0.45, 0.4, 0.4
 """A model without lights: light from all sides, from the camera, and from above."""
@@ -34,8 +34,7 @@ _SOFT = 8.0
 """The exponent up to which a spot light is soft from its middle on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lamp:
+class Lamp(Struct, frozen=True):
     """A light: of parallel rays, of a point, or of a cone."""
 
     colour: Array
@@ -48,8 +47,7 @@ class Lamp:
     """Cosines at which a cone ends and from which on it is bright."""
 
 
-@dataclass(frozen=True, slots=True)
-class Light:
+class Light(Struct, frozen=True):
     """All light of a scene."""
 
     ambient: Array
@@ -59,8 +57,7 @@ class Light:
     """How strong highlights are."""
 
 
-@dataclass(frozen=True, slots=True)
-class Material:
+class Material(Struct, frozen=True):
     """How a surface takes light."""
 
     shininess: float = 128 * _SHININESS

@@ -17,13 +17,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.labs.light import Light, Material, shaded, studio
 from coursebuild.labs.raster import NORMAL, PLACE, WRAP, Eye, Layer, Placed, Raster, turned
 from coursebuild.labs.shapes import Array, Surface
 from coursebuild.labs.textures import Dress, Texture, sharpness, sky
-from coursebuild.values import dataclass, replace
 
 _SAMPLES = 2
 _NEAR = 0.01
@@ -39,8 +40,7 @@ _STEPS = 127
 _PLAIN = Material()
 
 
-@dataclass(frozen=True, slots=True)
-class Solid:
+class Solid(Struct, frozen=True):
     """A surface, where it stands and its looks."""
 
     surface: Surface
@@ -59,8 +59,7 @@ class Solid:
     """Whether both of its sides are outside."""
 
 
-@dataclass(frozen=True, slots=True)
-class Camera:
+class Camera(Struct, frozen=True):
     """MuJoCo's free camera."""
 
     azimuth: float

@@ -12,12 +12,13 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+from msgspec import Struct
+
 from coursebuild.drawing.marks import apart
 from coursebuild.drawing.marks import markup_text as _text
 from coursebuild.drawing.scales import tick_texts as tick_texts
 from coursebuild.drawing.scales import ticks as ticks
 from coursebuild.model import LabPlot, LabTrace
-from coursebuild.values import dataclass
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
 _TOP, _BOTTOM = 12.0, 38.0
@@ -87,8 +88,7 @@ def _frame(
     return _Frame(low_t, high_t, low, high, left, width - room, width)
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
+class _Frame(Struct, frozen=True):
     """From values to places."""
 
     low_t: float

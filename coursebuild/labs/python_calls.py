@@ -5,12 +5,13 @@ Entry point: `Calls`, which translates expressions with all that is in them.
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from coursebuild.labs.engine_names import CALLS, RESULTS
 from coursebuild.labs.javascript_tree import Array, Call, Expression, Member, Name, Spread
 from coursebuild.labs.python_expressions import Expressions
 from coursebuild.labs.python_texts import METHODS, formatted
 from coursebuild.labs.python_values import Code, Type, floating, refuse
-from coursebuild.values import replace
 
 _EXACT_FUNCTIONS = {
     "abs": "abs",

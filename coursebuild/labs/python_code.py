@@ -12,6 +12,8 @@ import keyword
 from collections.abc import Iterable, Iterator
 from typing import assert_never
 
+from msgspec import Struct
+
 from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
 from coursebuild.labs.javascript import parse_expression, parse_statements
 from coursebuild.labs.javascript_tree import (
@@ -44,7 +46,6 @@ from coursebuild.labs.python_values import (
     floating,
     refuse,
 )
-from coursebuild.values import dataclass
 
 _INDENT = "    "
 RESERVED = frozenset(
@@ -59,8 +60,7 @@ RESERVED = frozenset(
 """Names that nothing else in a script may have."""
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A piece of code in Python."""
 
     lines: tuple[str, ...]
@@ -353,8 +353,7 @@ class _Statements(Calls):
                 return False
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
+class _Place(Struct, frozen=True):
     """What can be assigned to."""
 
     text: str

@@ -9,11 +9,10 @@ that does not use it.
 
 from __future__ import annotations
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Helper:
+class Helper(Struct, frozen=True):
     """A definition, what it needs, and the modules that it is written with."""
 
     source: str

@@ -13,9 +13,10 @@ import math
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
+from msgspec import Struct, field
+
 from coursebuild.labs.engine_names import Element
 from coursebuild.labs.javascript_tokens import UntranslatableError
-from coursebuild.values import dataclass, field
 
 Type: TypeAlias = Literal["nat", "int", "num", "bool", "str", "vector", "rows", "energy", "nothing"]
 """Of a Python expression; `rows` is an array that has two dimensions there, and one in JavaScript.
@@ -28,8 +29,7 @@ _EXACT = 2.0**53
 SMALL = 2.0**31
 
 
-@dataclass(frozen=True, slots=True)
-class Code:
+class Code(Struct, frozen=True):
     """A Python expression."""
 
     text: str
@@ -45,8 +45,7 @@ class Code:
         return self.text if self.strength >= strength else f"({self.text})"
 
 
-@dataclass(slots=True)
-class Used:
+class Used(Struct):
     """What the code that was translated needs."""
 
     helpers: set[str] = field(default_factory=set)
@@ -57,16 +56,14 @@ class Used:
     """Whether no function is involved whose last bit may differ from one library to another."""
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(Struct, frozen=True):
     """A variable of the code: what it is called in Python, and its type."""
 
     code: Code
     constant: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Names:
+class Names(Struct, frozen=True):
     """What the code may refer to besides the engine."""
 
     context: Mapping[str, Type]

@@ -6,10 +6,10 @@ Entry point: `Raster(size, eye, lens).add(layer, placed)`.
 from __future__ import annotations
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from coursebuild.labs.shapes import Array, Surface
-from coursebuild.values import dataclass
 
 _FAR_AWAY = 1e12
 """m; what is beyond, or nowhere, is not drawn."""
@@ -19,8 +19,7 @@ PLACE, NORMAL, WRAP, _KEPT = slice(0, 3), slice(3, 6), slice(6, 8), 8
 """What is kept of a surface at a sample, in the solid's own frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class Eye:
+class Eye(Struct, frozen=True):
     """Where a picture is seen from: a camera, or its image in a mirror."""
 
     position: Array
@@ -39,8 +38,7 @@ class Layer:
         self.kept = np.zeros((*depth.shape, _KEPT), np.float32)
 
 
-@dataclass(frozen=True, slots=True)
-class Placed:
+class Placed(Struct, frozen=True):
     """A surface at its place in the world, and the number it has in a layer."""
 
     index: int

@@ -8,14 +8,14 @@ from __future__ import annotations
 import base64
 from typing import Any
 
+from msgspec import Struct
+
 from coursebuild.labs.compile import Entry
-from coursebuild.values import dataclass
 
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
+class Failure(Struct, frozen=True):
     """Something that went wrong in a trial."""
 
     entry: Entry
@@ -29,8 +29,7 @@ class Failure:
     """What was being tried."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
+class Trial(Struct, frozen=True):
     """A reply. `main` is what the main run recorded, `None` where it did not come to its end."""
 
     version: str

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.labs.light import Material, material_of
 from coursebuild.labs.picture import Solid
@@ -24,7 +25,6 @@ from coursebuild.labs.shapes import (
     surface,
 )
 from coursebuild.labs.textures import Dress, Texture, texture_of
-from coursebuild.values import dataclass
 
 RGBA = tuple[float, float, float, float]
 
@@ -56,8 +56,7 @@ _UNSET = (0.5, 0.5, 0.5, 1.0)
 """A flex or skin of this colour has its material's."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Stock:
+class _Stock(Struct, frozen=True):
     """What geoms share."""
 
     meshes: tuple[Surface, ...]
@@ -69,8 +68,7 @@ class _Stock:
     """m."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Looks:
+class _Looks(Struct, frozen=True):
     material: Material
     texture: Texture | None = None
     repeat: tuple[float, float] = (1.0, 1.0)

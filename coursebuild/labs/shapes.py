@@ -14,9 +14,8 @@ from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
-
-from coursebuild.values import dataclass
 
 Array: TypeAlias = NDArray[np.float64]
 Kind: TypeAlias = Literal[
@@ -32,8 +31,7 @@ _SMOOTH = 0.8
 """Cosine between a face and its vertex's normal from which on the edge is not sharp."""
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(Struct, frozen=True):
     """Triangles with normals."""
 
     vertices: Array

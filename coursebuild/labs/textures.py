@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from coursebuild.labs.shapes import Array, Kind
-from coursebuild.values import dataclass
 
 _CUBE, _SKY = 1, 2
 """mjtTexture."""
@@ -23,8 +23,7 @@ _SHARPER = 4.0
 _LID = 0.9
 
 
-@dataclass(frozen=True, slots=True)
-class Texture:
+class Texture(Struct, frozen=True):
     """A texture, flat or of a cube, and smaller ones made from it."""
 
     levels: tuple[Array, ...]
@@ -57,8 +56,7 @@ def texture_of(given: dict[str, Any]) -> Texture | None:
     return Texture(tuple(levels), given["type"])
 
 
-@dataclass(frozen=True, slots=True)
-class Dress:
+class Dress(Struct, frozen=True):
     """How a texture lies on a geom."""
 
     texture: Texture

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.labs.compile import Entry, Piece
 from coursebuild.labs.reply import Failure, Trial
 from coursebuild.model import Lab
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 PARITY_RTOL = 1e-9
 """How far (relative) the two engines may be apart over the first second, unless a lab says."""
@@ -33,8 +34,7 @@ _RULES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Parity:
+class Parity(Struct, frozen=True):
     """A run of the browser's engine beside the native one."""
 
     steps: int

@@ -8,11 +8,10 @@ field beside it says why, so that it can be kept as JSON.
 
 from __future__ import annotations
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Machine:
+class Machine(Struct, frozen=True):
     """Where it was measured; times mean nothing without it."""
 
     engine: str
@@ -25,8 +24,7 @@ class Machine:
     """What the processor calls itself; empty where it does not say."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """What can be chosen without changing the scene."""
 
     integrator: str
@@ -41,8 +39,7 @@ class Setting:
     """As MJCF names it; empty where nothing can touch."""
 
 
-@dataclass(frozen=True, slots=True)
-class WorkPrecisionRow:
+class WorkPrecisionRow(Struct, frozen=True):
     """One setting in one scenario. Errors are the largest over the horizon, and at its end."""
 
     setting: Setting
@@ -97,8 +94,7 @@ class WorkPrecisionRow:
     """Relative standard error of the cost."""
 
 
-@dataclass(frozen=True, slots=True)
-class OrderRow:
+class OrderRow(Struct, frozen=True):
     """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
 
     integrator: str
@@ -107,8 +103,7 @@ class OrderRow:
     velocity: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class StableRow:
+class StableRow(Struct, frozen=True):
     """The largest stable timestep of an integrator in a scenario."""
 
     integrator: str
@@ -120,8 +115,7 @@ class StableRow:
     """The timesteps between which was looked, s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Struct, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
     on_front: bool
@@ -137,8 +131,7 @@ class Verdict:
     """The same in a sentence or two."""
 
 
-@dataclass(frozen=True, slots=True)
-class ScenarioReport:
+class ScenarioReport(Struct, frozen=True):
     """Everything that was measured in a scenario."""
 
     name: str
@@ -176,8 +169,7 @@ class ScenarioReport:
     """What to know when reading the figures, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class SceneCard:
+class SceneCard(Struct, frozen=True):
     """What a model is made of, and how fast the browser's engine runs it."""
 
     bodies: int
@@ -198,8 +190,7 @@ class SceneCard:
     begins; `None` where it was not measured."""
 
 
-@dataclass(frozen=True, slots=True)
-class SceneReport:
+class SceneReport(Struct, frozen=True):
     """Everything that was measured on a model."""
 
     model: str

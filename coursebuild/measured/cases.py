@@ -8,11 +8,10 @@ field beside it says why, so that it can be kept as JSON.
 
 from __future__ import annotations
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class BoundaryLine:
+class BoundaryLine(Struct, frozen=True):
     """The largest stable timestep of an integrator."""
 
     integrator: str
@@ -36,8 +35,7 @@ class BoundaryLine:
     """The timesteps between which was looked, s."""
 
 
-@dataclass(frozen=True, slots=True)
-class FigureLine:
+class FigureLine(Struct, frozen=True):
     """A quantity that was measured and is known."""
 
     name: str
@@ -50,8 +48,7 @@ class FigureLine:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorLine:
+class ErrorLine(Struct, frozen=True):
     """One run against the reference. Errors are the largest over the duration, and at its end."""
 
     integrator: str
@@ -74,8 +71,7 @@ class ErrorLine:
     """Whether constraints were softened because the timestep is long: it is another model."""
 
 
-@dataclass(frozen=True, slots=True)
-class OrderLine:
+class OrderLine(Struct, frozen=True):
     """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
 
     integrator: str
@@ -84,8 +80,7 @@ class OrderLine:
     velocity: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class ReferenceLine:
+class ReferenceLine(Struct, frozen=True):
     """What the errors were measured against."""
 
     kind: str
@@ -98,8 +93,7 @@ class ReferenceLine:
     """The largest difference of the two."""
 
 
-@dataclass(frozen=True, slots=True)
-class CaseReport:
+class CaseReport(Struct, frozen=True):
     """Everything that was measured on a hard case."""
 
     name: str

@@ -15,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
+from msgspec import Struct
+
 from coursebuild.measured.bench import (
     ScenarioReport,
     SceneReport,
@@ -25,7 +27,6 @@ from coursebuild.measured.bench import (
 from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
 from coursebuild.measured.points import FLOORS, seconds_text, setting_text, status_text
 from coursebuild.model.scenarios import Bands
-from coursebuild.values import dataclass
 
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""
@@ -40,8 +41,7 @@ _T = TypeVar("_T")
 _K = TypeVar("_K", bound=Hashable)
 
 
-@dataclass(frozen=True, slots=True)
-class Departure:
+class Departure(Struct, frozen=True):
     """A figure that is not what was recorded."""
 
     where: str
@@ -55,8 +55,7 @@ class Departure:
     """What would have been well."""
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
+class Checked(Struct, frozen=True):
     """A recorded report, held against what was measured."""
 
     name: str

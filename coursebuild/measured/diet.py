@@ -8,8 +8,9 @@ it can be kept as JSON.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.measured.bench import Machine
-from coursebuild.values import dataclass
 
 IDENTICAL = "bit-identical"
 """Without it every bit is the same, and a reason says why that does not hang on the scenarios."""
@@ -20,8 +21,7 @@ CHANGES = "changes the result"
 LABELS = (IDENTICAL, EQUAL, UNTOUCHED, CHANGES)
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """An element of the model."""
 
     name: str
@@ -36,8 +36,7 @@ class Place:
     """From 1, in characters."""
 
 
-@dataclass(frozen=True, slots=True)
-class TextEdit:
+class TextEdit(Struct, frozen=True):
     """A part of a file replaced."""
 
     path: str
@@ -50,8 +49,7 @@ class TextEdit:
     new: str
 
 
-@dataclass(frozen=True, slots=True)
-class Saving:
+class Saving(Struct, frozen=True):
     """What a change saves; times are those of one machine."""
 
     time: float | None
@@ -66,8 +64,7 @@ class Saving:
     """Bytes of the MJCF."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Struct, frozen=True):
     """What a model could be without."""
 
     kind: str
@@ -104,8 +101,7 @@ class Finding:
         return not excused and self.label in (IDENTICAL, EQUAL)
 
 
-@dataclass(frozen=True, slots=True)
-class Tried:
+class Tried(Struct, frozen=True):
     """What could be left out and is no finding: it is needed, or saves no time."""
 
     kind: str
@@ -117,8 +113,7 @@ class Tried:
     """Why it was not run; empty where it was, and changed the result."""
 
 
-@dataclass(frozen=True, slots=True)
-class DietScenario:
+class DietScenario(Struct, frozen=True):
     """A scenario that the model was tried in."""
 
     name: str
@@ -128,8 +123,7 @@ class DietScenario:
     reasons: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class StaleKeep:
+class StaleKeep(Struct, frozen=True):
     """An entry `[[keep]]` that keeps nothing any more."""
 
     finding: str
@@ -138,8 +132,7 @@ class StaleKeep:
     column: int
 
 
-@dataclass(frozen=True, slots=True)
-class DietReport:
+class DietReport(Struct, frozen=True):
     """Everything that was found in a model."""
 
     model: str

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.drawing.loglog import SIZE, TICK_SIZE, Frame, ticks_y
 from coursebuild.drawing.marks import shortened, text_width
 from coursebuild.measured.bench import ScenarioReport
 from coursebuild.measured.points import Chart, Line, Point
 from coursebuild.measured.words import lane_text
-from coursebuild.values import dataclass
 
 WIDE, NARROW = 620.0, 350.0
 _HEIGHT = {WIDE: 320.0, NARROW: 260.0}
@@ -25,8 +26,7 @@ _LARGEST = 290.0
 """Powers of ten beyond this are drawn there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lane:
+class Lane(Struct, frozen=True):
     """A line's place above the plot."""
 
     line: Line

@@ -15,8 +15,9 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.measured.bench import ScenarioReport, Setting, WorkPrecisionRow
-from coursebuild.values import dataclass
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
@@ -26,8 +27,7 @@ FEWEST_STEPS = 20
 """Steps of a scenario at the longest timestep of which it is tried whether it is stable."""
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
+class Quantity(Struct, frozen=True):
     """An error that can be drawn."""
 
     name: str
@@ -49,8 +49,7 @@ class Quantity:
         return None if value is None or not math.isfinite(value) else value
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(Struct, frozen=True):
     """A row that is drawn."""
 
     row: int
@@ -62,8 +61,7 @@ class Point:
     """`None` for a run that was lost."""
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """What is drawn of an integrator."""
 
     integrator: str
@@ -81,8 +79,7 @@ class Line:
     """The largest stable timestep, s; `None` as above, 0 where none tried is stable."""
 
 
-@dataclass(frozen=True, slots=True)
-class Chart:
+class Chart(Struct, frozen=True):
     """What is drawn of a scenario."""
 
     quantity: Quantity

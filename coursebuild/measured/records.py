@@ -19,11 +19,11 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec import Struct
 
 from coursebuild.measured.bench import SceneReport
 from coursebuild.measured.cases import CaseReport
 from coursebuild.measured.diet import DietReport
-from coursebuild.values import dataclass
 
 FOLDER = "content/reports"
 STABILITY_PATH = f"{FOLDER}/stability.json"
@@ -43,16 +43,14 @@ class RecordError(Exception):
         self.message = message
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
+class Failure(Struct, frozen=True):
     """Why a recorded report cannot be checked, or written."""
 
     message: str
     help: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _BenchFile:
+class _BenchFile(Struct, frozen=True):
     """What a file of a model holds."""
 
     holds: str
@@ -60,8 +58,7 @@ class _BenchFile:
     scene: SceneReport
 
 
-@dataclass(frozen=True, slots=True)
-class _StabilityFile:
+class _StabilityFile(Struct, frozen=True):
     """What the file of the hard cases holds."""
 
     holds: str
@@ -69,8 +66,7 @@ class _StabilityFile:
     cases: tuple[CaseReport, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _DietFile:
+class _DietFile(Struct, frozen=True):
     """What the file of a model's diet holds."""
 
     holds: str

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import enum
 
+from msgspec import Struct
+
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 PERTURBATION = 1e-12
 """How far initial states are moved, relative."""
@@ -36,8 +37,7 @@ class Standing(enum.Enum):
     """It did not run to its end with moved states."""
 
 
-@dataclass(frozen=True, slots=True)
-class Doubt:
+class Doubt(Struct, frozen=True):
     """A recorded number of which not all printed digits hold."""
 
     span: Span
@@ -55,8 +55,7 @@ class Doubt:
     """Whether the verification would take the difference for drift."""
 
 
-@dataclass(frozen=True, slots=True)
-class Flip:
+class Flip(Struct, frozen=True):
     """Recorded text, beside numbers, that was printed otherwise, or not at all, or that came in."""
 
     span: Span
@@ -65,8 +64,7 @@ class Flip:
     compared: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Sensitivity:
+class Sensitivity(Struct, frozen=True):
     """A script."""
 
     path: str

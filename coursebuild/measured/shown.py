@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from coursebuild.values import dataclass, field
+from msgspec import Struct, field
 
 if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.measured.bench import SceneReport
@@ -16,8 +16,7 @@ if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.measured.diet import DietReport
 
 
-@dataclass(frozen=True, slots=True)
-class Reports:
+class Reports(Struct, frozen=True):
     """What was recorded."""
 
     scenes: Mapping[str, SceneReport] = field(default_factory=dict)

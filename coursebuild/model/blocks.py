@@ -9,15 +9,15 @@ import enum
 from decimal import Decimal
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model.inlines import Inline, Label
 from coursebuild.model.interactive import Lab, Quiz
 from coursebuild.model.lexicon import Lexicon
 from coursebuild.source import Excerpt, Source, Span
-from coursebuild.values import dataclass, field
 
 
-@dataclass(frozen=True, slots=True)
-class Heading:
+class Heading(Struct, frozen=True):
     """A heading; `anchor` is unique in its document."""
 
     span: Span
@@ -29,8 +29,7 @@ class Heading:
     classes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Paragraph:
+class Paragraph(Struct, frozen=True):
     """A paragraph; `tight` when it stands in a tight list, where it gets no element of its own."""
 
     span: Span
@@ -38,8 +37,7 @@ class Paragraph:
     tight: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ListItem:
+class ListItem(Struct, frozen=True):
     """An item of a list; `checked` is set for task lists."""
 
     span: Span
@@ -47,8 +45,7 @@ class ListItem:
     checked: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ListBlock:
+class ListBlock(Struct, frozen=True):
     """A list; `start` is the first number of an ordered one, `None` for bullets."""
 
     span: Span
@@ -56,16 +53,14 @@ class ListBlock:
     start: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class BlockQuote:
+class BlockQuote(Struct, frozen=True):
     """A blockquote that is no callout."""
 
     span: Span
     blocks: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Callout:
+class Callout(Struct, frozen=True):
     """`> [!kind] Title`."""
 
     span: Span
@@ -77,8 +72,7 @@ class Callout:
     blocks: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CodeBlock:
+class CodeBlock(Struct, frozen=True):
     """A fenced or indented code block that is none of ours.
 
     `info` is the raw info string, `language` its first word.
@@ -90,16 +84,14 @@ class CodeBlock:
     code: Excerpt
 
 
-@dataclass(frozen=True, slots=True)
-class HtmlBlock:
+class HtmlBlock(Struct, frozen=True):
     """A block of raw HTML, kept."""
 
     span: Span
     html: str
 
 
-@dataclass(frozen=True, slots=True)
-class HtmlFlow:
+class HtmlFlow(Struct, frozen=True):
     """HTML in a quiz text, where math between the tags is still math.
 
     Raw tags and inlines in order, in no paragraph.
@@ -109,15 +101,13 @@ class HtmlFlow:
     children: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ThematicBreak:
+class ThematicBreak(Struct, frozen=True):
     """`---`."""
 
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class MathBlock:
+class MathBlock(Struct, frozen=True):
     """`$$…$$` on lines of its own."""
 
     span: Span
@@ -125,8 +115,7 @@ class MathBlock:
     label: Label | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
+class Cell(Struct, frozen=True):
     """A table cell; `text` is its Markdown, escaped pipes made plain."""
 
     span: Span
@@ -134,8 +123,7 @@ class Cell:
     children: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
+class Table(Struct, frozen=True):
     """A table; `align` has one entry a column."""
 
     span: Span
@@ -144,8 +132,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Script:
+class Script(Struct, frozen=True):
     """A complete script: ```` ```python file=examples/x.py ````."""
 
     span: Span
@@ -179,8 +166,7 @@ class Mode(enum.Enum):
     VOLATILE = "volatile"
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Struct, frozen=True):
     """How a recording is compared.
 
     `rtol` and `atol` count only in mode `TOLERANCE`; `ellipsis` goes with all but `VOLATILE`.
@@ -192,16 +178,14 @@ class Comparison:
     ellipsis: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Filter:
+class Filter(Struct, frozen=True):
     """`[[verify.filter]]`: a regular expression replaced on both sides before comparing."""
 
     pattern: str
     replacement: str
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
+class Recording(Struct, frozen=True):
     """`Output:` and the text fence or table below it."""
 
     span: Span
@@ -223,8 +207,7 @@ class Recording:
     """Whether the fence says in a right way how to compare; if not, nothing is compared."""
 
 
-@dataclass(frozen=True, slots=True)
-class Io:
+class Io(Struct, frozen=True):
     """The io card: what the script takes, does and gives."""
 
     span: Span
@@ -233,8 +216,7 @@ class Io:
     output: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Mjcf:
+class Mjcf(Struct, frozen=True):
     """A model or fragment.
 
     `fragment` names the element that it goes into, `error` the message it must fail with.
@@ -251,8 +233,7 @@ BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
 """What of a report is shown."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bench:
+class Bench(Struct, frozen=True):
     """What was recorded of a model in one of its scenarios."""
 
     span: Span
@@ -265,8 +246,7 @@ class Bench:
     """In the order in which it is shown."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlainCode:
+class PlainCode(Struct, frozen=True):
     """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
 
     span: Span
@@ -297,8 +277,7 @@ Block: TypeAlias = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Footnote:
+class Footnote(Struct, frozen=True):
     """A footnote that is referred to.
 
     `number` in order of first reference, `references` how often.
@@ -311,8 +290,7 @@ class Footnote:
     blocks: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Document:
+class Document(Struct, frozen=True, dict=True):
     """One Markdown text, parsed."""
 
     source: Source
@@ -320,11 +298,3 @@ class Document:
     footnotes: tuple[Footnote, ...]
     lexicon: Lexicon | None = None
     """Only of a skeleton, which does not have what it was taken from."""
-    _all: list[Block] = field(
-        default_factory=list, init=False, repr=False, compare=False, hash=False
-    )
-    """What `document_blocks` gives, once it was asked for."""
-    _kinds: frozenset[type] | None = field(
-        default=None, init=False, repr=False, compare=False, hash=False
-    )
-    """What `document_has` knows, once it was asked."""

@@ -9,10 +9,11 @@ import enum
 import hashlib
 import re
 
+from msgspec import Struct
+
 from coursebuild.model.blocks import Comparison, Document, Filter
 from coursebuild.model.scenarios import Declarations
 from coursebuild.source import Source, Span
-from coursebuild.values import dataclass
 
 
 class Status(enum.Enum):
@@ -23,8 +24,7 @@ class Status(enum.Enum):
     PLANNED = "planned"
 
 
-@dataclass(frozen=True, slots=True)
-class Lesson:
+class Lesson(Struct, frozen=True):
     """A lesson of the map; `document` is `None` for a planned one."""
 
     span: Span
@@ -47,8 +47,7 @@ class Lesson:
         return f"content/lessons/{self.id}-{self.slug}.md"
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
+class Level(Struct, frozen=True):
     """A level of the map."""
 
     span: Span
@@ -58,8 +57,7 @@ class Level:
     lessons: tuple[Lesson, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Page:
+class Page(Struct, frozen=True):
     """A page that is no lesson."""
 
     span: Span
@@ -71,16 +69,14 @@ class Page:
     """Whether every page's menu has it; the foot has them all."""
 
 
-@dataclass(frozen=True, slots=True)
-class MjcfModel:
+class MjcfModel(Struct, frozen=True):
     """A file of `models/`; its name is its path there without `.xml`."""
 
     name: str
     source: Source
 
 
-@dataclass(frozen=True, slots=True)
-class CalloutKind:
+class CalloutKind(Struct, frozen=True):
     """A kind of callout: its label, and what it promises."""
 
     name: str
@@ -88,8 +84,7 @@ class CalloutKind:
     promise: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Silence:
+class Silence(Struct, frozen=True):
     """A warning that the author does not want to see, and why.
 
     `path` limits it to a file (glob).
@@ -100,8 +95,7 @@ class Silence:
     path: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Course:
+class Course(Struct, frozen=True):
     """A whole course."""
 
     map: Source

@@ -7,52 +7,47 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
+class Text(Struct, frozen=True):
     """Plain text, entities decoded."""
 
     span: Span
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Emphasis:
+class Emphasis(Struct, frozen=True):
     """`*text*`."""
 
     span: Span
     children: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Strong:
+class Strong(Struct, frozen=True):
     """`**text**`."""
 
     span: Span
     children: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Strikethrough:
+class Strikethrough(Struct, frozen=True):
     """`~~text~~`."""
 
     span: Span
     children: tuple[Inline, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CodeSpan:
+class CodeSpan(Struct, frozen=True):
     """Inline code."""
 
     span: Span
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class NumberBinding:
+class NumberBinding(Struct, frozen=True):
     """`` `+6.6 %`{out} ``: a number that must be one the script printed."""
 
     span: Span
@@ -63,16 +58,14 @@ class NumberBinding:
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
+class Label(Struct, frozen=True):
     """`{#eq:euler}` after a formula on a line of its own: its id, colon included."""
 
     span: Span
     id: str
 
 
-@dataclass(frozen=True, slots=True)
-class Meaning:
+class Meaning(Struct, frozen=True):
     """`{symbol="angular velocity" unit="rad/s"}` after a formula: what the symbol stands for."""
 
     span: Span
@@ -81,8 +74,7 @@ class Meaning:
     """Empty where none is given."""
 
 
-@dataclass(frozen=True, slots=True)
-class Math:
+class Math(Struct, frozen=True):
     """A formula; `display` for `$$…$$`."""
 
     span: Span
@@ -94,8 +86,7 @@ class Math:
     """Only where it is not."""
 
 
-@dataclass(frozen=True, slots=True)
-class Term:
+class Term(Struct, frozen=True):
     """`[inertia tensor]{term}`: where the text says what a term means."""
 
     span: Span
@@ -113,53 +104,46 @@ class Term:
         return f"term:{self.id}"
 
 
-@dataclass(frozen=True, slots=True)
-class LessonTarget:
+class LessonTarget(Struct, frozen=True):
     """`lesson:4.3#anchor`."""
 
     id: str
     anchor: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class LevelTarget:
+class LevelTarget(Struct, frozen=True):
     """A mention such as "Level 18"; there is no scheme for it in a link."""
 
     id: str
 
 
-@dataclass(frozen=True, slots=True)
-class ModelTarget:
+class ModelTarget(Struct, frozen=True):
     """`model:tumbling_box#measured`."""
 
     name: str
     anchor: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class PageTarget:
+class PageTarget(Struct, frozen=True):
     """`page:about#anchor`."""
 
     id: str
     anchor: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class ExampleTarget:
+class ExampleTarget(Struct, frozen=True):
     """`examples/x.py`: a script of the course."""
 
     path: str
 
 
-@dataclass(frozen=True, slots=True)
-class UrlTarget:
+class UrlTarget(Struct, frozen=True):
     """Anything else: an address elsewhere, `#anchor` on this page, or a relative file."""
 
     url: str
 
 
-@dataclass(frozen=True, slots=True)
-class TermTarget:
+class TermTarget(Struct, frozen=True):
     """`term:inertia-tensor`."""
 
     id: str
@@ -170,8 +154,7 @@ Target: TypeAlias = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(Struct, frozen=True):
     """A link; `mention` when it is a "Lesson 2.2" or "Level 18" that became a link by itself."""
 
     span: Span
@@ -183,8 +166,7 @@ class Link:
     mention: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Image:
+class Image(Struct, frozen=True):
     """An image; `url` as written."""
 
     span: Span
@@ -195,30 +177,26 @@ class Image:
     """Where the address is written: in the image, or in the definition that it names."""
 
 
-@dataclass(frozen=True, slots=True)
-class RawInline:
+class RawInline(Struct, frozen=True):
     """Inline HTML, kept."""
 
     span: Span
     html: str
 
 
-@dataclass(frozen=True, slots=True)
-class SoftBreak:
+class SoftBreak(Struct, frozen=True):
     """A line end inside a paragraph."""
 
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class HardBreak:
+class HardBreak(Struct, frozen=True):
     """A forced line break."""
 
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class FootnoteRef:
+class FootnoteRef(Struct, frozen=True):
     """`[^label]`.
 
     `number` is its place in the order of first reference, `occurrence` counts references to it,

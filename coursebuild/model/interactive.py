@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model.inlines import Inline
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.model.blocks import Block
 
 
-@dataclass(frozen=True, slots=True)
-class LabControl:
+class LabControl(Struct, frozen=True):
     """A control of a lab.
 
     For a slider `minimum` … `step` are set, for a select `options`, for a button `run`.
@@ -40,8 +40,7 @@ class LabControl:
     reset: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class LabReadout:
+class LabReadout(Struct, frozen=True):
     """A number or text that the lab shows while it runs."""
 
     span: Span
@@ -50,8 +49,7 @@ class LabReadout:
     digits: int
 
 
-@dataclass(frozen=True, slots=True)
-class LabTrace:
+class LabTrace(Struct, frozen=True):
     """One line of a plot."""
 
     span: Span
@@ -60,8 +58,7 @@ class LabTrace:
     dash: bool | tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class LabPlot:
+class LabPlot(Struct, frozen=True):
     """A plot against simulated time (s)."""
 
     span: Span
@@ -80,8 +77,7 @@ LabStep: TypeAlias = str | tuple[tuple[str, float | str], ...]
 """What a reader does to a lab: the label of a button pressed, or labels of controls with values."""
 
 
-@dataclass(frozen=True, slots=True)
-class LabExpect:
+class LabExpect(Struct, frozen=True):
     """A claim that the build proves.
 
     `expr` lies in `[minimum, maximum]` at time `t` (s) after `after`.
@@ -96,8 +92,7 @@ class LabExpect:
     maximum: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Lab:
+class Lab(Struct, frozen=True):
     """A live simulation. See LABS: exactly one of `model` and `xml` is given for `simlab`."""
 
     span: Span
@@ -140,8 +135,7 @@ class Lab:
     """Where each value of the JSON stands, by the way to it: `("controls", 2, "set")`."""
 
 
-@dataclass(frozen=True, slots=True)
-class LabCamera:
+class LabCamera(Struct, frozen=True):
     """MuJoCo's free camera: degrees and metres; `None` is the engine's default for the model."""
 
     azimuth: float | None
@@ -150,8 +144,7 @@ class LabCamera:
     target: tuple[float, float, float] | None
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(Struct, frozen=True):
     """An option of a question, with what to say to a learner who takes it."""
 
     span: Span
@@ -161,8 +154,7 @@ class Choice:
     feedback: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Question:
+class Question(Struct, frozen=True):
     """What every question has, whatever its kind."""
 
     span: Span
@@ -174,8 +166,7 @@ class Question:
     hints: tuple[tuple[Block, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ChoiceQuestion(Question):
+class ChoiceQuestion(Question, frozen=True):
     """`mcq` and `predict`.
 
     `answers` are indices of the right options; `several` when all right ones must be chosen.
@@ -189,8 +180,7 @@ class ChoiceQuestion(Question):
     predict: bool
 
 
-@dataclass(frozen=True, slots=True)
-class NumericQuestion(Question):
+class NumericQuestion(Question, frozen=True):
     """A number: right within `tolerance` (absolute) of `answer`, in `unit`."""
 
     answer: float
@@ -200,15 +190,13 @@ class NumericQuestion(Question):
     unit: str
 
 
-@dataclass(frozen=True, slots=True)
-class OpenQuestion(Question):
+class OpenQuestion(Question, frozen=True):
     """Free text, compared by the learner with `reference`."""
 
     reference: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class OutputQuestion(Question):
+class OutputQuestion(Question, frozen=True):
     """What does the script print there? The key is the verified output's line `line` (from 1)."""
 
     script: str
@@ -217,8 +205,7 @@ class OutputQuestion(Question):
     line_span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class OrderQuestion(Question):
+class OrderQuestion(Question, frozen=True):
     """Put the items in order; they are written in the right order."""
 
     items: tuple[tuple[Inline, ...], ...]
@@ -231,8 +218,7 @@ AnyQuestion: TypeAlias = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Quiz:
+class Quiz(Struct, frozen=True):
     """A quiz; `id` is unique in the course and stable."""
 
     span: Span

@@ -6,19 +6,17 @@ document's skeleton.
 
 from __future__ import annotations
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A part of a definition, as HTML; `display`: a formula on a line of its own."""
 
     html: str
     display: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class DefinedTerm:
+class DefinedTerm(Struct, frozen=True):
     """A term, and what the text says of it where it defines it."""
 
     id: str
@@ -28,8 +26,7 @@ class DefinedTerm:
     definition: tuple[Piece, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class SymbolUse:
+class SymbolUse(Struct, frozen=True):
     """A symbol of the formulas of a document, where it stands first."""
 
     symbol: str
@@ -41,8 +38,7 @@ class SymbolUse:
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Equation:
+class Equation(Struct, frozen=True):
     """A formula on a line of its own."""
 
     id: str
@@ -51,8 +47,7 @@ class Equation:
     """Of one with a label: `3`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lexicon:
+class Lexicon(Struct, frozen=True):
     """See the module; everything in the order of the text."""
 
     terms: tuple[DefinedTerm, ...] = ()

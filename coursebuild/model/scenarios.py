@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+from msgspec import Struct
+
 from coursebuild.source import Source, Span
-from coursebuild.values import dataclass
 
 VISIBLE = 0.01
 """Share of a model's extent that a learner sees in a picture of it: 2 pixels of 200."""
@@ -29,8 +30,7 @@ def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:
     return tuple(found) or ("start",)
 
 
-@dataclass(frozen=True, slots=True)
-class Visible:
+class Visible(Struct, frozen=True):
     """From where on an error would be noticed."""
 
     share: float = VISIBLE
@@ -39,8 +39,7 @@ class Visible:
     """Degrees, for attitudes and hinges."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bands:
+class Bands(Struct, frozen=True):
     """What figures may differ by from those recorded, before `--check` fails."""
 
     error: float = 0.05
@@ -49,8 +48,7 @@ class Bands:
     """Of a fitted order."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """What is measured beside coordinates: the place of a thing, or what a sensor says."""
 
     kind: Literal["body", "site", "sensor"]
@@ -62,8 +60,7 @@ class Measured:
         return f"{self.kind}:{self.name}"
 
 
-@dataclass(frozen=True, slots=True)
-class DeclaredScenario:
+class DeclaredScenario(Struct, frozen=True):
     """A scenario as its author wrote it."""
 
     span: Span
@@ -101,8 +98,7 @@ class DeclaredScenario:
         return dict(self.places).get(name, self.span)
 
 
-@dataclass(frozen=True, slots=True)
-class Keep:
+class Keep(Struct, frozen=True):
     """A finding of the scene diet that is wanted as it is."""
 
     span: Span
@@ -113,8 +109,7 @@ class Keep:
     finding_span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Declarations:
+class Declarations(Struct, frozen=True):
     """A file `models/NAME.toml`."""
 
     model: str

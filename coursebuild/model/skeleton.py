@@ -18,6 +18,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import assert_never
 
+from msgspec.structs import replace
+
 from coursebuild.model.blocks import (
     Bench,
     Block,
@@ -43,7 +45,6 @@ from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInl
 from coursebuild.model.interactive import Lab, OutputQuestion, Quiz
 from coursebuild.model.walk import block_inlines, document_blocks, is_blank, walk_inlines
 from coursebuild.source import Span
-from coursebuild.values import replace
 
 _KEPT = frozenset((Link, Image, NumberBinding, RawInline, Term))
 

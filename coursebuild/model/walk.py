@@ -106,9 +106,9 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
 
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
-    known = document._all
-    if not known:
-        known += walk_blocks(document.blocks)
+    known: list[Block] | None = document.__dict__.get("walked")
+    if known is None:  # asked for by every check
+        known = document.__dict__["walked"] = list(walk_blocks(document.blocks))
         for footnote in document.footnotes:
             known += walk_blocks(footnote.blocks)
     return iter(known)
@@ -123,20 +123,15 @@ def is_blank(blocks: Iterable[Block]) -> bool:
     )
 
 
-_KINDS: dict[frozenset[type], frozenset[type]] = {}
-"""The sets that documents have, each once."""
-
-
 def document_has(document: Document, *kinds: type[Block] | type[AnyQuestion]) -> bool:
     """Whether a document has blocks, or questions in quizzes, of one of these types."""
-    known = document._kinds
+    known: frozenset[type] | None = document.__dict__.get("kinds")
     if known is None:
         blocks = tuple(document_blocks(document))
         quizzes = (block for block in blocks if isinstance(block, Quiz))
         questions = (question for quiz in quizzes for question in quiz.questions)
         known = frozenset(map(type, (*blocks, *questions)))
-        # Most documents of a course have the same ones.
-        object.__setattr__(document, "_kinds", _KINDS.setdefault(known, known))
+        document.__dict__["kinds"] = known
     return not known.isdisjoint(kinds)
 
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.measured.bench import Setting
 from coursebuild.physics.engine import advance, begun, held, silent, varied
@@ -26,7 +27,6 @@ from coursebuild.physics.pilot import OWN, Pilot
 from coursebuild.physics.problem import Array, Integrator, whole_number
 from coursebuild.physics.scene import Scene
 from coursebuild.physics.timing import MOST, QUICK_MOST, Clock, Job, Timing, timed
-from coursebuild.values import dataclass
 
 MOMENTS = 6
 """Times of a scenario from which steps are timed."""
@@ -36,8 +36,7 @@ JOB = 1_000_000
 """ns that a job takes at least."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cost:
+class Cost(Struct, frozen=True):
     """What a setting costs."""
 
     ratio: float
@@ -122,8 +121,7 @@ def _moments(model: Any, data: Any, scene: Scene, first: Pilot) -> tuple[Array, 
     return tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class _Batch:
+class _Batch(Struct, frozen=True):
     """What is timed of a setting."""
 
     job: Job

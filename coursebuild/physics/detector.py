@@ -17,9 +17,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.problem import Array
-from coursebuild.values import dataclass
 
 BAD = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -41,8 +41,7 @@ class Status(enum.Enum):
     """MuJoCo put the state back to its beginning on the way: the end says nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
+class Observation(Struct, frozen=True):
     """What was seen of a run."""
 
     warnings: tuple[int, int, int]
@@ -62,8 +61,7 @@ class Observation:
     """Deepest contact seen, relative to the deepest that is no fault."""
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
+class Judgement(Struct, frozen=True):
     """How a run went, and what shows it, in words."""
 
     status: Status
@@ -107,8 +105,7 @@ def judge(seen: Observation) -> Judgement:
 _WORSE = (Status.OK, Status.SLOW_GROWTH, Status.DIVERGED, Status.RESET)
 
 
-@dataclass(frozen=True, slots=True)
-class Peaks:
+class Peaks(Struct, frozen=True):
     """The most that was seen on the way."""
 
     position: float = 0.0

@@ -19,10 +19,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.physics.detector import Judgement, Peaks, deepest_contact, judge, observe, peaks
 from coursebuild.physics.problem import Array, Integrator, Motion, Problem, Setup, whole_number
-from coursebuild.values import dataclass, replace
 
 _CODE = {
     Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
@@ -113,8 +114,7 @@ def _ignore(_: str) -> None:
     pass
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(Struct, frozen=True):
     """A simulation, looked at n times."""
 
     times: Array

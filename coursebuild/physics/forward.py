@@ -16,18 +16,17 @@ from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.engine import begun, compiled, motion_of
 from coursebuild.physics.extrapolation import NoConvergenceError, Rate, State, integrate
 from coursebuild.physics.problem import Array, Integrator, Motion, Scenario, Setup
-from coursebuild.values import dataclass
 
 Method: TypeAlias = Callable[[Rate, State, Array], State]
 """A rate, a first state (d,) and rising times (n,) → the states (n, d)."""
 
 
-@dataclass(frozen=True, slots=True)
-class States:
+class States(Struct, frozen=True):
     """A motion in the engine's coordinates."""
 
     times: Array
@@ -40,8 +39,7 @@ class States:
     """(n, na)."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Unbounded:
+class _Unbounded(Struct, frozen=True):
     """A scenario of which nothing is judged."""
 
     scenario: Scenario

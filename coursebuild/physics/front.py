@@ -15,9 +15,10 @@ import itertools
 import math
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.measured.bench import Setting, Verdict
 from coursebuild.measured.points import seconds_text
-from coursebuild.values import dataclass
 
 COST_SLACK = (0.03, 0.12)
 """Relative: no difference in cost below the first is one, and every one beyond the second is."""
@@ -25,8 +26,7 @@ ERROR_SLACK = 0.05
 """Relative."""
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(Struct, frozen=True):
     """A setting in the plane of cost and error."""
 
     cost: float
@@ -35,8 +35,7 @@ class Point:
     """In any unit; 0 is as good as can be told."""
 
 
-@dataclass(frozen=True, slots=True)
-class Placed:
+class Placed(Struct, frozen=True):
     """Where a point lies."""
 
     front: bool

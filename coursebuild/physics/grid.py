@@ -12,13 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import mujoco
+from msgspec.structs import replace
 
 from coursebuild.measured.bench import Setting
 from coursebuild.physics.engine import choose
 from coursebuild.physics.pilot import OWN, Pilot
 from coursebuild.physics.problem import STANDARD, Integrator
 from coursebuild.physics.scene import Scene
-from coursebuild.values import replace
 
 _SOLVERS = {
     "PGS": int(mujoco.mjtSolver.mjSOL_PGS),

@@ -19,6 +19,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.model.scenarios import DeclaredScenario
 from coursebuild.physics.collocation import collocated
@@ -31,7 +33,6 @@ from coursebuild.physics.problem import Array, Integrator, Motion, Problem
 from coursebuild.physics.rotation import conjugate, multiply
 from coursebuild.physics.scene import Scene, SceneError
 from coursebuild.physics.tending import tends_to
-from coursebuild.values import dataclass, replace
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
@@ -46,8 +47,7 @@ _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
 
 
-@dataclass(frozen=True, slots=True)
-class Floor:
+class Floor(Struct, frozen=True):
     """What a reference may be wrong by."""
 
     position: float
@@ -63,8 +63,7 @@ class Floor:
         return max(self.position, self.attitude)
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
+class Known(Struct, frozen=True):
     """The reference of a scene, from the first sample to the horizon."""
 
     kind: str

@@ -16,12 +16,12 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.detector import Judgement
 from coursebuild.physics.engine import Run, compiled, motion_of, refsafe_active, simulate
 from coursebuild.physics.problem import STANDARD, Array, Integrator, Motion, Problem, Reference
 from coursebuild.physics.rotation import angle_between
-from coursebuild.values import dataclass
 
 FLOORS = 10.0
 """No error below so many floors of the reference is given."""
@@ -29,8 +29,7 @@ LOWEST, HIGHEST = 100.0, 0.1
 """Where an order is fitted: over so many floors, and under so much."""
 
 
-@dataclass(frozen=True, slots=True)
-class Error:
+class Error(Struct, frozen=True):
     """The difference of two motions in one respect."""
 
     largest: float
@@ -39,8 +38,7 @@ class Error:
     """At its end."""
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
+class Errors(Struct, frozen=True):
     """The difference of two motions; `None` for what they do not have."""
 
     position: Error | None
@@ -51,8 +49,7 @@ class Errors:
     """m/s or rad/s: Euclidean norm."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
+class Measurement(Struct, frozen=True):
     """One run, compared with its reference."""
 
     problem: str
@@ -163,8 +160,7 @@ def momentum_drift(run: Run) -> float | None:
     return float(np.max(np.linalg.norm(run.momentum - run.momentum[0], axis=1)) / scale)
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class Order(Struct, frozen=True):
     """The slope of error against timestep, on logarithmic axes."""
 
     value: float
@@ -188,8 +184,7 @@ def order(timesteps: Sequence[float], found: Sequence[float], floor: float) -> O
     return Order(float(np.polyfit(x, y, 1)[0]), len(usable))
 
 
-@dataclass(frozen=True, slots=True)
-class Orders:
+class Orders(Struct, frozen=True):
     """The orders of an integrator on a problem."""
 
     position: Order | None

@@ -17,12 +17,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.detector import Peaks, peaks
 from coursebuild.physics.engine import advance, begun, held, varied
 from coursebuild.physics.problem import Array, Integrator, Scenario, whole_number
 from coursebuild.physics.scene import Scene, SceneError
-from coursebuild.values import dataclass
 
 NUDGE = 1e-10
 """Of the twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
@@ -37,8 +37,7 @@ _SELDOM = 8
 """Steps from one look at how large the state is to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bounded:
+class Bounded(Struct, frozen=True):
     """A scenario, and the most that can be in it: a `Setup`."""
 
     scenario: Scenario
@@ -47,8 +46,7 @@ class Bounded:
     penetration_bound: float = float("inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Pilot:
+class Pilot(Struct, frozen=True):
     """What the first run says."""
 
     contact: bool

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
-
-from coursebuild.values import dataclass
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -43,8 +42,7 @@ STANDARD: tuple[Integrator, ...] = tuple(
 """Those with a name of their own in MJCF."""
 
 
-@dataclass(frozen=True, slots=True)
-class Scenario:
+class Scenario(Struct, frozen=True):
     """What happens: where it begins, how long it takes, what is commanded, when it is looked at."""
 
     duration: float
@@ -82,8 +80,7 @@ def whole_number(length: float, part: float, length_name: str, part_name: str) -
     return count
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(Struct, frozen=True):
     """States at n times, with attitudes apart from positions: their errors have other orders."""
 
     times: Array
@@ -96,8 +93,7 @@ class Motion:
     """(n, v) m/s or rad/s, as `qvel`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(Struct, frozen=True):
     """What exactly happens, and how well that is known."""
 
     kind: Literal["closed", "ode", "self"]
@@ -110,8 +106,7 @@ class Reference:
     """Errors of the reference itself: in m, rad, m/s and rad/s, over the problem's duration."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
+class Limit(Struct, frozen=True):
     """What theory says of the largest stable timestep of an integrator."""
 
     timestep: float
@@ -119,8 +114,7 @@ class Limit:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
-class Figure:
+class Figure(Struct, frozen=True):
     """A quantity of a hard case that is known exactly and can be measured."""
 
     name: str
@@ -152,8 +146,7 @@ class Setup(Protocol):
         """Deepest contact that is no fault, m."""
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(Struct, frozen=True):
     """A hard case."""
 
     name: str

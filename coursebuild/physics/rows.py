@@ -16,6 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.measured.bench import Setting
 from coursebuild.physics.detector import Judgement, Status
@@ -29,11 +30,9 @@ from coursebuild.physics.problem import Array, Integrator
 from coursebuild.physics.rotation import angle_between
 from coursebuild.physics.scene import Scene, thickness
 from coursebuild.physics.slip import Sticks, slip
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Conserved:
+class Conserved(Struct, frozen=True):
     """What does not change in a scene."""
 
     energy: float | None
@@ -42,8 +41,7 @@ class Conserved:
     """Whether the angular momentum about the centre of mass is."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """What one setting gave, without its cost."""
 
     setting: Setting

@@ -16,6 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.model.scenarios import (
     Declarations,
@@ -25,7 +26,6 @@ from coursebuild.model.scenarios import (
 )
 from coursebuild.physics.problem import Array, Scenario
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 DURATION = 2.0
 """Seconds of a scenario that does not say how long it takes."""
@@ -53,8 +53,7 @@ class SceneError(Exception):
         self.help = help
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Struct, frozen=True):
     """A scenario of a model, ready to run."""
 
     name: str

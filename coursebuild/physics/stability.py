@@ -18,6 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.detector import Peaks, Status, judge, observe
 from coursebuild.physics.engine import begun, bounds_of, compiled, watched
@@ -31,7 +32,6 @@ from coursebuild.physics.problem import (
     Scenario,
     Setup,
 )
-from coursebuild.values import dataclass
 
 GRID = 12
 """Timesteps tried in a decade."""
@@ -40,8 +40,7 @@ RESOLUTION = 1e-4
 _LOOKS = 20
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
+class Trial(Struct, frozen=True):
     """One timestep tried."""
 
     timestep: float
@@ -57,8 +56,7 @@ class Trial:
         return self.status is Status.OK
 
 
-@dataclass(frozen=True, slots=True)
-class Boundary:
+class Boundary(Struct, frozen=True):
     """Where an integrator ceases to be stable."""
 
     integrator: Integrator
@@ -122,8 +120,7 @@ def boundary(problem: Problem, integrator: Integrator) -> Boundary:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Scan:
+class Scan(Struct, frozen=True):
     """Where timesteps cease to be stable."""
 
     largest: float

@@ -21,7 +21,7 @@ import statistics
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 Clock: TypeAlias = Callable[[], int]
 """Time so far, in ns."""
@@ -37,8 +37,7 @@ _PARTS = 4
 """Into so many parts the rounds are cut, to see how much ratios vary."""
 
 
-@dataclass(frozen=True, slots=True)
-class Timing:
+class Timing(Struct, frozen=True):
     """What a candidate took."""
 
     ratio: float

@@ -16,6 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.detector import Judgement, Status
 from coursebuild.physics.engine import Run, begun, invariants, simulate_model, varied
@@ -26,14 +27,12 @@ from coursebuild.physics.problem import Integrator
 from coursebuild.physics.rows import Conserved, visible_error
 from coursebuild.physics.scene import Scene
 from coursebuild.physics.slip import Sticks, sticking
-from coursebuild.values import dataclass
 
 CONSERVED = 1e-8
 """Relative change, over the reference, of what is called conserved."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cone:
+class Cone(Struct, frozen=True):
     """What errors under a cone are measured against."""
 
     known: Known

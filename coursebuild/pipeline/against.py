@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct, field
+
 from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.diagnostics import Severity
 from coursebuild.effects.environments import environment, needed, other_version
@@ -33,7 +35,6 @@ from coursebuild.scripts.dependencies import Kind
 from coursebuild.scripts.elsewhere import Standing, is_comparable, judged, standings
 from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.failures import failure
-from coursebuild.values import dataclass, field
 
 
 def against(options: Options, names: tuple[str, ...], version: str) -> AgainstReport:
@@ -68,8 +69,7 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
         return work.report(blocked if documents is None else ())
 
 
-@dataclass(slots=True)
-class _Work:
+class _Work(Struct):
     """The comparison of some scripts."""
 
     course: Course

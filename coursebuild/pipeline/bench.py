@@ -13,6 +13,8 @@ Entry points: `bench(options, names, quick=…)`, `record(…)`, `check(…)`.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.measured.bench import SceneReport
 from coursebuild.measured.departures import Checked, scene_departures
@@ -28,11 +30,9 @@ from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.reports import command, read_record, recorded_models, write_record
 from coursebuild.pipeline.scene_run import Measuring, SceneRun
 from coursebuild.pipeline.scenes import Scene, Scenes, find_scenes
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Benched:
+class Benched(Struct, frozen=True):
     """What a run found."""
 
     scenes: tuple[SceneReport, ...]

@@ -9,19 +9,19 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course
 from coursebuild.pipeline.labs import Engines, try_labs
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.results import CompileResult, LabResult
-from coursebuild.values import dataclass
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Trials:
+class Trials(Struct, frozen=True):
     """Which labs to try, and how; see `try_labs`."""
 
     course: Course

@@ -12,6 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.site_swap import check_out, publish
@@ -26,7 +29,6 @@ from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report
 from coursebuild.results import FileList, Results, SiteFile
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
@@ -48,8 +50,7 @@ _FOLLOWING = (
 """What is needed when the course was read."""
 
 
-@dataclass(frozen=True, slots=True)
-class Prepared:
+class Prepared(Struct, frozen=True):
     """A verdict on the course, and its site; the site is empty where something is wrong."""
 
     report: Report

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.mjcf import parts
@@ -14,7 +16,6 @@ from coursebuild.effects.native import NativeEngine, NativeError
 from coursebuild.effects.v8_library import StoppedError
 from coursebuild.measured.bench import SceneCard, SceneReport
 from coursebuild.pipeline.scenes import Scene
-from coursebuild.values import replace
 
 _STEPS = 5000
 """Of a run in the browser's engine, at most."""

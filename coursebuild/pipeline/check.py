@@ -10,6 +10,8 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.effects.foresight import RunAll, early_server
 from coursebuild.effects.locks import project_lock
@@ -25,7 +27,6 @@ from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import plural
 from coursebuild.scripts.extract import extract
-from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.measured.sensitivity import Sensitivity

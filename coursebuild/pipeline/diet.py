@@ -20,6 +20,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.effects.code import code_digest
@@ -34,7 +36,6 @@ from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reports import write_record
 from coursebuild.pipeline.scenes import Scene, find_scenes
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.physics.diet.model_text import ModelText
@@ -48,8 +49,7 @@ _ROUNDS = 20
 """Most times that something new is found after something was changed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fixed:
+class Fixed(Struct, frozen=True):
     """A file that was changed."""
 
     path: str
@@ -57,8 +57,7 @@ class Fixed:
     """Of the findings that it was changed for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Dieted:
+class Dieted(Struct, frozen=True):
     """What a run found."""
 
     reports: tuple[DietReport, ...]

@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from coursebuild.effects.prepared import prepared_cut, prepared_source, prepared_template
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.render.strings import Strings
-from coursebuild.values import replace
 
 if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob

@@ -12,6 +12,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from msgspec import Struct
+
 from coursebuild.effects.native import NativeEngine, NativeError
 from coursebuild.effects.store import Store
 from coursebuild.effects.versions import engine_version
@@ -20,15 +22,13 @@ from coursebuild.labs.export import Export, export_script, file_name, filled, in
 from coursebuild.labs.export_text import About
 from coursebuild.labs.verdict import PARITY_RTOL, Parity
 from coursebuild.model import Course, Lab
-from coursebuild.values import dataclass
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
 """How long a trial's main run is, unless the lab says so."""
 
 
-@dataclass(frozen=True, slots=True)
-class Offer:
+class Offer(Struct, frozen=True):
     """What a page offers to download, or why there is nothing."""
 
     script: tuple[str, str] | None

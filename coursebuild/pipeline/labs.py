@@ -24,6 +24,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.lab_files import engine_digest
@@ -52,7 +54,6 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.remember import LabTrial, Memory
 from coursebuild.pipeline.remember_models import need_of
 from coursebuild.results import CompileResult, LabResult, StaticForm
-from coursebuild.values import dataclass
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
@@ -128,8 +129,7 @@ def try_labs(
     return tuple(results), tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class _Source:
+class _Source(Struct, frozen=True):
     """A lab's model as text."""
 
     path: str
@@ -174,8 +174,7 @@ def _saved(memory: Memory, engines: Engines, source: _Source) -> bytes:
     return made
 
 
-@dataclass(frozen=True, slots=True)
-class _Attempt:
+class _Attempt(Struct, frozen=True):
     """Trying one lab."""
 
     root: Path

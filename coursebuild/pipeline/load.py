@@ -16,19 +16,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import Course, Declarations, Document, Lesson, Level, Page, Status
 from coursebuild.source import Source
-from coursebuild.values import dataclass, replace
 from coursebuild.vocabulary import CALLOUTS
 
 MAP = "content/course.toml"
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
+class Loaded(Struct, frozen=True):
     """What the disk holds. `course` is `None` when the map cannot be used."""
 
     course: Course | None

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.measured.bench import ScenarioReport
@@ -25,11 +26,9 @@ from coursebuild.physics.engine import silent
 from coursebuild.physics.scene import Scene as PhysicsScene
 from coursebuild.physics.scene import SceneError, scenes
 from coursebuild.pipeline.scenes import Scene
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
+class Loaded(Struct, frozen=True):
     """A scene, compiled in this process."""
 
     scene: Scene

@@ -10,17 +10,17 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.errors import UsageError as UsageError
 from coursebuild.effects.read import find_root
 from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
+class Options(Struct, frozen=True):
     """Where the course is and how to work on it."""
 
     root: Path
@@ -117,8 +117,7 @@ def _size(said: str, text: str) -> int:
     return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 
 
-@dataclass(frozen=True, slots=True)
-class Selection:
+class Selection(Struct, frozen=True):
     """The lessons and pages that a command is about."""
 
     lessons: tuple[Lesson, ...]

@@ -17,17 +17,17 @@ import struct
 from collections.abc import Iterable
 from typing import Any
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.tool import engine_digest, tool_digest
 from coursebuild.model import Document
 from coursebuild.source import Source
-from coursebuild.values import dataclass
 
 _LENGTH = struct.Struct("<I")
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
+class Task(Struct, frozen=True):
     """A text to parse."""
 
     source: Source
@@ -50,8 +50,7 @@ class Task:
         return same and (self.source is source or self.source == source)
 
 
-@dataclass(frozen=True, slots=True)
-class Outline:
+class Outline(Struct, frozen=True):
     """A parsed text: what others than its own page look at, and what is wrong in it."""
 
     skeleton: Document

@@ -17,6 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, TypeAlias, assert_never
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.archives import check_archive, write_archive
 from coursebuild.effects.errors import EffectError
@@ -45,7 +48,6 @@ from coursebuild.render.tools import Tools
 from coursebuild.report import Report
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
-from coursebuild.values import dataclass, replace
 
 Kind: TypeAlias = Literal["qti", "scorm"]
 NAMES: dict[Kind, str] = {"qti": "quizzes-qti.zip", "scorm": "course-scorm.zip"}
@@ -111,8 +113,7 @@ def _scorm(course: Course, tools: Tools, assets: Assets, site: Site) -> Iterator
 # ------------------------------------------------------------------------------------------ QTI
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
+class _Asked(Struct, frozen=True):
     """A document with quizzes."""
 
     source: Source

@@ -22,6 +22,8 @@ import operator
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from msgspec import Struct
+
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
@@ -48,15 +50,13 @@ from coursebuild.render.shared import PageFacts
 from coursebuild.render.sheet import fingerprint, sheet_bytes
 from coursebuild.results import KeptFile
 from coursebuild.source import key_of
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.exports.page import Beside
     from coursebuild.render.exports.parts import LessonPart, OpenChapter
 
 
-@dataclass(frozen=True, slots=True)
-class _Wanted:
+class _Wanted(Struct, frozen=True):
     """A page as it should be."""
 
     page: PageEntry
@@ -70,8 +70,7 @@ class _Wanted:
         return self.page.path
 
 
-@dataclass(frozen=True, slots=True)
-class _Page:
+class _Page(Struct, frozen=True):
     wanted: _Wanted
     indexed: bool
     entry: Entry | None

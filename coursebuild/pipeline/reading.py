@@ -20,6 +20,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self, assert_never
 
 from markupsafe import Markup
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
@@ -54,7 +56,6 @@ from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
 from coursebuild.source import key_of
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.effects.v8 import MathEngine
@@ -71,8 +72,7 @@ _RENEW = 512
 some 6 kB. A new one takes as long for its first texts as for 20 further ones."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Whole:
+class _Whole(Struct, frozen=True):
     document: Document
     diagnostics: tuple[Diagnostic, ...]
     formulas: dict[Formula, str | MathError]

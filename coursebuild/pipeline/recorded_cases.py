@@ -9,6 +9,8 @@ Entry points: `record_stability`, `check_stability`.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.measured.cases import CaseReport
 from coursebuild.measured.departures import Checked, case_departures
 from coursebuild.measured.records import (
@@ -21,11 +23,9 @@ from coursebuild.model.scenarios import Bands
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reports import command, read_record, write_record
 from coursebuild.pipeline.stability import stability
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Cases:
+class Cases(Struct, frozen=True):
     """What a run found."""
 
     cases: tuple[CaseReport, ...]

@@ -20,6 +20,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import assert_never
 
+from msgspec import Struct
+
 from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.installed import Installed
@@ -43,7 +45,6 @@ from coursebuild.scripts.dependencies import (
     state_changes,
 )
 from coursebuild.scripts.remembered import REMEMBERED, Record, from_bytes, to_bytes
-from coursebuild.values import dataclass
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
@@ -53,8 +54,7 @@ _FETCHERS = 16
 _REASON = "{} changed while it ran"
 
 
-@dataclass(frozen=True, slots=True)
-class LabTrial:
+class LabTrial(Struct, frozen=True):
     """The trial of a lab."""
 
     ok: bool

@@ -9,11 +9,12 @@ import pickle
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.pipeline.outlines import Task
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.values import Searched
 from coursebuild.render.sheet import Sheet
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.exports.page import PageExports
@@ -23,15 +24,13 @@ PARTS, SECTIONS = "parts", "sections"
 """Kinds of entries in the store. They stay on this machine: reading them may run code."""
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+class Read(Struct, frozen=True):
     """Read a text."""
 
     task: Task
 
 
-@dataclass(frozen=True, slots=True)
-class Draw:
+class Draw(Struct, frozen=True):
     """Draw a page."""
 
     packed: bytes
@@ -52,8 +51,7 @@ class Draw:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
+class Ask(Struct, frozen=True):
     """Make the items of a page's quizzes; they are kept under the page's key."""
 
     page: Draw
@@ -78,8 +76,7 @@ def _same(request: Draw | Ask) -> Draw | Ask:
     return request
 
 
-@dataclass(frozen=True, slots=True)
-class Drawn:
+class Drawn(Struct, frozen=True):
     """A page that was drawn."""
 
     record: PageRecord

@@ -17,6 +17,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.checks.scenarios import check_scenarios
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean, nearest, sort_diagnostics
 from coursebuild.effects.mjcf import compile_models, model_files, readable_error
@@ -26,13 +28,11 @@ from coursebuild.pipeline.options import UsageError
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Source, Span
 from coursebuild.syntax.scenarios import parse_declarations
-from coursebuild.values import dataclass
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Struct, frozen=True):
     """A model that can be measured."""
 
     model: MjcfModel
@@ -48,8 +48,7 @@ class Scene:
         return self.model.name
 
 
-@dataclass(frozen=True, slots=True)
-class Scenes:
+class Scenes(Struct, frozen=True):
     """What was found."""
 
     scenes: tuple[Scene, ...]

@@ -17,16 +17,16 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from msgspec import Struct
+
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.write import write_atomic
 from coursebuild.pipeline.options import UsageError
-from coursebuild.values import dataclass
 
 _MOST = 10_000
 
 
-@dataclass(frozen=True, slots=True)
-class Shard:
+class Shard(Struct, frozen=True):
     """One part of the work, from 1 to `count`."""
 
     index: int

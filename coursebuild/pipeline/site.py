@@ -18,6 +18,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import kept_distributions, library_files
@@ -45,7 +48,6 @@ from coursebuild.render.shared import PageFacts, common_characters, needed_fonts
 from coursebuild.render.templates import templates_of
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.render.exports.chapters import Note
@@ -60,8 +62,7 @@ _CELLS = "search"
 _DIGEST = hashlib.sha256().digest_size * 2
 
 
-@dataclass(frozen=True, slots=True)
-class Site:
+class Site(Struct, frozen=True):
     """A site that may be published where nothing is wrong with it."""
 
     files: tuple[SiteFile, ...]

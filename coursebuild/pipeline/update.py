@@ -20,6 +20,8 @@ import difflib
 import time
 from collections.abc import Collection, Mapping, Sequence
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.foresight import RunAll
@@ -40,7 +42,6 @@ from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.findings import bearings, script_findings
 from coursebuild.source import Source
-from coursebuild.values import replace
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:

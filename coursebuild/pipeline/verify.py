@@ -17,6 +17,8 @@ import functools
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, assert_never
 
+from msgspec import Struct, field
+
 from coursebuild.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
@@ -45,7 +47,6 @@ from coursebuild.scripts.dependencies import Inputs
 from coursebuild.scripts.divergence import is_lost
 from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
-from coursebuild.values import dataclass, field
 
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
@@ -53,8 +54,7 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.shards import Shard
 
 
-@dataclass(frozen=True, slots=True)
-class Verified:
+class Verified(Struct, frozen=True):
     """What verification found."""
 
     results: Results
@@ -150,8 +150,7 @@ def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
 # --- scripts
 
 
-@dataclass(frozen=True, slots=True)
-class ExtractedScripts:
+class ExtractedScripts(Struct, frozen=True):
     """The scripts as they are in `examples/` now."""
 
     all: tuple[Extraction, ...]

@@ -6,6 +6,7 @@ Entry points: `article`, `contents`.
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.model import (
     Bench,
@@ -22,11 +23,9 @@ from coursebuild.model import (
 )
 from coursebuild.render.context import PageContext
 from coursebuild.render.plainly import without_links
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """An entry of the contents list."""
 
     anchor: str
@@ -49,8 +48,7 @@ def article(page: PageContext, document: Document) -> Markup:
     return Markup("\n").join((*parts, page.footnotes()))
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
+class _Group(Struct, frozen=True):
     """Blocks that follow each other; with a docked lab, those before and after it."""
 
     before: tuple[Block, ...]

@@ -14,8 +14,9 @@ import functools
 import hashlib
 from collections.abc import Mapping
 
+from msgspec import Struct
+
 from coursebuild.render.strings import DEFAULT_LANGUAGE, Strings, parse_strings
-from coursebuild.values import dataclass
 
 SCRIPTS = {
     "theme.js": "js/theme.js",
@@ -29,8 +30,7 @@ SCRIPTS = {
 """What plain scripts of pages are published as, and the bundled modules that they are."""
 
 
-@dataclass(frozen=True, slots=True)
-class Assets:
+class Assets(Struct, frozen=True):
     """Templates and bundled files, sorted by path."""
 
     templates: tuple[tuple[str, str], ...]

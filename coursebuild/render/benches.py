@@ -11,20 +11,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.model import Bench, document_blocks
 from coursebuild.render.figures import Grid, again, where
 from coursebuild.render.scenarios import scenario_view
 from coursebuild.render.sheet import ShownBench
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.measured.bench import ScenarioReport
     from coursebuild.render.context import PageContext
 
 
-@dataclass(frozen=True, slots=True)
-class BenchView:
+class BenchView(Struct, frozen=True):
     """The block, ready for its template."""
 
     model: str

@@ -12,6 +12,7 @@ from decimal import Decimal
 from typing import TYPE_CHECKING, assert_never
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.model import (
     Callout,
@@ -34,14 +35,12 @@ from coursebuild.render.sheet import ShownRun, ShownVerdict
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
 from coursebuild.results import Outcome
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
 
 
-@dataclass(frozen=True, slots=True)
-class CodePart:
+class CodePart(Struct, frozen=True):
     """A stretch of a script's lines, as HTML."""
 
     html: Markup
@@ -52,8 +51,7 @@ class CodePart:
     """What a fold holds, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class Receipt:
+class Receipt(Struct, frozen=True):
     """What the build can say for an output or a script."""
 
     kind: str
@@ -133,8 +131,7 @@ def binding(page: PageContext, node: NumberBinding) -> Markup:
 # --- outputs
 
 
-@dataclass(frozen=True, slots=True)
-class Output:
+class Output(Struct, frozen=True):
     """A recorded output, ready for its template."""
 
     caption: Markup

@@ -13,6 +13,7 @@ from typing import assert_never
 from urllib.parse import quote, unquote
 
 from markupsafe import Markup, escape
+from msgspec import Struct
 
 from coursebuild.model import (
     Bench,
@@ -43,11 +44,9 @@ from coursebuild.render.sheet import Shown
 from coursebuild.render.shown import file_address, shown
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class PageContext:
+class PageContext(Struct, frozen=True):
     """One document on one page."""
 
     tools: Tools

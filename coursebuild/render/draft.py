@@ -6,12 +6,10 @@ Entry point: `Draft`.
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec import Struct
 
-from coursebuild.values import dataclass
 
-
-@dataclass(frozen=True, slots=True)
-class Draft:
+class Draft(Struct, frozen=True):
     """A page without its frame."""
 
     path: str

@@ -11,18 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from html import unescape
 
+from msgspec import Struct
+
 from coursebuild.model import Document
 from coursebuild.model.equations import display_formulas
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass
 
 _COUNTED = 'class="tml-eqn"'
 _TAGGED = 'class="tml-tag"'
 _TAG = pattern(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
-@dataclass(frozen=True, slots=True)
-class NumberedFormula:
+class NumberedFormula(Struct, frozen=True):
     """A formula on a line of its own, as its page shows it."""
 
     id: str

@@ -11,19 +11,18 @@ import shlex
 from collections.abc import Iterator
 
 from markupsafe import Markup, escape
+from msgspec import Struct
 
 from coursebuild.measured.bench import Machine, ScenarioReport
 from coursebuild.measured.cases import ReferenceLine
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
 """A thin space; tables and numbers are kept in one line by the style sheet."""
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """Rows of a table under a title of their own."""
 
     title: str
@@ -32,8 +31,7 @@ class Part:
     """How many."""
 
 
-@dataclass(frozen=True, slots=True)
-class Grid:
+class Grid(Struct, frozen=True):
     """A table."""
 
     label: str

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import ast
 
+from msgspec import Struct
+
 from coursebuild.python_text import text_key, top_level
-from coursebuild.values import dataclass
 
 LONG = 48
 """Lines; a script up to this length is shown whole."""
@@ -32,8 +33,7 @@ _MOST = 4096
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """Whole lines of a script, from `first` to `last` (from 1, both included)."""
 
     first: int
@@ -58,8 +58,7 @@ def imported(code: str) -> frozenset[str]:
     return _read(code).modules
 
 
-@dataclass(frozen=True, slots=True)
-class _Outline:
+class _Outline(Struct, frozen=True):
     parts: tuple[Part, ...]
     modules: frozenset[str]
 

@@ -23,7 +23,7 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
 """Families, as the bundle names them."""
@@ -41,8 +41,7 @@ _QUALITY = 10
 bytes."""
 
 
-@dataclass(frozen=True, slots=True)
-class Face:
+class Face(Struct, frozen=True):
     """A font file of the bundle, as `fonts.json` lists it."""
 
     family: str
@@ -58,8 +57,7 @@ class Face:
     """See `measured`; nothing where nobody has looked."""
 
 
-@dataclass(frozen=True, slots=True)
-class FontJob:
+class FontJob(Struct, frozen=True):
     """One font to cut."""
 
     face: Face
@@ -208,8 +206,7 @@ def _cut(job: FontJob, flavor: str | None, quality: int) -> bytes:
 # --------------------------------------------------------------------------------- fallbacks
 
 
-@dataclass(frozen=True, slots=True)
-class Fallback:
+class Fallback(Struct, frozen=True):
     """Local fonts, alike in their advance widths, that stand in for a face until it is there."""
 
     family: str

@@ -22,8 +22,9 @@ import re
 from collections.abc import Iterator, Sequence
 from html import escape, unescape
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass
 
 LONG = 20
 """Characters; a shorter formula stays whole."""
@@ -197,8 +198,7 @@ def _hold(html: str) -> str:
 # --- piece by piece
 
 
-@dataclass(frozen=True, slots=True)
-class Woven:
+class Woven(Struct, frozen=True):
     """HTML, and where its formulas stand."""
 
     texts: tuple[str, ...]

@@ -16,6 +16,7 @@ import re
 from collections.abc import Mapping
 
 from markupsafe import Markup, escape
+from msgspec import Struct
 
 from coursebuild.patterns import pattern
 from coursebuild.render import meta, urls
@@ -24,7 +25,6 @@ from coursebuild.render.direction import direction
 from coursebuild.render.draft import Draft as Draft
 from coursebuild.render.library import Library
 from coursebuild.render.own_pages import own_pages
-from coursebuild.values import dataclass
 
 PAGE_WORDS = (
     "theme.label",
@@ -56,8 +56,7 @@ _PARTS = {
 body, and the interface texts that it needs; of some, the beginnings of their keys."""
 
 
-@dataclass(frozen=True, slots=True)
-class Names:
+class Names(Struct, frozen=True):
     """Site paths of the files that every page refers to."""
 
     style: str
@@ -101,8 +100,7 @@ def policy(json_ld: str, *, form: bool = False) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class NavLink:
+class NavLink(Struct, frozen=True):
     """An entry of the site's navigation."""
 
     href: str

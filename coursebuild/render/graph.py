@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 from markupsafe import Markup, escape
+from msgspec import Struct
 
 from coursebuild.drawing.layered import Layout, layered, reduced
 from coursebuild.drawing.marks import markup_text, shortened, text_width
@@ -24,7 +25,6 @@ from coursebuild.render import urls
 from coursebuild.render.library import Library
 from coursebuild.render.sheet import Graphed, GraphNode
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 _BESIDE = 5
 """Lessons that are shown of those that one needs, and of those that it leads to."""
@@ -34,8 +34,7 @@ _IN_LEVEL = 40
 """Lessons of a level that are drawn, and with those from elsewhere as many again."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Look:
+class _Look(Struct, frozen=True):
     """Sizes in the units of the drawing, which are the pixels of CSS."""
 
     width: float
@@ -152,8 +151,7 @@ def _x(place: float, unit: float, look: _Look) -> float:
     return place * unit - look.gap / 2 + _EDGE
 
 
-@dataclass(frozen=True, slots=True)
-class _Box:
+class _Box(Struct, frozen=True):
     x: float
     """The middle."""
     top: float

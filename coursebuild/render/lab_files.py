@@ -11,15 +11,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
+from msgspec import Struct
+
 from coursebuild.render.assets import Assets, hashed_name
 from coursebuild.results import LabResult, OutputFile
-from coursebuild.values import dataclass
 
 _FOLDER = "assets/labs"
 
 
-@dataclass(frozen=True, slots=True)
-class LabFiles:
+class LabFiles(Struct, frozen=True):
     """Where the files of one lab are, as site paths."""
 
     result: LabResult
@@ -29,8 +29,7 @@ class LabFiles:
     picture: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class PublishedLabs:
+class PublishedLabs(Struct, frozen=True):
     """All labs of a course."""
 
     labs: Mapping[tuple[str, int], LabFiles]

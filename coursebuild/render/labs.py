@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.model import Lab, LabControl, ModelTarget
 from coursebuild.render.qr import qr_svg
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
     from coursebuild.render.sheet import ShownRecord
 
 
-@dataclass(frozen=True, slots=True)
-class ControlView:
+class ControlView(Struct, frozen=True):
     """A row of the table of controls."""
 
     label: str
@@ -30,8 +29,7 @@ class ControlView:
     """Range or options, and what it is at first, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class RecordedView:
+class RecordedView(Struct, frozen=True):
     """What the trial recorded, ready for the template."""
 
     picture: str
@@ -44,8 +42,7 @@ class RecordedView:
     proven: str
 
 
-@dataclass(frozen=True, slots=True)
-class PaperView:
+class PaperView(Struct, frozen=True):
     """What leads from paper to the lab."""
 
     code: Markup
@@ -55,8 +52,7 @@ class PaperView:
     """The address as one types it."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlotView:
+class PlotView(Struct, frozen=True):
     """A plot: its axes and the lines in it."""
 
     title: str

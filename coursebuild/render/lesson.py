@@ -5,6 +5,8 @@ Entry points: `lesson_sheet`, and for a planned lesson `stub_sheet`.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.model import Document, Lesson, Status
 from coursebuild.render import meta, urls
 from coursebuild.render.graph import around
@@ -12,11 +14,9 @@ from coursebuild.render.library import Library, document_scripts
 from coursebuild.render.owners import owner_links
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.shown import shown
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class LessonLink:
+class LessonLink(Struct, frozen=True):
     """A lesson as other pages name it."""
 
     id: str
@@ -30,8 +30,7 @@ class LessonLink:
     """Its questions, where a list names them; see `asked.asked`."""
 
 
-@dataclass(frozen=True, slots=True)
-class LessonHead:
+class LessonHead(Struct, frozen=True):
     """What stands over a lesson."""
 
     id: str
@@ -46,8 +45,7 @@ class LessonHead:
         return cls(lesson.id, lesson.title, lesson.summary, lesson.minutes, lesson.objectives)
 
 
-@dataclass(frozen=True, slots=True)
-class LevelName:
+class LevelName(Struct, frozen=True):
     """A level as a lesson names it."""
 
     id: str

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.measured.shown import Reports
 from coursebuild.model import (
@@ -40,7 +41,6 @@ from coursebuild.render.strings import Strings
 from coursebuild.render.templates import Templates, templates_of
 from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
-from coursebuild.values import dataclass
 from coursebuild.vocabulary import CALLOUTS
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
@@ -49,8 +49,7 @@ Owner: TypeAlias = Lesson | Page
 """What a document belongs to."""
 
 
-@dataclass(frozen=True, slots=True)
-class ModelUse:
+class ModelUse(Struct, frozen=True):
     """A document that uses a model, and how."""
 
     owner: Owner
@@ -59,8 +58,7 @@ class ModelUse:
     by_link: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Library:
+class Library(Struct, frozen=True):
     """A course and its results, by name."""
 
     course: Course
@@ -255,8 +253,7 @@ def models_named(script: Script) -> frozenset[str]:
     return frozenset(found)
 
 
-@dataclass(frozen=True, slots=True)
-class NamedModels:
+class NamedModels(Struct, frozen=True):
     """What a document names that may be models."""
 
     by_labs: frozenset[str]

@@ -18,12 +18,13 @@ from html import unescape
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import nearest
 from coursebuild.model import linked_lines
 from coursebuild.patterns import pattern
 from coursebuild.render import urls
 from coursebuild.results import OutputFile
-from coursebuild.values import dataclass
 
 _ADDRESSES = {
     "a": ("href",),
@@ -53,8 +54,7 @@ Reference: TypeAlias = tuple[str, str]
 """
 
 
-@dataclass(frozen=True, slots=True)
-class BrokenLink:
+class BrokenLink(Struct, frozen=True):
     """An address of a page that leads nowhere."""
 
     page: str
@@ -69,20 +69,17 @@ class BrokenLink:
     """The nearest file or id that is there."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Address:
+class _Address(Struct, frozen=True):
     url: str
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Page:
+class _Page(Struct, frozen=True):
     ids: frozenset[str]
     addresses: tuple[_Address, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Base:
+class _Base(Struct, frozen=True):
     """Where the site is served."""
 
     root: str

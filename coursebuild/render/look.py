@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Literal, Protocol, TypeAlias
 
 from markupsafe import Markup
+from msgspec import Struct, field
 
 from coursebuild.model import (
     Bench,
@@ -23,7 +24,6 @@ from coursebuild.model import (
     Script,
     Target,
 )
-from coursebuild.values import dataclass, field
 
 OwnBlock: TypeAlias = Bench | Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
 """The blocks that are more than Markdown."""
@@ -65,8 +65,7 @@ class Context(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+class Words(Struct, frozen=True):
     """The words that Markdown's own elements need; `{number}` and `{occurrence}` are filled in."""
 
     anchor: str = "Link to this section"
@@ -80,8 +79,7 @@ class Words:
     not_done: str = "Not done"
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
+class Look(Struct, frozen=True):
     """Details of the HTML."""
 
     words: Words = field(default_factory=Words)

@@ -7,6 +7,7 @@ command that measures it.
 from __future__ import annotations
 
 from markupsafe import Markup, escape
+from msgspec import Struct
 
 from coursebuild.measured.bench import SceneReport
 from coursebuild.measured.diet import DietReport, Finding, Saving
@@ -17,11 +18,9 @@ from coursebuild.render.figures import again, factor, power, sentence, size, whe
 from coursebuild.render.library import Library
 from coursebuild.render.scenarios import ScenarioView, scenario_view
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class FindingView:
+class FindingView(Struct, frozen=True):
     """A finding of the diet."""
 
     kind: str
@@ -35,8 +34,7 @@ class FindingView:
     places: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class DietView:
+class DietView(Struct, frozen=True):
     """What the model could be without."""
 
     summary: str
@@ -47,8 +45,7 @@ class DietView:
     """The address of the report."""
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredView:
+class MeasuredView(Struct, frozen=True):
     """All of it."""
 
     card: tuple[tuple[str, str], ...]

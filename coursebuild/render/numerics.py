@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
 from coursebuild.measured.points import FLOORS, KNOWN, seconds_text, status_text
 from coursebuild.measured.records import STABILITY_PATH
@@ -27,7 +29,6 @@ from coursebuild.render.library import Library
 from coursebuild.render.scenarios import ORDERS, largest
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 _QUANTITIES = (
     ("position", "measured.position"),
@@ -47,8 +48,7 @@ _Rows = list[tuple[tuple[str, ...], str]]
 """Cells, and the integrator that they are of."""
 
 
-@dataclass(frozen=True, slots=True)
-class CaseView:
+class CaseView(Struct, frozen=True):
     """A hard case."""
 
     name: str
@@ -62,8 +62,7 @@ class CaseView:
     command: str
 
 
-@dataclass(frozen=True, slots=True)
-class CaseGroup:
+class CaseGroup(Struct, frozen=True):
     """Cases of one number."""
 
     number: int

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from msgspec import Struct
+
 from coursebuild.render import urls
 from coursebuild.render.library import Library
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class OwnPage:
+class OwnPage(Struct, frozen=True):
     """A page or file of the site that no author wrote."""
 
     path: str

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import Owner
 from coursebuild.render.lookup.references import owner_path as owner_path
-from coursebuild.values import dataclass
 
 MOST = 12
 """Links that a list shows; of more it says how many there are."""
 
 
-@dataclass(frozen=True, slots=True)
-class OwnerLink:
+class OwnerLink(Struct, frozen=True):
     """A lesson or page as a link."""
 
     href: str
@@ -28,8 +28,7 @@ class OwnerLink:
     title: str
 
 
-@dataclass(frozen=True, slots=True)
-class OwnerLinks:
+class OwnerLinks(Struct, frozen=True):
     """Some of them, and how many more there are."""
 
     shown: tuple[OwnerLink, ...]

@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from msgspec import Struct
+
 from coursebuild.model import Document
 from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.tools import Tools
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class PageEntry:
+class PageEntry(Struct, frozen=True):
     """A page of a site."""
 
     path: str
@@ -52,8 +52,7 @@ class PageEntry:
         return draw(self.sheet(library), shown, tools or library.tools)
 
 
-@dataclass(frozen=True, slots=True)
-class PageKind:
+class PageKind(Struct, frozen=True):
     """How the pages of a kind are made, each from the id of what it shows."""
 
     sheet: Callable[[Library, str], Sheet]

@@ -6,6 +6,9 @@ shows.
 
 from __future__ import annotations
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.render import meta, urls
 from coursebuild.render.frame import place_of
@@ -17,11 +20,9 @@ from coursebuild.render.measured import measured_view
 from coursebuild.render.sheet import Highlighted, Plotted, Sheet
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
-from coursebuild.values import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
-class LevelView:
+class LevelView(Struct, frozen=True):
     """A level and its lessons."""
 
     id: str
@@ -32,16 +33,14 @@ class LevelView:
     written: int
 
 
-@dataclass(frozen=True, slots=True)
-class CourseHead:
+class CourseHead(Struct, frozen=True):
     """What stands over the course map."""
 
     title: str
     summary: str
 
 
-@dataclass(frozen=True, slots=True)
-class Named:
+class Named(Struct, frozen=True):
     """A link with its text, and a remark on it."""
 
     href: str

@@ -14,6 +14,8 @@ import re
 from typing import TYPE_CHECKING, assert_never
 
 from markupsafe import Markup, escape
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.model import (
     AnyQuestion,
@@ -31,14 +33,12 @@ from coursebuild.model import (
     plain_text,
 )
 from coursebuild.results import Outcome
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
 
 
-@dataclass(frozen=True, slots=True)
-class Option:
+class Option(Struct, frozen=True):
     """An option of a question, lettered."""
 
     key: str
@@ -48,16 +48,14 @@ class Option:
     right: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(Struct, frozen=True):
     """An item that is to be put in order."""
 
     key: str
     text: Markup
 
 
-@dataclass(frozen=True, slots=True)
-class QuestionView:
+class QuestionView(Struct, frozen=True):
     """A question, ready for its template."""
 
     kind: str

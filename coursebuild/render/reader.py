@@ -8,6 +8,8 @@ and where, and hold places that the page's script fills from the reader's own br
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.model import Lesson
 from coursebuild.render import urls
 from coursebuild.render.asked import count
@@ -15,15 +17,13 @@ from coursebuild.render.library import Library, owners
 from coursebuild.render.owners import owner_path
 from coursebuild.render.pages import level_view
 from coursebuild.render.sheet import Sheet
-from coursebuild.values import dataclass
 
 KEPT_AS = "coursebuild.progress."
 """What the name under which a browser keeps progress begins with; the course's key follows. As in
 site/js/progress/store.js."""
 
 
-@dataclass(frozen=True, slots=True)
-class Asking:
+class Asking(Struct, frozen=True):
     """A lesson or page with questions."""
 
     id: str

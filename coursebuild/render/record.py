@@ -6,6 +6,8 @@ Entry point: `record(draft, article, base_url)`.
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.render import fonts
 from coursebuild.render.draft import Draft
@@ -14,11 +16,9 @@ from coursebuild.render.frame import parts_of
 from coursebuild.render.links import Reference, references, without_lines
 from coursebuild.render.settling import settle_with
 from coursebuild.render.shared import PageFacts
-from coursebuild.values import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
-class PageRecord:
+class PageRecord(Struct, frozen=True):
     """What the site must know of a page to put it together, but for the page's body."""
 
     draft: Draft

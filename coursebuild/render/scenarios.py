@@ -5,6 +5,8 @@ Entry point: `scenario_view(words, report, anchor)`; `largest`, a largest stable
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.measured.bench import (
     OrderRow,
     ScenarioReport,
@@ -34,7 +36,6 @@ from coursebuild.render.figures import (
     sentence,
 )
 from coursebuild.render.strings import Strings
-from coursebuild.values import dataclass
 
 _QUANTITIES = {
     "seen": "measured.seen",
@@ -50,8 +51,7 @@ ORDERS = (
 """Orders that are fitted, with their titles."""
 
 
-@dataclass(frozen=True, slots=True)
-class ScenarioView:
+class ScenarioView(Struct, frozen=True):
     """A scenario."""
 
     anchor: str

@@ -17,13 +17,14 @@ import functools
 from collections.abc import Callable, Sequence
 from html import unescape
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
 from coursebuild.render import formulas, links, styles
 from coursebuild.render.characters import RARE, visible
 from coursebuild.render.formulas import Woven
 from coursebuild.render.mathml import is_ours
 from coursebuild.render.shared import page_characters
-from coursebuild.values import dataclass
 
 _FEW = 200
 """Characters by which a part is found."""
@@ -31,8 +32,7 @@ _REMEMBERED = 256
 """Formulas: a page says the same ones again and again, the next one others."""
 
 
-@dataclass(frozen=True, slots=True)
-class Settled:
+class Settled(Struct, frozen=True):
     """See the module."""
 
     html: str
@@ -181,8 +181,7 @@ def _noted(attributes: str) -> tuple[tuple[str, str], ...]:
     return tuple((name, value) for name, value in found if name)
 
 
-@dataclass(frozen=True, slots=True)
-class _Formula:
+class _Formula(Struct, frozen=True):
     """What is between the ends of a `math` element, settled."""
 
     inside: str

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from html import unescape
 
 from markupsafe import Markup
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.patterns import pattern
 from coursebuild.render import fonts, formulas, styles
@@ -22,11 +24,9 @@ from coursebuild.render.assets import SCRIPTS, Assets, hashed_name, page_script
 from coursebuild.render.frame import Draft, Names
 from coursebuild.render.library import Library
 from coursebuild.results import OutputFile
-from coursebuild.values import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
-class PageFacts:
+class PageFacts(Struct, frozen=True):
     """What the shared files must know of a page."""
 
     text: frozenset[str]

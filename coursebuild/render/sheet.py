@@ -18,17 +18,16 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
 from markupsafe import Markup
+from msgspec import Struct, field
 
 from coursebuild.model import Comparison, Target
 from coursebuild.results import Outcome
-from coursebuild.values import dataclass, field
 
 if TYPE_CHECKING:
     from coursebuild.measured.bench import Machine, ScenarioReport
 
 
-@dataclass(frozen=True, slots=True)
-class ShownRun:
+class ShownRun(Struct, frozen=True):
     """What a page may say of the run of a script."""
 
     outcome: Outcome
@@ -39,16 +38,14 @@ class ShownRun:
     `None` where there is no such line."""
 
 
-@dataclass(frozen=True, slots=True)
-class ShownVerdict:
+class ShownVerdict(Struct, frozen=True):
     """What a page says of the comparison of an output."""
 
     status: Literal["verified", "drift", "volatile", "unchecked"]
     comparison: Comparison
 
 
-@dataclass(frozen=True, slots=True)
-class ShownRecord:
+class ShownRecord(Struct, frozen=True):
     """What a page shows of the trial of a lab."""
 
     picture: str
@@ -66,8 +63,7 @@ class ShownRecord:
     parity: str
 
 
-@dataclass(frozen=True, slots=True)
-class ShownLab:
+class ShownLab(Struct, frozen=True):
     """A lab that runs."""
 
     name: str
@@ -77,8 +73,7 @@ class ShownLab:
     record: ShownRecord | None
 
 
-@dataclass(frozen=True, slots=True)
-class ShownBench:
+class ShownBench(Struct, frozen=True):
     """What a page shows of a report."""
 
     href: str
@@ -89,16 +84,14 @@ class ShownBench:
     """Where it was measured."""
 
 
-@dataclass(frozen=True, slots=True)
-class ShownCallout:
+class ShownCallout(Struct, frozen=True):
     """The words of a kind of callout."""
 
     label: str
     promise: str
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(Struct, frozen=True):
     """What the page of a document shows of the rest of the course, and of what running it found.
 
     What stands at a place in the document goes by its offset there.
@@ -123,8 +116,7 @@ class Shown:
     """The page's full address; empty where nobody knows where the site will stand."""
 
 
-@dataclass(frozen=True, slots=True)
-class Highlighted:
+class Highlighted(Struct, frozen=True):
     """A file whose tokens are marked when the page is drawn."""
 
     language: str
@@ -133,15 +125,13 @@ class Highlighted:
     """By which its lines are linked to."""
 
 
-@dataclass(frozen=True, slots=True)
-class Plotted:
+class Plotted(Struct, frozen=True):
     """Work–precision plots, drawn when the page is: two of each, for wide and narrow screens."""
 
     reports: tuple[ScenarioReport, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class GraphNode:
+class GraphNode(Struct, frozen=True):
     """A lesson in a drawing of lessons."""
 
     id: str
@@ -154,8 +144,7 @@ class GraphNode:
     """Whether it is of another level than the page's."""
 
 
-@dataclass(frozen=True, slots=True)
-class Graphed:
+class Graphed(Struct, frozen=True):
     """Which lessons build on which, drawn when the page is: for wide and narrow screens."""
 
     nodes: tuple[GraphNode, ...]
@@ -164,8 +153,7 @@ class Graphed:
     """Ids: what is needed, and what needs it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sheet:
+class Sheet(Struct, frozen=True):
     """A page that is to be drawn."""
 
     path: str

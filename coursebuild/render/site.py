@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from msgspec import Struct, field
+
 from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
 from coursebuild.render import fonts, meta, urls, zips
@@ -32,11 +34,9 @@ from coursebuild.render.shared import (
     shared_files,
 )
 from coursebuild.results import OutputFile, Results
-from coursebuild.values import dataclass, field
 
 
-@dataclass(frozen=True, slots=True)
-class SiteOptions:
+class SiteOptions(Struct, frozen=True):
     """What is not in the course itself."""
 
     files: tuple[OutputFile, ...] = ()

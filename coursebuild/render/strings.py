@@ -14,27 +14,31 @@ Entry point: `parse_strings(text, fallback, language)`, which gives `Strings`; a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
+
+from msgspec import Struct
 
 from coursebuild.render.plurals import CATEGORIES, category
-from coursebuild.values import dataclass, field
 
 DEFAULT_LANGUAGE = "en"
 
 
-@dataclass(frozen=True, slots=True)
-class Strings:
+class Strings(Struct, frozen=True, dict=True):
     """The interface's words in one language."""
 
     entries: tuple[tuple[str, str], ...]
     """Dotted key and text, sorted by key."""
-    _table: dict[str, str] = field(repr=False, compare=False, hash=False)
-    language: str = field(default=DEFAULT_LANGUAGE, compare=False)
+    language: str = DEFAULT_LANGUAGE
     """Of the course that they are for."""
 
     @classmethod
     def of(cls, table: dict[str, str], language: str = DEFAULT_LANGUAGE) -> Strings:
         """The words of a table: dotted key and text."""
-        return cls(tuple(sorted(table.items())), table, language)
+        return cls(tuple(sorted(table.items())), language)
+
+    @cached_property
+    def _table(self) -> dict[str, str]:
+        return dict(self.entries)
 
     @property
     def keys(self) -> frozenset[str]:

@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 from markupsafe import Markup
+from msgspec import Struct, field
 
 from coursebuild.render.direction import direction
 from coursebuild.render.quantities import text_html
 from coursebuild.render.strings import Strings
 from coursebuild.render.templates import Templates
 from coursebuild.results import Formula, MathError
-from coursebuild.values import dataclass, field
 
 _SLOT = "\ue000"
 """Stands for a value; no template has it."""
@@ -31,8 +31,7 @@ def mark_now(language: str, code: str) -> tuple[Markup, ...]:
     return highlight_lines(language, code)
 
 
-@dataclass(frozen=True, slots=True)
-class Tools:
+class Tools(Struct, frozen=True):
     """The interface's words in the course's language, the templates, and formulas as MathML."""
 
     words: Strings
@@ -40,7 +39,7 @@ class Tools:
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
     mark: Mark = mark_now
     """How code is marked: whoever calls may keep what was marked before."""
-    around: dict[str, tuple[str, str]] = field(default_factory=dict, repr=False, compare=False)
+    around: dict[str, tuple[str, str]] = field(default_factory=dict)
     """What templates write around their only value, as far as it is known."""
 
     def render(self, template: str, **values: object) -> Markup:

@@ -15,9 +15,10 @@ from __future__ import annotations
 import posixpath
 from urllib.parse import quote, urlsplit
 
+from msgspec import Struct
+
 from coursebuild.model import Course, Lesson, Level, Page
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass
 
 HOME = "index.html"
 NOT_FOUND = "404.html"
@@ -121,8 +122,7 @@ def encode(path: str) -> str:
     return path if _UNRESERVED.fullmatch(path) else quote(path, safe="/~-._+@,")
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """The page that addresses are written for."""
 
     path: str

@@ -19,7 +19,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 _TAGS = """
 cmap head hhea hmtx maxp name OS/2 post cvt fpgm glyf loca prep CFF VORG EBDT EBLC gasp hdmx kern
@@ -156,8 +156,7 @@ _FORMAT = ">HHHHLLLLLLL"
 """The head of the table (5.1)."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Simple:
+class _Simple(Struct, frozen=True):
     """A glyph of contours."""
 
     ends: Sequence[int]

@@ -15,19 +15,19 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
+from msgspec import Struct
+
 from coursebuild.model import Course, Lesson, Script
 from coursebuild.render import urls
 from coursebuild.render.library import Library, document_scripts, models_named, owners
 from coursebuild.results import OutputFile
 from coursebuild.source import Excerpt
-from coursebuild.values import dataclass
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Package:
+class Package(Struct, frozen=True):
     """An installed package that scripts import."""
 
     module: str
@@ -52,8 +52,7 @@ def _path(part: tuple[str, object]) -> str:
     return part[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Surroundings:
+class Surroundings(Struct, frozen=True):
     """What scripts need around them, besides the course itself."""
 
     packages: tuple[Package, ...] = ()
@@ -68,8 +67,7 @@ class Surroundings:
     """What the code of a script imports, likewise."""
 
 
-@dataclass(frozen=True, slots=True)
-class Archive:
+class Archive(Struct, frozen=True):
     """An archive that is not packed yet."""
 
     path: str

@@ -8,11 +8,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.report.text import Style, visible, visible_lines
 from coursebuild.report.values import plural
 from coursebuild.results import Change, DriftKind
-from coursebuild.values import dataclass
 
 _BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
 _COLOURS = {"same": _GREEN, "changed": _RED, "fails": _RED}
@@ -20,8 +21,7 @@ _NAMED = 20
 _WIDTH = 60
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptAgainst:
+class ScriptAgainst(Struct, frozen=True):
     """One script."""
 
     path: str
@@ -37,8 +37,7 @@ class ScriptAgainst:
     """How it failed with the other version."""
 
 
-@dataclass(frozen=True, slots=True)
-class ModelLine:
+class ModelLine(Struct, frozen=True):
     """A model or MJCF block that compiles here."""
 
     path: str
@@ -47,8 +46,7 @@ class ModelLine:
     """What the other version says; empty where it compiles there too."""
 
 
-@dataclass(frozen=True, slots=True)
-class AgainstReport:
+class AgainstReport(Struct, frozen=True):
     """All of a comparison."""
 
     engine: str

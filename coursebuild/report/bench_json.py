@@ -10,11 +10,12 @@ what is wrong.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
+
+import msgspec
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.measured.bench import ScenarioReport, SceneReport, WorkPrecisionRow
@@ -52,8 +53,8 @@ def bench_json(
         ],
         "scenes": [_scene(scene) for scene in scenes],
         "diagnostics": [_diagnostic(one) for one in diagnostics],
-        "failures": [dataclasses.asdict(one) for one in failures],
-        "checked": [dataclasses.asdict(one) for one in checked],
+        "failures": [msgspec.to_builtins(one) for one in failures],
+        "checked": [msgspec.to_builtins(one) for one in checked],
         "remarks": list(remarks),
     }
     return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"
@@ -177,7 +178,7 @@ def _scene(scene: SceneReport) -> dict[str, Any]:
         "scene": scene.model,
         "digest": scene.digest,
         "quick": scene.quick,
-        "card": None if scene.card is None else dataclasses.asdict(scene.card),
+        "card": None if scene.card is None else msgspec.to_builtins(scene.card),
     }
 
 

@@ -9,16 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from msgspec import Struct
+
 from coursebuild.rules import RULES, Rule
-from coursebuild.values import dataclass
 
 _LINES = 16
 """How much of a file an example shows."""
 _LANGUAGES = {"md": "markdown", "toml": "toml", "py": "python fragment", "xml": "xml"}
 
 
-@dataclass(frozen=True, slots=True)
-class ExampleFile:
+class ExampleFile(Struct, frozen=True):
     """A file of a course with a mistake."""
 
     path: str
@@ -28,8 +28,7 @@ class ExampleFile:
     """Empty where there is nothing to show."""
 
 
-@dataclass(frozen=True, slots=True)
-class Example:
+class Example(Struct, frozen=True):
     """A mistake, and what its author is told."""
 
     command: str

@@ -8,10 +8,11 @@ and is needed is told in a line.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import textwrap
 from collections.abc import Sequence
+
+import msgspec
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.measured.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
@@ -58,7 +59,7 @@ def diet_values(
 ) -> str:
     """As one JSON object."""
     value = {
-        "models": [dataclasses.asdict(one) | {"ok": one.ok} for one in reports],
+        "models": [msgspec.to_builtins(one) | {"ok": one.ok} for one in reports],
         "diagnostics": [
             {
                 "rule": one.rule,
@@ -70,7 +71,7 @@ def diet_values(
             }
             for one in diagnostics
         ],
-        "failures": [dataclasses.asdict(one) for one in failures],
+        "failures": [msgspec.to_builtins(one) for one in failures],
         "remarks": list(remarks),
     }
     return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"

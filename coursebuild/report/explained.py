@@ -5,21 +5,21 @@ Entry points: `Explanation`, `explained_text`, `explained_json`.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
 from typing import Literal
 
+import msgspec
+from msgspec import Struct
+
 from coursebuild.report.text import Style, visible
 from coursebuild.report.values import plural
-from coursebuild.values import dataclass
 
 State = Literal["remembered", "would run", "norun"]
 _GREEN, _YELLOW, _FAINT, _BOLD = "32", "1;33", "2", "1"
 
 
-@dataclass(frozen=True, slots=True)
-class Explained:
+class Explained(Struct, frozen=True):
     """A script or a lab: whether it would run now, and why."""
 
     kind: Literal["script", "lab"]
@@ -39,8 +39,7 @@ class Explained:
     """How its last run ended; empty where there was none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
+class Explanation(Struct, frozen=True):
     """What is known of a path."""
 
     path: str
@@ -59,7 +58,7 @@ class Explanation:
 
 def explained_json(explanation: Explanation) -> str:
     """As one JSON object."""
-    value = dataclasses.asdict(explanation)
+    value = msgspec.to_builtins(explanation)
     return json.dumps(value, ensure_ascii=True, indent=2) + "\n"
 
 

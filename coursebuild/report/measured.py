@@ -5,9 +5,10 @@ Entry points: `bench_report`, `bench_values`; `cases_report`, `cases_values` (JS
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Sequence
+
+import msgspec
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.measured.bench import SceneReport
@@ -69,9 +70,9 @@ def cases_values(
     if not recorded:
         return stability_json(cases)
     value = {
-        "cases": [dataclasses.asdict(case) for case in cases],
-        "checked": [dataclasses.asdict(one) for one in checked],
-        "failures": [dataclasses.asdict(one) for one in failures],
+        "cases": [msgspec.to_builtins(case) for case in cases],
+        "checked": [msgspec.to_builtins(one) for one in checked],
+        "failures": [msgspec.to_builtins(one) for one in failures],
         "remarks": list(remarks),
     }
     return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"

@@ -5,9 +5,10 @@ Entry points: `stability_text(reports, style)`, `stability_json(reports)`.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Sequence
+
+import msgspec
 
 from coursebuild.measured.cases import BoundaryLine, CaseReport, FigureLine, ReferenceLine
 from coursebuild.report.text import Style
@@ -19,7 +20,7 @@ _BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step"
 
 def stability_json(reports: Sequence[CaseReport]) -> str:
     """As one JSON array."""
-    value = [dataclasses.asdict(report) for report in reports]
+    value = [msgspec.to_builtins(report) for report in reports]
     return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"
 
 

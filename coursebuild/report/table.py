@@ -8,14 +8,14 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.report.text import visible
-from coursebuild.values import dataclass
 
 _GAP = "  "
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
+class Column(Struct, frozen=True):
     """A column with its cells from top to bottom."""
 
     title: str

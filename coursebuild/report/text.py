@@ -12,16 +12,16 @@ from __future__ import annotations
 
 import unicodedata
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.report.values import LabLine, Report, ScriptLine, plural, summary_line
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 _TAB = 4
 
 
-@dataclass(frozen=True, slots=True)
-class Style:
+class Style(Struct, frozen=True):
     """How text is shown: with ANSI colours or without, and in how many columns."""
 
     colour: bool = False

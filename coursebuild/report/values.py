@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.values import dataclass, replace
 
 if TYPE_CHECKING:
     from coursebuild.measured.sensitivity import Sensitivity
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptLine:
+class ScriptLine(Struct, frozen=True):
     """One script, as a report lists it."""
 
     path: str
@@ -29,8 +30,7 @@ class ScriptLine:
     """For a skipped one: the modules that are not there."""
 
 
-@dataclass(frozen=True, slots=True)
-class LabLine:
+class LabLine(Struct, frozen=True):
     """One lab, as a report lists it."""
 
     name: str
@@ -50,8 +50,7 @@ class LabLine:
     """Why its page offers no Python script, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
+class Summary(Struct, frozen=True):
     """The totals."""
 
     lessons: int
@@ -67,8 +66,7 @@ class Summary:
     """Of `ran`: those whose result is remembered, so that they were not run again."""
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+class Report(Struct, frozen=True):
     """Everything that one command found."""
 
     diagnostics: tuple[Diagnostic, ...]

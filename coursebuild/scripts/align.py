@@ -14,13 +14,14 @@ import enum
 from collections import Counter
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.model import Comparison
 from coursebuild.patterns import pattern
 from coursebuild.scripts.ellipsis import blocks_match
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.scripts.traced import Side
-from coursebuild.values import dataclass
 
 _ALIKE = 6
 _WORD = pattern(r"[^\W\d]+")
@@ -39,8 +40,7 @@ class StepKind(enum.Enum):
     """A line that ran and that a `...` line stands for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """One step; the indices count lines from 0.
 
     For `EXTRA` and `ELIDED`, `recorded` is the line before which the line stands; for `MISSING` and

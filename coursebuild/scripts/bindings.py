@@ -21,12 +21,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.scripts.held import Borne, Held, Leans
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 if TYPE_CHECKING:
     from coursebuild.scripts.printed import PrintedLine
@@ -44,8 +45,7 @@ _REMEMBERED = 64
 """Recorded outputs of which the lines are remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class Leaning:
+class Leaning(Struct, frozen=True):
     """A binding, and the change of a recorded value that it leans on."""
 
     binding: NumberBinding

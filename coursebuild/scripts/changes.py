@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
 from coursebuild.results import Change, DriftKind
 from coursebuild.scripts.lines import LineMatcher
@@ -26,14 +28,12 @@ from coursebuild.scripts.numbers import (
 )
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 _PART = pattern(r"\s+|\w+|[^\w\s]")
 _SPACE, _NUMBER = 1, 4
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(Struct, frozen=True):
     """A stretch of a recorded line, and the stretch of the line that ran which stands there."""
 
     start: int
@@ -95,8 +95,7 @@ def differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Differen
     return (Difference(0, len(recorded), 0, len(ran)),)
 
 
-@dataclass(frozen=True, slots=True)
-class _Token:
+class _Token(Struct, frozen=True):
     start: int
     end: int
     text: str

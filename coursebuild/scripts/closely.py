@@ -8,6 +8,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.model import Comparison, Filter, Recording, Table
 from coursebuild.results import Change, DriftKind, Verdict
 from coursebuild.scripts.align import Step, StepKind, align, same_lines
@@ -17,7 +19,6 @@ from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.tables import compare_table
 from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass
 
 
 def compare_closely(
@@ -38,8 +39,7 @@ def compare_closely(
     return Verdict(recording, comparison, "drift", changes, diff_text(steps, recorded, ran))
 
 
-@dataclass(frozen=True, slots=True)
-class _Changes:
+class _Changes(Struct, frozen=True):
     """Turns steps into changes with their places in the lesson."""
 
     recording: Recording

@@ -18,9 +18,10 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import assert_never
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
 from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.values import dataclass
 
 VERSION = "2"
 """To be changed with how scripts are run and watched: older results then count no more."""
@@ -58,16 +59,14 @@ class Kind(enum.Enum):
     __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Need:
+class Need(Struct, frozen=True, order=True):
     """Something whose state counts."""
 
     kind: Kind
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class Dependency:
+class Dependency(Struct, frozen=True):
     """Something that a script looked at, and how it was then."""
 
     kind: Kind
@@ -80,8 +79,7 @@ class Dependency:
         return Need(self.kind, self.name)
 
 
-@dataclass(frozen=True, slots=True)
-class Inputs:
+class Inputs(Struct, frozen=True):
     """All that counts and is known before a script runs."""
 
     path: str

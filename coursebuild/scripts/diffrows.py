@@ -9,27 +9,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model import Filter, Recording, Table
 from coursebuild.results import Verdict
 from coursebuild.scripts.align import Step, StepKind, align
 from coursebuild.scripts.changes import differences
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.traced import Side
-from coursebuild.values import dataclass
 
 Mark: TypeAlias = Literal[" ", "-", "+"]
 
 
-@dataclass(frozen=True, slots=True)
-class DiffPiece:
+class DiffPiece(Struct, frozen=True):
     """A stretch of a line."""
 
     text: str
     changed: bool
 
 
-@dataclass(frozen=True, slots=True)
-class DiffRow:
+class DiffRow(Struct, frozen=True):
     """A line: as recorded (`-`), as it ran (`+`), or both (a space)."""
 
     mark: Mark

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.scripts.align import Step, StepKind
 from coursebuild.scripts.traced import Side
-from coursebuild.values import dataclass
 
 _CONTEXT = 2
 _LINES = 40
 _WIDTH = 160
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
+class _Row(Struct, frozen=True):
     mark: str
     text: str
     recorded: int

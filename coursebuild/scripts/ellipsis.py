@@ -14,13 +14,13 @@ from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.model import Mode
 from coursebuild.scripts.lines import LineMatcher
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class _Block:
+class _Block(Struct, frozen=True):
     lines: tuple[str, ...]
     runs: tuple[tuple[int, list[int]], ...]
     """Stretches of lines without an ellipsis: (index of the first, ids of their skeletons)."""

@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model import Course
 from coursebuild.results import Change, Outcome, ScriptRun, Verdict
 from coursebuild.scripts.align import StepKind, align
@@ -19,14 +21,12 @@ from coursebuild.scripts.compare import verify
 from coursebuild.scripts.difftext import diff_text
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.traced import Side
-from coursebuild.values import dataclass
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
 """`changed` and `fails` are MuJoCo's doing; of what is `unclear` that cannot be said."""
 
 
-@dataclass(frozen=True, slots=True)
-class Standing:
+class Standing(Struct, frozen=True):
     """How a run stands to what is recorded; where nothing is, to what the script prints here."""
 
     run: ScriptRun
@@ -42,8 +42,7 @@ class Standing:
         return self.run.outcome is Outcome.OK and not self.diffs
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
+class Judged(Struct, frozen=True):
     """What became of a script with another version of MuJoCo."""
 
     status: Status

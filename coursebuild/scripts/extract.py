@@ -11,15 +11,15 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable, Iterator
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Course, Document, Lesson, Page, Script, document_scripts
 from coursebuild.results import ScriptJob
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Extraction:
+class Extraction(Struct, frozen=True):
     """A script and the file that it becomes."""
 
     path: str

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Leans:
+class Leans(Struct, frozen=True):
     """What a binding shows, and on which outputs it leans, whatever they are now."""
 
     text: str
@@ -26,8 +25,7 @@ class Leans:
     """Of these outputs: with another one, it is not known any more which is which."""
 
 
-@dataclass(frozen=True, slots=True)
-class Borne:
+class Borne(Struct, frozen=True):
     """The lines by which a binding held."""
 
     lines: tuple[str, ...] = ()

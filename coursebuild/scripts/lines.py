@@ -15,9 +15,11 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.model import Comparison, Mode
 from coursebuild.scripts.numbers import Number, scan, within_half_unit, within_tolerance
-from coursebuild.values import dataclass, replace
 
 MARK = "\x00"
 ELLIPSIS = "..."
@@ -31,8 +33,7 @@ _SEARCH = 32
 SameNumber = Callable[[Number, Number], bool]
 
 
-@dataclass(frozen=True, slots=True)
-class Canon:
+class Canon(Struct, frozen=True):
     """A line, or a part of one between two ellipses, with its numbers marked."""
 
     skeleton: str

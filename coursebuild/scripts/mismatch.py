@@ -13,21 +13,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.model import NumberBinding
 from coursebuild.scripts.nearest import meant, of_window
 from coursebuild.scripts.printed import PrintedLine
 from coursebuild.scripts.shown import Shown, Window
 from coursebuild.scripts.successors import Succession, succession
-from coursebuild.values import dataclass
 
 _NAMED = 4
 """Numbers of which one may be meant that are named."""
 _YOURS = "write the number that the sentence is about"
 
 
-@dataclass(frozen=True, slots=True)
-class _Proposal:
+class _Proposal(Struct, frozen=True):
     label: str
     help: str = ""
     better: str = ""

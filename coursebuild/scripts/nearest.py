@@ -15,9 +15,11 @@ import enum
 from collections.abc import Sequence
 from decimal import Context, Decimal
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.scripts.numbers import Number, difference, unit, within_half_unit
 from coursebuild.scripts.shown import Shown, Window, shows
-from coursebuild.values import dataclass, replace
 
 _SLIP = 10
 """How many times as far away a number counts that needs a second mistake, beside its digits."""
@@ -34,8 +36,7 @@ class Likeness(enum.Enum):
     DIGITS = "digits"
 
 
-@dataclass(frozen=True, slots=True)
-class Meant:
+class Meant(Struct, frozen=True):
     """Printed numbers that a binding most probably means."""
 
     window: Window

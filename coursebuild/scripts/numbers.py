@@ -19,8 +19,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from decimal import Context, Decimal
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass, replace
 
 _SIGN = "[+\\-\u2212]"
 _MAGNITUDE = rf"(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE]{_SIGN}?[0-9]{{1,4}})?"
@@ -62,8 +64,7 @@ _POWER = pattern(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(Struct, frozen=True):
     """A number and the half-open range `[start, end)` of its text."""
 
     start: int

@@ -15,7 +15,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 Weight = Callable[[int, int], int]
 
@@ -28,16 +28,14 @@ _ALL_CELLS = 400_000
 """Cells of all tables of one alignment."""
 
 
-@dataclass(frozen=True, slots=True)
-class Keys:
+class Keys(Struct, frozen=True):
     """What makes items of a sequence recognisable: equal keys, equal items."""
 
     exact: Sequence[Hashable]
     skeleton: Sequence[Hashable]
 
 
-@dataclass(frozen=True, slots=True)
-class _Region:
+class _Region(Struct, frozen=True):
     """The stretches `[i0, i1)` and `[j0, j1)` that are still to be aligned."""
 
     i0: int

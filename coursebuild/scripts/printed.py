@@ -9,18 +9,18 @@ import functools
 from bisect import bisect_right
 from collections.abc import Callable
 
+from msgspec import Struct
+
 from coursebuild.model import Recording, Table
 from coursebuild.scripts.numbers import Number, scan
 from coursebuild.scripts.tables import RowCell, table_rows
 from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass
 
 Locate = Callable[[int, int], Span]
 
 
-@dataclass(frozen=True, slots=True)
-class PrintedLine:
+class PrintedLine(Struct, frozen=True):
     """A line of output, or a row of a recorded table with its cells joined."""
 
     text: str

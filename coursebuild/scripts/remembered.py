@@ -13,17 +13,16 @@ import re
 from collections.abc import Iterable
 
 import msgspec
+from msgspec import Struct
 
 from coursebuild.results import Divergence, Outcome, ScriptRun, Sign, Trace
 from coursebuild.scripts.dependencies import Dependency, Inputs, Kind, sought_files
-from coursebuild.values import dataclass
 
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+class Record(Struct, frozen=True):
     """One run of a script."""
 
     inputs: Inputs

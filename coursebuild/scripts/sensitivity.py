@@ -24,6 +24,8 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.measured.sensitivity import (
     PERTURBATION,
@@ -40,7 +42,6 @@ from coursebuild.scripts.lines import same_number
 from coursebuild.scripts.numbers import Number, difference, round_like, scan, unit
 from coursebuild.scripts.printed import printed_lines
 from coursebuild.source import Span
-from coursebuild.values import replace
 
 _NAMED = 20
 _AS_MOVED = 11

@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from msgspec import Struct
+
 from coursebuild.scripts.celltext import plain
 from coursebuild.scripts.numbers import (
     Number,
@@ -16,7 +18,6 @@ from coursebuild.scripts.numbers import (
     within_half_unit,
 )
 from coursebuild.scripts.printed import PrintedLine
-from coursebuild.values import dataclass
 
 
 def shows(shown: Number, printed: Number) -> bool:
@@ -28,8 +29,7 @@ def shows(shown: Number, printed: Number) -> bool:
     return within_half_unit(shown, printed.value)
 
 
-@dataclass(frozen=True, slots=True)
-class Window:
+class Window(Struct, frozen=True):
     """Numbers of one printed line, one after the other."""
 
     line: PrintedLine
@@ -41,8 +41,7 @@ class Window:
         return ", ".join(number.text for number in self.numbers)
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(Struct, frozen=True):
     """What a binding shows: its numbers and the text around them; `before` is all without any."""
 
     before: str

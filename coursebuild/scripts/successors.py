@@ -20,14 +20,14 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 
+from msgspec import Struct
+
 from coursebuild.scripts.lines import canonical
 from coursebuild.scripts.printed import PrintedLine
 from coursebuild.scripts.shown import Shown, Window
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Succession:
+class Succession(Struct, frozen=True):
     """Where the numbers of a binding were printed, and what is printed there now."""
 
     before: tuple[Window, ...]
@@ -53,8 +53,7 @@ def succession(shown: Shown, before: tuple[str, ...], now: Sequence[PrintedLine]
     return Succession(places, tuple(map(successor, places)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
+class _Known(Struct, frozen=True):
     """What a line with numbers is known by."""
 
     index: int

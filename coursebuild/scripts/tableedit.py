@@ -12,6 +12,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.model import Comparison, Filter, Mode, Recording, Table
 from coursebuild.scripts.lines import canonical, same_number
@@ -20,7 +22,6 @@ from coursebuild.scripts.tables import RowCell, RowMatch, match_rows, rows_match
 from coursebuild.scripts.traced import Side
 from coursebuild.scripts.unstable import unstable
 from coursebuild.source import Span
-from coursebuild.values import replace
 
 MINUS = "\u2212"
 _BY_HAND = "bring the row up to date by hand"

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from msgspec import Struct
+
 from coursebuild.model import Cell, Comparison, Filter, Recording, Table
 from coursebuild.results import Change, DriftKind, Verdict
 from coursebuild.scripts.celltext import cell_text, plain
@@ -32,7 +34,6 @@ from coursebuild.scripts.numbers import Number, relative_error
 from coursebuild.scripts.pairing import MATCH, Keys, pair
 from coursebuild.scripts.traced import Side, Traced
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 _ALIKE = 6
 _CELLS = 40_000
@@ -42,8 +43,7 @@ _DIFF_ROWS = 20
 _WIDTH = 160
 
 
-@dataclass(frozen=True, slots=True)
-class RowCell:
+class RowCell(Struct, frozen=True):
     """A cell of a recorded table."""
 
     cell: Cell
@@ -55,8 +55,7 @@ class RowCell:
         return Span(self.cell.span.source, *self.traced.origin(number.start, number.end))
 
 
-@dataclass(frozen=True, slots=True)
-class RowMatch:
+class RowMatch(Struct, frozen=True):
     """A row of a table and the line that it stands in; `line` is -1 where there is none.
 
     `pairs` are the numbers of the row, each with its cell and the printed one.

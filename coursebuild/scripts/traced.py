@@ -17,15 +17,15 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
+from msgspec import Struct
+
 from coursebuild.model import Filter
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass
 
 _LINE_END = pattern(r"\r\n?|\n")
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A stretch of a traced text, up to the next piece."""
 
     at: int
@@ -38,8 +38,7 @@ class Piece:
     """Copied character by character; otherwise all of the stretch stands for `[start, end)`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Traced:
+class Traced(Struct, frozen=True):
     """A text whose characters know where they came from; pieces are in order, without gaps."""
 
     text: str
@@ -159,16 +158,14 @@ def filtered(traced: Traced, filters: Iterable[Filter]) -> Traced:
     return traced
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """A line: its text without trailing white space, and where it begins in its side's text."""
 
     at: int
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Side:
+class Side(Struct, frozen=True):
     """One side of a comparison."""
 
     raw: str

@@ -12,11 +12,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import Label, Meaning
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
-from coursebuild.values import dataclass
 
 Report = Callable[[Diagnostic], None]
 
@@ -32,8 +33,7 @@ _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the u
 _LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
 
 
-@dataclass(frozen=True, slots=True)
-class Braces:
+class Braces(Struct, frozen=True):
     """A stretch of a text, from `{` to behind `}` or to where that is missing."""
 
     start: int

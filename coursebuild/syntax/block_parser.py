@@ -33,12 +33,12 @@ from markdown_it.rules_block import (
 )
 from markdown_it.utils import EnvType
 from mdit_py_plugins.footnote.index import footnote_def
+from msgspec import Struct, field
 
 from coursebuild.source import Excerpt
 from coursebuild.syntax.math import math_block
 from coursebuild.syntax.spans import BlockState, Placed, Row
 from coursebuild.syntax.tables import table
-from coursebuild.values import dataclass, field
 
 MAX_NESTING = 60
 """Containers inside each other; a list with its item counts as two."""
@@ -49,8 +49,7 @@ LOOK_AHEAD = 20
 BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
 
-@dataclass(slots=True)
-class Definition:
+class Definition(Struct):
     """A link definition as markdown-it keeps it, with the rows of `base` that hold it."""
 
     href: str
@@ -59,8 +58,7 @@ class Definition:
     rows: list[Row]
 
 
-@dataclass(slots=True)
-class Definitions:
+class Definitions(Struct):
     """What block parsing learns besides its tokens."""
 
     links: dict[str, Definition] = field(default_factory=dict)

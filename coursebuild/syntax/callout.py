@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Parsed, diagnose, did_you_mean
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import trimmed
-from coursebuild.values import dataclass
 
 _HEAD = pattern(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
 """What a callout of an unknown kind is read as, so that all in it is still checked."""
 
 
-@dataclass(frozen=True, slots=True)
-class Head:
+class Head(Struct, frozen=True):
     """The first line of a callout, and what follows it in its paragraph."""
 
     kind: Excerpt

@@ -48,13 +48,11 @@ from coursebuild.syntax.wording import (
     array_of,
     tuple_of,
 )
-from coursebuild.values import dataclass
 
 S = TypeVar("S", bound=Struct)
 
 
-@dataclass(frozen=True, slots=True)
-class Decoding(Generic[S]):
+class Decoding(Struct, Generic[S], frozen=True):
     """What a tree of nodes holds."""
 
     value: S | None

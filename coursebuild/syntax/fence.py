@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 
 from markdown_it.common.utils import unescapeAll
+from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.info import first_word, kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
-from coursebuild.values import dataclass
 
 OURS = ("bench", "io", "lab", "mjcf", "python", "quiz", "text")
 
@@ -24,8 +24,7 @@ OURS = ("bench", "io", "lab", "mjcf", "python", "quiz", "text")
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
 
 
-@dataclass(frozen=True, slots=True)
-class Fence:
+class Fence(Struct, frozen=True):
     """A fenced code block."""
 
     span: Span

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import islice
 
+from msgspec import Struct, field
+
 from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.model import Block, Footnote, FootnoteRef
 from coursebuild.source import Span
-from coursebuild.values import dataclass, field
 
 
-@dataclass(slots=True)
-class Written:
+class Written(Struct):
     """A footnote that is written."""
 
     label: str
@@ -26,8 +26,7 @@ class Written:
     """Reads its blocks; done once all else is read, in the order of the numbers."""
 
 
-@dataclass(slots=True)
-class Notes:
+class Notes(Struct):
     """The footnotes of a document while it is read."""
 
     report: Callable[[Diagnostic], None]

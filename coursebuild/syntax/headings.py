@@ -10,11 +10,12 @@ import re
 from collections.abc import Callable
 from unicodedata import normalize
 
+from msgspec import Struct, field
+
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Image, Inline, plain_text, walk_inlines
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass, field
 
 _CANDIDATE = pattern(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
 _ID = pattern(r"#[\w:.-]*[\w:-]|#\w")
@@ -27,8 +28,7 @@ _HELP = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Attributes:
+class Attributes(Struct, frozen=True):
     """What stands in braces after a heading, and the heading's text before it."""
 
     title: Excerpt
@@ -84,8 +84,7 @@ def term_id(name: str) -> str:
     return _words(normalize("NFC", name))
 
 
-@dataclass(slots=True)
-class Anchors:
+class Anchors(Struct):
     """The anchors of a document. Explicit ids are known before the first heading is named."""
 
     report: Callable[[Diagnostic], None]

@@ -12,11 +12,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.spans import joined
-from coursebuild.values import dataclass
 
 _WORD = pattern(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
 _SPACED = pattern(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
@@ -25,8 +26,7 @@ _NEXT_SPACE = pattern(r"\s|$")
 _ESCAPE = pattern(r"""\\(["\\])""")
 
 
-@dataclass(frozen=True, slots=True)
-class Word:
+class Word(Struct, frozen=True):
     """A word of an info string: `key`, or `key=value`."""
 
     span: Span
@@ -43,8 +43,7 @@ class Word:
         return self.span if self.value_text is None else self.value_text.span()
 
 
-@dataclass(frozen=True, slots=True)
-class Info:
+class Info(Struct, frozen=True):
     """An info string; `kind` is its first word."""
 
     kind: str
@@ -135,8 +134,7 @@ def _unescaped(value: Excerpt) -> Excerpt:
     return joined(value.slice(a, b) for a, b in zip(cuts[::2], cuts[1::2], strict=True)) or value
 
 
-@dataclass(frozen=True, slots=True)
-class Keys:
+class Keys(Struct, frozen=True):
     """The keys of a fence that its kind knows, each at most once."""
 
     words: tuple[Word, ...]

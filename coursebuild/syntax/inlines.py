@@ -18,6 +18,7 @@ import re
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
+from msgspec import Struct, field
 
 from coursebuild.diagnostics import diagnose
 from coursebuild.model import (
@@ -50,7 +51,6 @@ from coursebuild.syntax.simple import simple_inlines
 from coursebuild.syntax.spans import Placed, Placer, locate
 from coursebuild.syntax.targets import check_scheme, classify
 from coursebuild.syntax.unread_math import unread_formula
-from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
@@ -63,8 +63,7 @@ _BRACES = pattern(r"\{[^}\s]{0,60}\}?")
 _DEFINED = pattern(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
-@dataclass(slots=True)
-class _Frame:
+class _Frame(Struct):
     """An inline that is open."""
 
     token: Placed | None

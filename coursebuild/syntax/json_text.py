@@ -15,6 +15,8 @@ from __future__ import annotations
 import re
 from typing import NoReturn
 
+from msgspec import Struct, field
+
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
@@ -32,7 +34,6 @@ from coursebuild.syntax.nodes import (
     StringNode,
 )
 from coursebuild.syntax.wording import short
-from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 64
 """How deep objects and arrays may nest: far more than a person writes, far less than the
@@ -71,8 +72,7 @@ class _LostError(Exception):
     """The rest of the text cannot be understood; what is wrong has been reported."""
 
 
-@dataclass(slots=True)
-class _Reader:
+class _Reader(Struct):
     body: Excerpt
     faults: list[Diagnostic] = field(default_factory=list)
 

@@ -12,15 +12,15 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.source import Excerpt, Span
-from coursebuild.values import dataclass, field
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Placed:
+class _Placed(Struct, frozen=True, eq=False):
     """What every node has: its stretch `[start, end)` of the text that was parsed."""
 
-    body: Excerpt = field(repr=False)
+    body: Excerpt
     start: int
     end: int
 
@@ -40,13 +40,12 @@ class _Placed:
         return self.body.text[self.start : self.end]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StringNode(_Placed):
+class StringNode(_Placed, frozen=True, eq=False):
     """A string, a key included."""
 
     value: str
     """The text that is meant, escapes resolved."""
-    runs: tuple[tuple[int, int], ...] = field(repr=False)
+    runs: tuple[tuple[int, int], ...]
     """(offset in the value, offset in the body), growing, the first at 0: from there both advance
     together."""
 
@@ -68,37 +67,31 @@ class StringNode(_Placed):
         return Excerpt(self.body.source, self.value, tuple(pieces))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NumberNode(_Placed):
+class NumberNode(_Placed, frozen=True, eq=False):
     """A number; a float may be infinite or, in TOML, not a number."""
 
     value: int | float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BoolNode(_Placed):
+class BoolNode(_Placed, frozen=True, eq=False):
     """`true` or `false`."""
 
     value: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NullNode(_Placed):
+class NullNode(_Placed, frozen=True, eq=False):
     """JSON's `null`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DateNode(_Placed):
+class DateNode(_Placed, frozen=True, eq=False):
     """TOML's dates and times. No field takes one; `raw` says what was written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BrokenNode(_Placed):
+class BrokenNode(_Placed, frozen=True, eq=False):
     """What stands in the place of a value and was already reported."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ArrayNode(_Placed):
+class ArrayNode(_Placed, frozen=True, eq=False):
     """A list of values."""
 
     mark_end: int
@@ -111,8 +104,7 @@ class ArrayNode(_Placed):
         return self.body.span(self.start, self.mark_end)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ObjectNode(_Placed):
+class ObjectNode(_Placed, frozen=True, eq=False):
     """A JSON object or a TOML table."""
 
     mark_start: int
@@ -151,8 +143,7 @@ class ObjectNode(_Placed):
         return tuple(item for item in items if isinstance(item, ObjectNode))
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
+class Member(Struct, frozen=True):
     """A key and its value."""
 
     key: StringNode

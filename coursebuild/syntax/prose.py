@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Block, Inline
 from coursebuild.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.syntax.texts import TextParser
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Prose:
+class Prose(Struct, frozen=True):
     """What each marked string says."""
 
     _blocks: dict[Node, tuple[Block, ...]]

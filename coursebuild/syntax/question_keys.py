@@ -12,7 +12,7 @@ import hashlib
 import unicodedata
 from collections.abc import Iterable
 
-from coursebuild.values import dataclass, field
+from msgspec import Struct, field
 
 DIGITS = 8
 """Hexadecimal digits of a hash: so few that an address with them can still be read."""
@@ -25,8 +25,7 @@ def text_key(kind: str, text: str) -> str:
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
-@dataclass(slots=True)
-class Keys:
+class Keys(Struct):
     """Keys that are each given once."""
 
     taken: set[str] = field(default_factory=set)

@@ -15,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import assert_never
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.model import (
     AnyQuestion,
@@ -45,7 +47,6 @@ from coursebuild.syntax.quiz_schema import (
 from coursebuild.syntax.relations import repeated
 from coursebuild.syntax.texts import TextParser
 from coursebuild.syntax.wording import JSON
-from coursebuild.values import replace
 
 TOLERANCE = 0.02
 """Of the answer's size, where a numeric question gives no tolerance."""

@@ -14,31 +14,26 @@ from coursebuild.source import Source
 from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.footnotes import Notes
 from coursebuild.syntax.headings import Anchors
-from coursebuild.values import dataclass, field
 
 T = TypeVar("T")
 
 
-@dataclass(slots=True)
 class Session:
     """One reading of one document."""
 
-    source: Source
-    callouts: frozenset[str]
-    lesson: bool
-    definitions: Definitions = field(default_factory=Definitions)
-    """The link definitions of the document, which its inner texts may use."""
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-    script: str | None = None
-    """The path of the nearest script above."""
-    script_wrong: bool = False
-    """Whether the nearest script above has no path that it may have."""
-    level: int = 1
-    """Level of the heading above."""
-    notes: Notes = field(init=False)
-    anchors: Anchors = field(init=False)
-
-    def __post_init__(self) -> None:
+    def __init__(self, source: Source, callouts: frozenset[str], lesson: bool) -> None:
+        self.source = source
+        self.callouts = callouts
+        self.lesson = lesson
+        self.definitions = Definitions()
+        """The link definitions of the document, which its inner texts may use."""
+        self.diagnostics: list[Diagnostic] = []
+        self.script: str | None = None
+        """The path of the nearest script above."""
+        self.script_wrong = False
+        """Whether the nearest script above has no path that it may have."""
+        self.level = 1
+        """Level of the heading above."""
         self.notes = Notes(self.report)
         self.anchors = Anchors(self.report)
 

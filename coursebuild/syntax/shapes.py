@@ -11,10 +11,9 @@ from __future__ import annotations
 import math
 import operator
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.source import Span
@@ -37,7 +36,6 @@ from coursebuild.syntax.wording import (
     type_help,
     wrong_type,
 )
-from coursebuild.values import dataclass, field
 
 
 class _Failed:
@@ -47,8 +45,7 @@ class _Failed:
 FAILED = _Failed()
 
 
-@dataclass(slots=True)
-class Run:
+class Run(Struct):
     """What one decoding gathers."""
 
     words: Words
@@ -69,8 +66,7 @@ class Run:
         return self.fault("field-type", node.mark, message, help or type_help(node, takes))
 
 
-@dataclass(frozen=True, slots=True)
-class Shape(ABC):
+class Shape(Struct, frozen=True):
     """What a field takes."""
 
     takes: Takes
@@ -85,21 +81,19 @@ class Shape(ABC):
             return run.wrong_type(node, name, self.takes)
         return self._value(node, name, run)
 
-    @abstractmethod
     def _value(self, node: Node, name: str, run: Run) -> object:
         """The value of a node that is of the right type."""
+        raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True)
-class NullShape(Shape):
+class NullShape(Shape, frozen=True):
     """`null`."""
 
     def _value(self, node: Node, name: str, run: Run) -> object:
         return None
 
 
-@dataclass(frozen=True, slots=True)
-class BoolShape(Shape):
+class BoolShape(Shape, frozen=True):
     """`true` or `false`."""
 
     def _value(self, node: Node, name: str, run: Run) -> object:
@@ -107,8 +101,7 @@ class BoolShape(Shape):
         return node.value
 
 
-@dataclass(frozen=True, slots=True)
-class StringShape(Shape):
+class StringShape(Shape, frozen=True):
     """Text, which may be bound by a pattern or a length."""
 
     pattern: re.Pattern[str] | None
@@ -132,8 +125,7 @@ class StringShape(Shape):
         return value
 
 
-@dataclass(frozen=True, slots=True)
-class LiteralShape(Shape):
+class LiteralShape(Shape, frozen=True):
     """One of a few words."""
 
     values: tuple[str, ...]
@@ -154,8 +146,7 @@ _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class NumberShape(Shape):
+class NumberShape(Shape, frozen=True):
     """A number within bounds: pairs of `ge`, `gt`, `le` or `lt` and a limit."""
 
     bounds: tuple[tuple[str, float], ...]
@@ -195,8 +186,7 @@ def _not_a_double(node: NumberNode) -> str:
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class ArrayShape(Shape):
+class ArrayShape(Shape, frozen=True):
     """An array of any length."""
 
     item: Shape
@@ -213,8 +203,7 @@ class ArrayShape(Shape):
         return _all([item.decode(v, f"{name}[{i}]", run) for i, v in enumerate(node.items)])
 
 
-@dataclass(frozen=True, slots=True)
-class TupleShape(Shape):
+class TupleShape(Shape, frozen=True):
     """An array with a place for each item."""
 
     each: tuple[Shape, ...]
@@ -240,8 +229,7 @@ def failed(values: Iterable[object]) -> bool:
     return False
 
 
-@dataclass(frozen=True, slots=True)
-class MapShape(Shape):
+class MapShape(Shape, frozen=True):
     """An object whose keys the author chooses."""
 
     value: Shape
@@ -256,8 +244,7 @@ class MapShape(Shape):
         return FAILED if failed(values.values()) else values
 
 
-@dataclass(frozen=True, slots=True)
-class UnionShape(Shape):
+class UnionShape(Shape, frozen=True):
     """One of several shapes, which the type of the node tells apart."""
 
     shapes: tuple[Shape, ...]

@@ -17,11 +17,9 @@ from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.syntax.nodes import Node, ObjectNode, StringNode
 from coursebuild.syntax.shapes import FAILED, Run, Shape, failed
 from coursebuild.syntax.wording import STRING, named, quoted
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class FieldShape:
+class FieldShape(Struct, frozen=True):
     """A field of a struct."""
 
     name: str
@@ -30,8 +28,7 @@ class FieldShape:
     description: str
 
 
-@dataclass(frozen=True, slots=True)
-class StructShape(Shape):
+class StructShape(Shape, frozen=True):
     """An object with known fields."""
 
     cls: type[Struct]
@@ -101,8 +98,7 @@ class StructShape(Shape):
         return meant
 
 
-@dataclass(frozen=True, slots=True)
-class TaggedShape(Shape):
+class TaggedShape(Shape, frozen=True):
     """An object of which one field, the tag, says which of several structs it is."""
 
     tag: str

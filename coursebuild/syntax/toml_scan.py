@@ -13,12 +13,13 @@ from __future__ import annotations
 import re
 from typing import Literal, TypeAlias
 
+from msgspec import Struct, field
+
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.source import Excerpt
 from coursebuild.syntax.nodes import StringNode
 from coursebuild.syntax.toml_fault import FaultError, advice, check_scalar
 from coursebuild.syntax.toml_string import read_string
-from coursebuild.values import dataclass, field
 
 MAX_DEPTH = 64
 """How deep tables and arrays may nest."""
@@ -30,16 +31,14 @@ _PLAIN_KEY = re.compile(r"([A-Za-z0-9_-]+)[ \t]*=")
 _SCALAR = re.compile(r"[^\n,\]}#]*")
 
 
-@dataclass(slots=True)
-class Scalar:
+class Scalar(Struct):
     """A number, boolean or date: only its place."""
 
     start: int
     end: int
 
 
-@dataclass(slots=True)
-class Sequence:
+class Sequence(Struct):
     """An array, or the tables that share a `[[header]]` (`tables`)."""
 
     start: int
@@ -49,8 +48,7 @@ class Sequence:
     items: list[Item] = field(default_factory=list)
 
 
-@dataclass(slots=True)
-class Table:
+class Table(Struct):
     """A table. `how` says what made it, which decides what may be added to it."""
 
     start: int

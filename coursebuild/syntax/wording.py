@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from typing import assert_never
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
 from coursebuild.syntax.nodes import (
     ArrayNode,
@@ -21,13 +23,11 @@ from coursebuild.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
-from coursebuild.values import dataclass
 
 _NUMBER = pattern(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+class Words(Struct, frozen=True):
     """The nouns of a language for what the other calls an object."""
 
     object: str
@@ -38,8 +38,7 @@ JSON = Words("an object", "objects")
 TOML = Words("a table", "tables")
 
 
-@dataclass(frozen=True, slots=True)
-class Takes:
+class Takes(Struct, frozen=True):
     """The types that a field takes, for the decoder and in words."""
 
     kinds: frozenset[str]

@@ -12,11 +12,11 @@ import sys
 import time
 import zipfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import distributed
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.effects import dask_runner, dask_task

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coursebuild.measured.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
 from coursebuild.measured.cases import BoundaryLine, FigureLine
 from coursebuild.measured.departures import Departure, case_departures, scene_departures
 from coursebuild.model.scenarios import Bands
-from coursebuild.values import replace
 from support.bench_reports import CASE, MACHINE, lost, row, scenario, scene, swing
 
 BANDS = Bands()

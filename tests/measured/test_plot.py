@@ -9,13 +9,13 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coursebuild.drawing.marks import text_width
 from coursebuild.drawing.symbols import colour, cross, dash, mark
 from coursebuild.measured.bench import ScenarioReport, StableRow
 from coursebuild.measured.plot import STYLE, plot_svg
 from coursebuild.measured.points import chart, quantities, telling
-from coursebuild.values import replace
 from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")

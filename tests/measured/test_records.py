@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.measured.records import (
     RecordError,
@@ -14,7 +15,6 @@ from coursebuild.measured.records import (
     encode_bench,
     encode_stability,
 )
-from coursebuild.values import replace
 from support.bench_reports import CASE, lost, row, scenario, scene, swing
 
 GOOD = encode_bench(scene())

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.physics.detector import NO_BOUNDS, Observation, Status, judge, observe
 from coursebuild.physics.engine import advance, simulate
@@ -15,7 +16,6 @@ from coursebuild.physics.measure import measure
 from coursebuild.physics.problem import Integrator
 from coursebuild.physics.problems import problem_named
 from coursebuild.physics.stability import attempt
-from coursebuild.values import replace
 
 SPRING = """
 <mujoco>

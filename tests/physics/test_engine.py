@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.physics.detector import Peaks
 from coursebuild.physics.engine import compiled, invariants, refsafe_active, simulate, watched
@@ -12,7 +13,6 @@ from coursebuild.physics.forward import forward_motion
 from coursebuild.physics.measure import errors
 from coursebuild.physics.problem import INTEGRATORS, Integrator
 from coursebuild.physics.problems import problem_named
-from coursebuild.values import replace
 
 SMOOTH = [
     "tumbling-box",

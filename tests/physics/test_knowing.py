@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.physics.collocation import collocated
 from coursebuild.physics.extrapolation import NoConvergenceError, integrate
@@ -18,7 +19,6 @@ from coursebuild.physics.problems import all_problems
 from coursebuild.physics.scene import SceneError, scenes
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
-from coursebuild.values import replace
 from coursebuild.vocabulary import CLOSED_FORMS
 
 PENDULUM = """\

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.physics.measure import (
     FLOORS,
@@ -32,7 +33,6 @@ from coursebuild.physics.problems import (
     touching_cradle,
     tumbling_box,
 )
-from coursebuild.values import replace
 
 FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
 

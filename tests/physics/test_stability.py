@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.physics.detector import Status
 from coursebuild.physics.problem import INTEGRATORS, Integrator, Problem
 from coursebuild.physics.problems import all_problems, problem_named
 from coursebuild.physics.problems.damped_spring import rk4_factor, rk4_limit
 from coursebuild.physics.stability import attempt, boundary, survey
-from coursebuild.values import replace
 
 KNOWN = [problem for problem in all_problems() if problem.case in (5, 6, 12)]
 

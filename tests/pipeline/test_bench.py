@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.measured.bench import ScenarioReport
@@ -17,7 +18,6 @@ from coursebuild.pipeline.bench import bench
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes
-from coursebuild.values import replace
 from support.measured_course import BOX, TOML, Fake, asked, bench_course, options, swing, write
 
 

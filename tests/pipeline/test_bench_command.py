@@ -11,10 +11,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.measured.records import decode_bench, encode_bench
-from coursebuild.values import replace
 from support.measured_course import BOX, PATH, TOML, bench_course, write
 from support.scratch_course import ROOT
 

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.measured.bench import ScenarioReport
 from coursebuild.measured.records import decode_bench, encode_bench
 from coursebuild.pipeline.bench import Benched, check, record
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes
-from coursebuild.values import replace
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.plots import plot_file, write_plots
-from coursebuild.values import replace
 from support.bench_reports import lost, scenario, scene, swing
 
 

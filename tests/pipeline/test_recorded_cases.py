@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.measured.records import STABILITY_PATH, decode_stability, encode_stability
-from coursebuild.values import replace
 
 
 @pytest.fixture

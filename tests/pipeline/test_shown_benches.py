@@ -8,9 +8,9 @@ import re
 import time
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.measured.records import bench_path, encode_bench
 from support.preview_process import serving

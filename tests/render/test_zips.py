@@ -7,11 +7,11 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.model import MjcfModel
 from coursebuild.render import Package, SiteOptions, Surroundings, imported_modules

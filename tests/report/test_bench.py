@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coursebuild.diagnostics import diagnose
 from coursebuild.measured.bench import SceneCard, WorkPrecisionRow
@@ -22,7 +23,6 @@ from coursebuild.report.checked import checked_text, failure_text
 from coursebuild.report.measured import bench_report, cases_values
 from coursebuild.report.table import Column, cells_of, table
 from coursebuild.source import Source
-from coursebuild.values import replace
 from support.bench_reports import awkward, lost, row, scenario, scene, setting, swing
 
 EXPECTED = Path(__file__).parent

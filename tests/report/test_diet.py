@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+from msgspec.structs import replace
+
 from coursebuild.measured.bench import Machine
 from coursebuild.measured.diet import (
     EQUAL,
@@ -21,7 +23,6 @@ from coursebuild.measured.diet import (
 from coursebuild.measured.records import Failure, decode_diet, encode_diet
 from coursebuild.report.diet import diet_report, diet_text, diet_values
 from coursebuild.report.text import Style
-from coursebuild.values import replace
 
 PLACE = Place("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")

@@ -13,11 +13,11 @@ from __future__ import annotations
 import ast
 import re
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.effects.store import Store
 from coursebuild.pipeline.build import build

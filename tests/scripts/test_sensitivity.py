@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.measured.sensitivity import Doubt, Flip, Sensitivity, Standing
 from coursebuild.model import Comparison, Filter, Recording
 from coursebuild.results import Outcome, ScriptRun, Trace
 from coursebuild.scripts.numbers import scan
 from coursebuild.scripts.sensitivity import noise, rounded, sensitivity, worth_moving
-from coursebuild.values import replace
 from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from coursebuild.measured.bench import SceneCard, SceneReport
 from coursebuild.measured.cases import (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from coursebuild.effects.versions import engine_version
 from coursebuild.measured.bench import SceneReport

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from coursebuild.model import Course, Document
 from coursebuild.render.assets import Assets

@@ -6,7 +6,7 @@ Spans are `line:column-line:column`, from 1, the end exclusive.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
+from msgspec.structs import fields
 
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.model import (

@@ -11,17 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from msgspec import Struct
+
 from coursebuild.physics.diet.compare import Seen
 from coursebuild.physics.diet.edits import Edit, drop_numbers, remove, set_options
 from coursebuild.physics.diet.mapping import Gone, mapping_without
 from coursebuild.physics.diet.markup import Element, place_of
 from coursebuild.physics.diet.model_text import ModelText
 from coursebuild.physics.diet.readers import Readers
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Item:
+class Item(Struct, frozen=True, eq=False):
     """One thing that may be in vain, and how to be without it."""
 
     name: str
@@ -36,8 +36,7 @@ class Item:
     flags: tuple[tuple[str, str | None], ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class Candidate(Struct, frozen=True, eq=False):
     """A kind of thing that may be in vain."""
 
     kind: str
@@ -61,8 +60,7 @@ class Candidate:
     """Who may need it, so that it is no fault; empty where nobody does."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Look(Struct, frozen=True, eq=False):
     """All that is known before anything is tried."""
 
     scene: ModelText

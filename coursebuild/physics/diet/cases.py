@@ -11,18 +11,17 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.model.scenarios import Declarations
 from coursebuild.physics.problem import whole_number
 from coursebuild.physics.scene import scenes
-from coursebuild.values import dataclass
 
 QUICK = 0.5
 """Seconds at most of a scenario where it should be quick."""
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
+class Case(Struct, frozen=True):
     """A scenario of a model."""
 
     name: str

@@ -18,13 +18,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.detector import Judgement, Peaks, judge, observe, peaks
 from coursebuild.physics.diet.cases import Case, begin, command
 from coursebuild.physics.diet.mapping import Mapping, transfer
 from coursebuild.physics.engine import advance
 from coursebuild.physics.scene import thickness
-from coursebuild.values import dataclass
 
 TOLERANCE = 1e-8
 """What counts as equal: relative to a number's size, absolute where that is under 1."""
@@ -34,8 +34,7 @@ _CONTACTS = 10
 """Steps from one look at the contacts to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Struct, frozen=True):
     """How a changed model did in all scenarios."""
 
     identical: bool
@@ -169,8 +168,7 @@ def _apart(data: Any, other: Any, mapping: Mapping) -> float:
     return math.inf if math.isnan(worst) else worst
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class Seen(Struct, frozen=True, eq=False):
     """What a run of the whole model showed."""
 
     case: Case

@@ -16,8 +16,9 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.physics.diet.markup import Document, Element
-from coursebuild.values import dataclass
 
 Settings: TypeAlias = Sequence[tuple[str, str | None]]
 """Names of attributes and their values; `None` for one to take out."""
@@ -29,8 +30,7 @@ _SECTIONS = frozenset(
 """What may go when nothing is left in it."""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Edit:
+class Edit(Struct, frozen=True, order=True):
     """Bytes `[start, end)` of a file replaced."""
 
     path: str

@@ -10,9 +10,8 @@ from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
-
-from coursebuild.values import dataclass
 
 Places: TypeAlias = NDArray[np.int64]
 
@@ -20,8 +19,7 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SIZES = ("nq", "nv", "na", "nu", "nbody", "nmocap", "ngeom", "nsensordata", "nuserdata", "neq")
 
 
-@dataclass(frozen=True, slots=True)
-class Gone:
+class Gone(Struct, frozen=True):
     """What a change takes out of a compiled model, by number."""
 
     bodies: frozenset[int] = frozenset()
@@ -34,8 +32,7 @@ class Gone:
         return bool(self.bodies or self.geoms or self.sensors or self.actuators)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Mapping:
+class Mapping(Struct, frozen=True, eq=False):
     """For each entry of the changed model, the place that it has in the whole one."""
 
     qpos: Places

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator
 from xml.parsers import expat
 
-from coursebuild.values import dataclass, field
+from msgspec import Struct, field
 
 _ATTRIBUTE = re.compile(rb"([^\s=/>\"']+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 _NAME = re.compile(rb"<[^\s/>]+")
@@ -29,8 +29,7 @@ class MarkupError(Exception):
         self.path, self.line, self.column, self.message = path, line, column, message
 
 
-@dataclass(frozen=True, slots=True)
-class Attribute:
+class Attribute(Struct, frozen=True):
     """An attribute in a tag; places are bytes from the beginning of the file."""
 
     name: str
@@ -49,13 +48,12 @@ class Attribute:
     """Of the first byte of the value."""
 
 
-@dataclass(frozen=False, slots=True, eq=False)
-class Element:
+class Element(Struct, eq=False):
     """An element of a file."""
 
-    document: Document = field(repr=False)
+    document: Document
     tag: str
-    parent: Element | None = field(repr=False)
+    parent: Element | None
     attributes: tuple[Attribute, ...]
     start: int
     head: int
@@ -63,9 +61,12 @@ class Element:
     tail: int = 0
     """Where its end tag begins; `head` where it has none."""
     end: int = 0
-    children: list[Element] = field(default_factory=list, repr=False)
-    included: Document | None = field(default=None, repr=False)
+    children: list[Element] = field(default_factory=list)
+    included: Document | None = None
     """The file that an `include` pulls in."""
+
+    def __repr__(self) -> str:
+        return f"<{self.tag}> at byte {self.start} of {self.document.path}"
 
     def get(self, name: str) -> str | None:
         """The value of an attribute."""
@@ -108,15 +109,15 @@ class Element:
         return parent
 
 
-@dataclass(frozen=False, slots=True, eq=False)
 class Document:
     """A file."""
 
-    path: str
-    data: bytes = field(repr=False)
-    root: Element = field(init=False, repr=False)
-    at: Element | None = field(default=None, repr=False)
-    """The `include` that pulls it in; `None` for a model's own file."""
+    def __init__(self, path: str, data: bytes) -> None:
+        self.path = path
+        self.data = data
+        self.root: Element
+        self.at: Element | None = None
+        """The `include` that pulls it in; `None` for a model's own file."""
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of a byte, both from 1; columns count characters."""

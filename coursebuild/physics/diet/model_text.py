@@ -18,10 +18,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.diet.edits import Edit, applied, set_attributes
 from coursebuild.physics.diet.markup import Document, Element, parse_markup
-from coursebuild.values import dataclass
 
 _DEEPEST = 32
 
@@ -52,8 +52,7 @@ _SECTIONS = frozenset(("sensor", "actuator", "tendon"))
 _TAG = "diet_"
 
 
-@dataclass(frozen=True, slots=True)
-class Thing:
+class Thing(Struct, frozen=True):
     """What an element becomes in the compiled model."""
 
     kind: str

@@ -22,9 +22,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
-
-from coursebuild.values import dataclass
 
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _HFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -77,8 +76,7 @@ def _ordered(a: int, b: int) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Shell:
+class Shell(Struct, frozen=True, eq=False):
     """All points whose distance from a centre is in a range, m; in the frame of some body."""
 
     centre: Vector

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 _ALL: dict[str, tuple[str, ...]] = {
     "sensor": (
@@ -108,16 +108,14 @@ _UNNAMED = r"(?<![\w])(?<!\)\.){}(?![\w])"
 """A word that is not asked of one thing, as in `data.joint("pivot").qpos`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reader:
+class Reader(Struct, frozen=True):
     """A file that uses the model."""
 
     path: str
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Readers:
+class Readers(Struct, frozen=True):
     """All files that use a model."""
 
     files: tuple[Reader, ...] = ()

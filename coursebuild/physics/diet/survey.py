@@ -15,6 +15,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from msgspec import Struct
+
 from coursebuild.measured.diet import CHANGES, EQUAL, IDENTICAL, UNTOUCHED, Place, Saving, TextEdit
 from coursebuild.measured.diet import Finding as Finding
 from coursebuild.measured.diet import Tried as Tried
@@ -33,7 +35,6 @@ from coursebuild.physics.diet.settings import settings
 from coursebuild.physics.diet.timing import Clock, Ratio
 from coursebuild.physics.diet.trials import NotTriedError, Trial, Trials
 from coursebuild.physics.diet.unused import unused
-from coursebuild.values import dataclass
 
 NAMES = 6
 """Names that a message lists."""
@@ -41,8 +42,7 @@ LEAST = 1.05
 """A setting must save so much time to be worth a word."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Order:
+class Order(Struct, frozen=True, eq=False):
     """What is to be surveyed, and how."""
 
     scene: ModelText
@@ -59,8 +59,7 @@ class Order:
     """Is told what is tried next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Survey:
+class Survey(Struct, frozen=True):
     """What was found."""
 
     seen: tuple[Seen, ...]

@@ -14,12 +14,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
+from msgspec import Struct
 
 from coursebuild.physics.diet.cases import Case, begin, command
 from coursebuild.physics.diet.compare import quiet
 from coursebuild.physics.diet.mapping import Mapping, transfer
 from coursebuild.physics.engine import advance
-from coursebuild.values import dataclass
 
 Clock = Callable[[], float]
 """Seconds that this thread has used the processor."""
@@ -28,8 +28,7 @@ _BLOCK = 0.006
 _ROUNDS, _QUICK_ROUNDS = 12, 4
 
 
-@dataclass(frozen=True, slots=True)
-class Ratio:
+class Ratio(Struct, frozen=True):
     """How much faster a model is than another."""
 
     value: float

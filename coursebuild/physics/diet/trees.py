@@ -13,21 +13,20 @@ from collections.abc import Iterable
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from coursebuild.physics.diet.candidates import Look
 from coursebuild.physics.diet.markup import Element
 from coursebuild.physics.diet.model_text import is_repeated
 from coursebuild.physics.diet.unused import unread_sensors
-from coursebuild.values import dataclass
 
 Vector = NDArray[np.float64]
 
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Box:
+class Box(Struct, frozen=True, eq=False):
     """A region, along the axes of the world."""
 
     low: Vector
@@ -164,8 +163,7 @@ class Trees:
         return most
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Referring:
+class Referring(Struct, frozen=True, eq=False):
     """What refers to some elements."""
 
     loose: tuple[Element, ...]

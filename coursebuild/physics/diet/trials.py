@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mujoco
+from msgspec import Struct
 
 from coursebuild.measured.diet import Saving
 from coursebuild.physics.diet.candidates import Item, change
@@ -19,11 +20,9 @@ from coursebuild.physics.diet.mapping import Mapping as Left
 from coursebuild.physics.diet.mapping import fits, mapping_without
 from coursebuild.physics.diet.model_text import ModelText, saved
 from coursebuild.physics.diet.timing import Clock, Ratio, time_ratio
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class Trial(Struct, frozen=True, eq=False):
     """A changed model, and how it did."""
 
     edits: tuple[Edit, ...]

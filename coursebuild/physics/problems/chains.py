@@ -15,19 +15,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.extrapolation import State, integrate
 from coursebuild.physics.forward import forward_motion
 from coursebuild.physics.problem import Array, Motion, Problem, Reference, Scenario
 from coursebuild.physics.problems.common import NO_CONTACT, motion_without_attitude
 from coursebuild.physics.rotation import conjugate, multiply, rate_of, rotate
-from coursebuild.values import dataclass
 
 GRAVITY = 9.81
 
 
-@dataclass(frozen=True, slots=True)
-class Chain:
+class Chain(Struct, frozen=True):
     """Bodies on joints, each joint at the end of the body before."""
 
     kind: str

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.physics.engine import advance, begun, compiled
 from coursebuild.physics.problem import (
@@ -28,14 +29,12 @@ from coursebuild.physics.problem import (
 from coursebuild.physics.problems.common import NO_CONTACT, NO_GRAVITY, free_body_motion
 from coursebuild.physics.problems.damped_spring import rk4_factor
 from coursebuild.physics.rotation import from_axis_angle, multiply
-from coursebuild.values import dataclass
 
 _STEPS = 200
 _AXIAL = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True, slots=True)
-class FreeTop:
+class FreeTop(Struct, frozen=True):
     """A body with two equal moments, about its resting centre of mass."""
 
     transverse: float

@@ -12,6 +12,8 @@ import math
 
 import mujoco
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.physics.elliptic import complete_k, jacobi
 from coursebuild.physics.engine import advance, begun, compiled
@@ -27,7 +29,6 @@ from coursebuild.physics.problem import (
 from coursebuild.physics.problems.common import NO_CONTACT, NO_GRAVITY, free_body_motion
 from coursebuild.physics.quadrature import cumulative
 from coursebuild.physics.rotation import from_matrix
-from coursebuild.values import dataclass, replace
 
 HALF_SIZES = (0.1, 0.05, 0.02)
 MASS = 1.0
@@ -55,8 +56,7 @@ def moments() -> Array:
     return np.array([b * b + c * c, a * a + c * c, a * a + b * b]) * MASS / 3
 
 
-@dataclass(frozen=True, slots=True)
-class Tumbling:
+class Tumbling(Struct, frozen=True):
     """Free rotation of a body with moments I₁ < I₂ < I₃, begun with ω = (nudge, spin, 0)."""
 
     nudge: float

@@ -8,7 +8,8 @@ place of others; `same_course`, `same_frame`; `changed_runs`, `changed_reference
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from coursebuild.checks.links import Places, anchors, defined_terms
 from coursebuild.diagnostics import Diagnostic, Severity

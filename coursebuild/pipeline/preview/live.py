@@ -20,6 +20,8 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from msgspec.structs import replace
+
 from coursebuild.checks.course import check_document
 from coursebuild.checks.links import Places, places
 from coursebuild.diagnostics import Diagnostic, Parsed
@@ -54,7 +56,6 @@ from coursebuild.render.page_list import PageEntry
 from coursebuild.render.shared import PageFacts
 from coursebuild.results import CompileResult, LabResult
 from coursebuild.source import Source
-from coursebuild.values import replace
 
 _Asked: TypeAlias = tuple[str, frozenset[str], bool]
 """A text and how it is to be parsed."""

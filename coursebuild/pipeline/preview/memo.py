@@ -11,11 +11,12 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Parsed
 from coursebuild.model import Document
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
-from coursebuild.values import dataclass
 
 T = TypeVar("T")
 
@@ -39,8 +40,7 @@ class PerDocument(Generic[T]):
         return made
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
+class _Entry(Struct, frozen=True):
     text: str
     callouts: frozenset[str]
     lesson: bool

@@ -19,6 +19,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
 from coursebuild.model import Course, Document
@@ -36,7 +39,6 @@ from coursebuild.render.shared import PageFacts, page_facts, settled, shared_fil
 from coursebuild.render.site import all_facts
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.results import OutputFile, SiteFile
-from coursebuild.values import dataclass, replace
 
 Make: TypeAlias = Callable[[], bytes | None]
 """Makes a file, if it can be had."""
@@ -55,8 +57,7 @@ _GENERATIONS = 3
 """How many sets of shared files stay available."""
 
 
-@dataclass(frozen=True, slots=True)
-class Drawn:
+class Drawn(Struct, frozen=True):
     """A page without its frame, and the styles that were written in its elements."""
 
     draft: Draft

@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.v8 import MathEngine
@@ -60,11 +63,9 @@ from coursebuild.results import (
 )
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.extract import Extraction, jobs
-from coursebuild.values import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
-class Ran:
+class Ran(Struct, frozen=True):
     """A run, and what was run."""
 
     job: ScriptJob
@@ -325,8 +326,7 @@ class Parts:
             self._wrong &= wanted
 
 
-@dataclass(frozen=True, slots=True)
-class _MadeFrom:
+class _MadeFrom(Struct, frozen=True):
     document: Document
     course: Course
     runs: tuple[ScriptRun, ...]
@@ -341,8 +341,7 @@ class _MadeFrom:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _Verdicts:
+class _Verdicts(Struct, frozen=True):
     made_from: _MadeFrom
     verdicts: tuple[Verdict, ...]
 

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from msgspec import Struct
+
 from coursebuild.checks.links import Places
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course, Document
 from coursebuild.pipeline.preview.pages import Drawn
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Struct, frozen=True):
     """What some saves come to."""
 
     edits: int

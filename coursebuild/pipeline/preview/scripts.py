@@ -6,9 +6,10 @@ Entry points: `Scripts.extract`, then `Scripts.run`. Both may be broken off at a
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Sequence
+
+from msgspec.structs import replace
 
 from coursebuild.checks.quizzes import check_output_lines
 from coursebuild.effects.runner import RunStoppedError, ScriptServer
@@ -122,7 +123,7 @@ class Scripts:
             old = self._live.parts.runs.get(ran.path)
             if again and old is not None:
                 printed = done.stdout if done.outcome is Outcome.OK else ""
-                taken.append(dataclasses.replace(old, again=printed))
+                taken.append(replace(old, again=printed))
             elif old is None or not _same_run(old, new):
                 taken.append(new)
         self._live.take_runs(taken)

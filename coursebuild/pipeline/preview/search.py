@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
 from markupsafe import Markup
+from msgspec.structs import replace
 
 from coursebuild.model import Document
 from coursebuild.render.compressed import COPIES
@@ -19,7 +20,6 @@ from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
 from coursebuild.render.search.values import Searched
 from coursebuild.render.search.whole import SearchedPages, search_files
-from coursebuild.values import replace
 
 Pages: TypeAlias = Iterable[tuple[Draft, bool]]
 """Pages that are drawn, and of each whether it is without mistakes."""

@@ -19,6 +19,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from msgspec import Struct
+
 from coursebuild.diagnostics import Diagnostic, Edit, Severity
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.write import write_atomic
@@ -37,7 +39,6 @@ from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import document_bindings
 from coursebuild.scripts.diffrows import DiffRow, diff_rows
 from coursebuild.scripts.edit import apply_edits, updated_body
-from coursebuild.values import dataclass
 
 _MOST = 60
 """Mistakes that a page is told of."""
@@ -45,8 +46,7 @@ _IN_PLACE = ("output-drift", "binding-mismatch")
 """Rules whose mistakes a page shows where they are."""
 
 
-@dataclass(frozen=True, slots=True)
-class Offer:
+class Offer(Struct, frozen=True):
     """An edit that an author may accept."""
 
     edit: Edit

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.model import Lesson
 from coursebuild.render import urls
@@ -20,15 +21,13 @@ from coursebuild.render.exports.addresses import filled, quoted
 from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
 from coursebuild.render.exports.parts import anchor
 from coursebuild.render.library import Library
-from coursebuild.values import dataclass
 
 MOST = 250
 """Written lessons that are on one page at most."""
 _HERE = Markup("<!--lessons-->")
 
 
-@dataclass(frozen=True, slots=True)
-class Book:
+class Book(Struct, frozen=True):
     """A page of lessons."""
 
     path: str

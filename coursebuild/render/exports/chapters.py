@@ -13,11 +13,12 @@ import sys
 from collections.abc import Callable
 from typing import TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.model import Lesson
 from coursebuild.render.exports.archive import Deflated, deflate
 from coursebuild.render.exports.epub import Chapter, Epub
 from coursebuild.render.exports.parts import OpenChapter
-from coursebuild.values import dataclass
 
 Keep: TypeAlias = Callable[[str, Callable[[], bytes]], bytes]
 """Gives what was made under a key before, or makes it."""
@@ -30,8 +31,7 @@ def _nothing() -> None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(Struct, frozen=True):
     """Bytes that are kept until others take their place."""
 
     get: Callable[[], bytes | None] = _nothing

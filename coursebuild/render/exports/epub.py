@@ -20,6 +20,7 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.model import Lesson
 from coursebuild.render import urls
@@ -32,7 +33,6 @@ from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, w
 from coursebuild.render.exports.parts import OpenChapter
 from coursebuild.render.library import Library
 from coursebuild.render.styles import style_rules
-from coursebuild.values import dataclass
 
 MIMETYPE = b"application/epub+zip"
 MODIFIED = "2000-01-01T00:00:00Z"
@@ -57,8 +57,7 @@ _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
 
 
-@dataclass(frozen=True, slots=True)
-class Chapter:
+class Chapter(Struct, frozen=True):
     """What the package must know of a lesson's chapter."""
 
     pictures: tuple[str, ...]
@@ -66,8 +65,7 @@ class Chapter:
     svg: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(Struct, frozen=True):
     """A file of the package."""
 
     id: str

@@ -14,6 +14,8 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Generic, Protocol, TypeAlias, TypeVar
 
+from msgspec import Struct
+
 from coursebuild.model import Document, Lesson
 from coursebuild.render import urls, zips
 from coursebuild.render.characters import visible
@@ -32,7 +34,6 @@ from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 from coursebuild.source import key_of
-from coursebuild.values import dataclass
 
 Of = TypeVar("Of")
 Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]]
@@ -64,8 +65,7 @@ class Source(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Around:
+class Around(Struct, frozen=True):
     """What files need besides the pages."""
 
     style: str
@@ -208,8 +208,7 @@ class Exports:
         return packed(epub.files(chapters.facts(), around.picture), pack)
 
 
-@dataclass(frozen=True, slots=True)
-class _Made(Generic[Of]):
+class _Made(Struct, Generic[Of], frozen=True):
     """Gives the bytes of a file; a course has many, so that they are small."""
 
     make: Callable[[Of], bytes]

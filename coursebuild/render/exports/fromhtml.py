@@ -14,6 +14,8 @@ import re
 from collections.abc import Callable, Iterator
 from html import unescape
 
+from msgspec import Struct, field
+
 from coursebuild.render.exports.marks import (
     code_span,
     escaped,
@@ -26,7 +28,6 @@ from coursebuild.render.exports.marks import (
     table,
 )
 from coursebuild.render.exports.tags import VOID, End, Start, pieces
-from coursebuild.values import dataclass, field
 
 _SKIPPED = frozenset("nav script style svg template button form input select label dialog".split())
 _BLOCKS = frozenset(
@@ -40,8 +41,7 @@ _IMPLIED |= {"td": ("td", "th"), "th": ("td", "th"), "p": ("p",)}
 """What the start of an element ends, where its end was left out."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Node:
+class _Node(Struct, frozen=True):
     start: Start
     children: list[_Node | str] = field(default_factory=list)
 

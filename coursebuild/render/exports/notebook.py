@@ -21,6 +21,8 @@ import shlex
 from collections.abc import Iterable, Iterator
 from urllib.parse import urljoin, urlsplit
 
+from msgspec import Struct
+
 from coursebuild.model import (
     Block,
     Heading,
@@ -37,7 +39,6 @@ from coursebuild.render.exports.plain import Plain
 from coursebuild.render.exports.twin import head
 from coursebuild.render.sheet import Sheet
 from coursebuild.results import Outcome
-from coursebuild.values import dataclass
 
 MAGIC = "%%example"
 SLOT = "\ue000"
@@ -46,8 +47,7 @@ _DEEPEST = 3
 """Headings down to this level begin a cell."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
+class Cell(Struct, frozen=True):
     """A cell: Markdown, or a script with what it printed."""
 
     section: str
@@ -58,8 +58,7 @@ class Cell:
     output: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Notebook:
+class Notebook(Struct, frozen=True):
     """What a lesson gives to its notebook."""
 
     head: str

@@ -5,14 +5,14 @@ Entry point: `written(library)`.
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.model import Lesson
 from coursebuild.render.exports.parts import anchor
 from coursebuild.render.library import Library
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """A lesson in the contents."""
 
     id: str
@@ -20,8 +20,7 @@ class Entry:
     href: str
 
 
-@dataclass(frozen=True, slots=True)
-class LevelEntry:
+class LevelEntry(Struct, frozen=True):
     """A level with its written lessons."""
 
     id: str
@@ -33,8 +32,7 @@ class LevelEntry:
     lessons: tuple[Entry, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """A level and its written lessons, of which there is at least one."""
 
     id: str

@@ -5,6 +5,8 @@ Entry point: `page_exports`. It depends on what the page depends on, and on noth
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.exports.markdown import Same
@@ -14,11 +16,9 @@ from coursebuild.render.exports.twin import twin
 from coursebuild.render.formulas import Woven
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.tools import Tools
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Beside:
+class Beside(Struct, frozen=True):
     """What a page gives to the files beside it."""
 
     twin: str
@@ -27,8 +27,7 @@ class Beside:
     """Of a lesson."""
 
 
-@dataclass(frozen=True, slots=True)
-class PageExports:
+class PageExports(Struct, frozen=True):
     """See the module. The two parts are kept apart, since the second is read for other files."""
 
     beside: Beside

@@ -7,6 +7,7 @@ Entry point: `lesson_part(sheet, tools, article)`. Links to the rest of the site
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.render.exports.cut import Cut
 from coursebuild.render.exports.rewrite import Rewriter, Rules
@@ -15,7 +16,6 @@ from coursebuild.render.formulas import Woven
 from coursebuild.render.lesson import LessonHead
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.tools import Tools
-from coursebuild.values import dataclass
 
 SHOWN = frozenset("gif jpeg jpg png svg webp".split())
 """Endings of the pictures that every reading system shows."""
@@ -29,8 +29,7 @@ _DOWN = 2
 """The course is the first heading, its levels are the second."""
 
 
-@dataclass(frozen=True, slots=True)
-class OpenChapter:
+class OpenChapter(Struct, frozen=True):
     """A lesson as a chapter of the e-book, with its links left open."""
 
     text: str
@@ -41,8 +40,7 @@ class OpenChapter:
     svg: bool
 
 
-@dataclass(frozen=True, slots=True)
-class LessonPart:
+class LessonPart(Struct, frozen=True):
     """A lesson, with its links left open. The two are kept apart: no file is made of both."""
 
     section: str

@@ -12,6 +12,8 @@ import shlex
 from collections.abc import Callable
 from typing import assert_never
 
+from msgspec import Struct, field
+
 from coursebuild.model import (
     AnyQuestion,
     Bench,
@@ -60,11 +62,9 @@ from coursebuild.render.labs import (
 )
 from coursebuild.render.look import OwnBlock
 from coursebuild.render.quizzes import letter, output_line
-from coursebuild.values import dataclass, field
 
 
-@dataclass(frozen=True, slots=True)
-class Plain:
+class Plain(Struct, frozen=True):
     """A document as plain Markdown."""
 
     page: PageContext

@@ -17,6 +17,9 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import unquote
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from coursebuild.patterns import pattern
 from coursebuild.render.exports.addresses import OPEN, SHUT, escape, quoted, site_path, xml_id
 from coursebuild.render.exports.attributes import (
@@ -31,7 +34,6 @@ from coursebuild.render.exports.attributes import (
 from coursebuild.render.exports.cut import MATHML, Cut
 from coursebuild.render.exports.tags import VOID, End, Piece, Start, read
 from coursebuild.render.formulas import Woven
-from coursebuild.values import dataclass, replace
 
 _DROPPED = frozenset("button form template script style dialog iframe object embed".split())
 _SIMPLE = pattern('[^&<>"\\x00-\\x1f\ud800-\udfff\ufffe\uffff]*+')
@@ -86,8 +88,7 @@ _MANY = 1000
 """How many are remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rules:
+class Rules(Struct, frozen=True):
     """What is to become of a lesson."""
 
     path: str

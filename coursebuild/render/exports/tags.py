@@ -15,14 +15,14 @@ from collections.abc import Iterator
 from html import unescape
 from typing import TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.patterns import pattern
-from coursebuild.values import dataclass
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
+class Start(Struct, frozen=True):
     """A start tag."""
 
     name: str
@@ -40,8 +40,7 @@ class Start:
         return None
 
 
-@dataclass(frozen=True, slots=True)
-class End:
+class End(Struct, frozen=True):
     """An end tag."""
 
     name: str

@@ -9,25 +9,23 @@ import unicodedata
 from itertools import groupby
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.render import urls
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import GlossaryTerm
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
 from coursebuild.render.sheet import Sheet
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class PieceView:
+class PieceView(Struct, frozen=True):
     """A part of a definition; `display`: a formula on a line of its own."""
 
     html: Markup
     display: bool
 
 
-@dataclass(frozen=True, slots=True)
-class TermView:
+class TermView(Struct, frozen=True):
     """An entry."""
 
     id: str
@@ -37,8 +35,7 @@ class TermView:
     used: OwnerLinks
 
 
-@dataclass(frozen=True, slots=True)
-class LetterView:
+class LetterView(Struct, frozen=True):
     """The entries under a letter."""
 
     letter: str

@@ -10,7 +10,10 @@ term is defined and used, which symbols there are and where.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import TypeAlias
+
+from msgspec import Struct, field
 
 from coursebuild.model import (
     Course,
@@ -26,7 +29,6 @@ from coursebuild.model import (
     resolve,
 )
 from coursebuild.render import urls
-from coursebuild.values import dataclass, field
 
 Owner: TypeAlias = Lesson | Page
 
@@ -36,8 +38,7 @@ def owner_path(owner: Owner) -> str:
     return urls.lesson_path(owner) if isinstance(owner, Lesson) else urls.page_path(owner)
 
 
-@dataclass(frozen=True, slots=True)
-class Mentions:
+class Mentions(Struct, frozen=True):
     """What one document says of others, and adds to what all share."""
 
     lessons: frozenset[str] = frozenset()
@@ -47,8 +48,7 @@ class Mentions:
     lexicon: Lexicon = field(default_factory=Lexicon)
 
 
-@dataclass(frozen=True, slots=True)
-class GlossaryTerm:
+class GlossaryTerm(Struct, frozen=True):
     """A term of the course."""
 
     term: DefinedTerm
@@ -58,8 +58,7 @@ class GlossaryTerm:
     """Where else it is linked to, in the order of the course."""
 
 
-@dataclass(frozen=True, slots=True)
-class SymbolMeaning:
+class SymbolMeaning(Struct, frozen=True):
     """What a symbol stands for, and in which documents."""
 
     text: str
@@ -67,8 +66,7 @@ class SymbolMeaning:
     owners: tuple[Owner, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CourseSymbol:
+class CourseSymbol(Struct, frozen=True):
     """A symbol of the formulas of the lessons of a course."""
 
     symbol: str
@@ -81,8 +79,7 @@ class CourseSymbol:
     """In the order of the course; none where nobody says."""
 
 
-@dataclass(frozen=True, slots=True)
-class CrossReferences:
+class CrossReferences(Struct, frozen=True, dict=True):
     """See the module."""
 
     referrers: Mapping[str, tuple[Owner, ...]] = field(default_factory=dict)
@@ -90,28 +87,20 @@ class CrossReferences:
     terms: Mapping[str, GlossaryTerm] = field(default_factory=dict)
     """By id; of two definitions the first."""
     has_symbols: bool = False
-    _again: Callable[[], Iterable[tuple[Owner, Mentions]]] = field(
-        default=tuple, repr=False, compare=False
-    )
-    """Gives the documents again."""
-    _symbols: list[CourseSymbol] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
-    """Those of the course, once they were asked for."""
+    documents: Callable[[], Iterable[tuple[Owner, Mentions]]] = tuple
+    """Gives lessons and pages in the order of the course."""
 
-    @property
+    @cached_property
     def symbols(self) -> tuple[CourseSymbol, ...]:
         """In the order in which they are first used.
 
         They are many, and only the page that lists them needs them.
         """
-        if self.has_symbols and not self._symbols:
-            rows: dict[str, _Row] = {}
-            for owner, said in self._again():
-                if isinstance(owner, Lesson):
-                    _note_symbols(rows, owner, said.lexicon)
-            self._symbols[:] = [row.made(symbol) for symbol, row in rows.items()]
-        return tuple(self._symbols)
+        rows: dict[str, _Row] = {}
+        for owner, said in self.documents():
+            if isinstance(owner, Lesson):
+                _note_symbols(rows, owner, said.lexicon)
+        return tuple(row.made(symbol) for symbol, row in rows.items())
 
     @classmethod
     def of(cls, documents: Callable[[], Iterable[tuple[Owner, Mentions]]]) -> CrossReferences:
@@ -138,8 +127,7 @@ class CrossReferences:
         return cls(referred, terms, has_symbols, documents)
 
 
-@dataclass(slots=True)
-class _Row:
+class _Row(Struct):
     """A symbol, as far as the course was looked at."""
 
     section: tuple[str, str]

@@ -8,6 +8,7 @@ Symbols whose meaning a lesson declares come first; the others are listed with t
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.render import urls
 from coursebuild.render.library import Library
@@ -15,11 +16,9 @@ from coursebuild.render.lookup.references import CourseSymbol
 from coursebuild.render.lookup.symbols import sort_key
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
 from coursebuild.render.sheet import Sheet
-from coursebuild.values import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class MeaningView:
+class MeaningView(Struct, frozen=True):
     """What a symbol stands for; `places`, where lessons differ in it."""
 
     text: str
@@ -27,8 +26,7 @@ class MeaningView:
     places: OwnerLinks | None
 
 
-@dataclass(frozen=True, slots=True)
-class SymbolView:
+class SymbolView(Struct, frozen=True):
     """A row."""
 
     symbol: Markup

@@ -15,11 +15,12 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from urllib.parse import urlsplit
 
+from msgspec import Struct
+
 from coursebuild.render.packages.formulas import mathml
 from coursebuild.render.packages.pieces import flat, joined, language_of
 from coursebuild.render.packages.tree import BLOCKS, Content, Node, parse_html
 from coursebuild.render.packages.xml import Element, add, element
-from coursebuild.values import dataclass
 
 STRUCK = "struck"
 """A class of the package's style sheet."""
@@ -45,8 +46,7 @@ _SPACE = re.compile(r"[ \t\n\r\f]+")
 _NUMBER = re.compile(r"[0-9]{1,5}")
 
 
-@dataclass(frozen=True, slots=True)
-class Places:
+class Places(Struct, frozen=True):
     """Where addresses of a drawn page lead, seen from a file of the package."""
 
     link: Callable[[str], str | None]

@@ -17,6 +17,8 @@ import posixpath
 from typing import assert_never
 from urllib.parse import unquote, urlsplit
 
+from msgspec import Struct
+
 from coursebuild.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -47,7 +49,6 @@ from coursebuild.render.packages.processing import (
 from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
 from coursebuild.render.quizzes import letter, output_line, shuffle, unit_html
 from coursebuild.source import Span
-from coursebuild.values import dataclass
 
 NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"
 SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/imsqti_v2p1.xsd"
@@ -56,8 +57,7 @@ NAME = 32
 """Characters that an identifier should have at most, for systems that keep no more."""
 
 
-@dataclass(frozen=True, slots=True)
-class MadeItem:
+class MadeItem(Struct, frozen=True):
     """A question as an item."""
 
     identifier: str
@@ -66,16 +66,14 @@ class MadeItem:
     """Site paths of the files that it shows."""
 
 
-@dataclass(frozen=True, slots=True)
-class Loss:
+class Loss(Struct, frozen=True):
     """Something of a question that an item cannot hold, or why there is no item."""
 
     span: Span
     what: str
 
 
-@dataclass(frozen=True, slots=True)
-class MadeQuiz:
+class MadeQuiz(Struct, frozen=True):
     """A quiz as items."""
 
     identifier: str

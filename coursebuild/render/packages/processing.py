@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from msgspec import Struct
+
 from coursebuild.render.packages.xml import Element, add, element
-from coursebuild.values import dataclass
 
 RESPONSE, SCORE, FEEDBACK, EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
 """Names of the variables, and of the feedback that everyone gets."""
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
+class Parts(Struct, frozen=True):
     """What differs between the kinds of questions."""
 
     response: Element

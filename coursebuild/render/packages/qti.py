@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from msgspec.structs import replace
+
 from coursebuild.model import Course
 from coursebuild.render import urls
 from coursebuild.render.packages.flow import STRUCK
@@ -23,7 +25,6 @@ from coursebuild.render.packages.xml import (
     long_document,
 )
 from coursebuild.results import OutputFile
-from coursebuild.values import replace
 
 MANIFEST = "imsmanifest.xml"
 CP = "http://www.imsglobal.org/xsd/imscp_v1p1"

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from html.parser import HTMLParser
 from typing import TypeAlias
 
-from coursebuild.values import dataclass, field
+from msgspec import Struct, field
 
 Content: TypeAlias = "Node | str"
 
@@ -38,8 +38,7 @@ _CLOSED_BY = {
 _LIMITS = frozenset({"ul", "ol", "dl", "table", "select"})
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
+class Node(Struct, frozen=True):
     """An element."""
 
     name: str

@@ -15,13 +15,14 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
+from msgspec import Struct
+
 from coursebuild.render import urls
 from coursebuild.render.compressed import COPIES, copy_of
 from coursebuild.render.search import index
 from coursebuild.render.search.index import DIGEST, Cells, Numbers, Plan
 from coursebuild.render.search.page import call
 from coursebuild.results import KeptFile
-from coursebuild.values import dataclass
 
 FOLDER = "assets/search"
 _QUALITY = 5
@@ -30,8 +31,7 @@ _MOST = 64
 """Buckets of which the numbers of pages are remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """A page that is searched."""
 
     path: str

@@ -23,8 +23,9 @@ import hashlib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
+from msgspec import Struct
+
 from coursebuild.render.search.words import BEGINNING, is_fuzzy, shelf_of
-from coursebuild.values import dataclass
 
 FORMAT = 1
 """Of the files; part of every name."""
@@ -35,8 +36,7 @@ _SHARDS_A_GROUP = 32
 _DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Struct, frozen=True):
     """How an index is cut: by the number of pages alone."""
 
     buckets: int
@@ -91,8 +91,7 @@ def _hash(text: str) -> int:
 _placed = functools.lru_cache(maxsize=1 << 14)(_hash)
 
 
-@dataclass(frozen=True, slots=True)
-class Cells:
+class Cells(Struct, frozen=True):
     """What the index gets of one bucket."""
 
     groups: tuple[bytes, ...]

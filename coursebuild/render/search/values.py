@@ -8,21 +8,19 @@ from __future__ import annotations
 import hashlib
 from typing import Literal
 
-from coursebuild.values import dataclass
+from msgspec import Struct
 
 Kind = Literal["text", "code", "formula", "output"]
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A paragraph, a listing, a formula, an output."""
 
     kind: Kind
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Section:
+class Section(Struct, frozen=True):
     """What stands between a heading and the next."""
 
     anchor: str
@@ -35,8 +33,7 @@ class Section:
     """Texts that it is found by and that are not shown: names of TeX commands, of files."""
 
 
-@dataclass(frozen=True, slots=True)
-class PageText:
+class PageText(Struct, frozen=True):
     """A page as it is searched."""
 
     title: str
@@ -45,8 +42,7 @@ class PageText:
     sections: tuple[Section, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Searched:
+class Searched(Struct, frozen=True):
     """What a page gives to the search."""
 
     name: str
