@@ -60,7 +60,6 @@ _AHEAD = (
     "coursebuild/render/compressed.py",
     "coursebuild/render/cutting.py",
     "coursebuild/render/fonts.py",
-    "coursebuild/render/woff2.py",
     "templates/icon.svg",
 )
 """What makes things ahead."""

@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from msgspec.structs import replace
 
-from coursebuild.render import cutting, fonts, woff2
+from coursebuild.render import cutting, fonts
 
 OFTEN = (
     *range(0x20, 0x7F),
@@ -67,7 +67,7 @@ def prepared(bundle: Path) -> dict[str, bytes]:
 def made_from(bundle: Path) -> str:
     """A hash of the fonts and of what cuts them."""
     digest = hashlib.sha256()
-    for path in map(Path, (__file__, fonts.__file__, cutting.__file__, woff2.__file__)):
+    for path in map(Path, (__file__, fonts.__file__, cutting.__file__)):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
     for face in fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes()):
         whole = replace(face, characters="", measure=None)  # which may not be noted yet

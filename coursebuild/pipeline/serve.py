@@ -22,7 +22,7 @@ from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
-from coursebuild.effects.watch import Watcher, watcher
+from coursebuild.effects.watch import Watcher
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.kept import kept_font
@@ -90,7 +90,7 @@ def serve(options: Options, port: int) -> None:
         server = PreviewServer(port, Site(live), files)
     except OSError as error:
         raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
-    saves = watcher(options.root)
+    saves = Watcher(options.root)
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH)
     try:

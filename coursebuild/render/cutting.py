@@ -6,10 +6,9 @@ Entry points: `covered`, `measured`, what a font has; `cut`, a font with some of
    the weights.
 2. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
    every root room for the widest of them, and leaves what is not needed as a gap behind the root.
-3. What was cut so before without compression (a ready font) needs only its characters chosen:
-   HarfBuzz does that in a millisecond, and `woff2` writes the result. The two take a fifth of the
-   time of fontTools, and its import is saved.
-4. fontTools compresses at the finest level of Brotli; where another one is wanted, it gets a
+3. What was cut so before without compression (a ready font) needs only its characters chosen, which
+   takes HarfBuzz a millisecond.
+4. fontTools writes WOFF2, at the finest level of Brotli; where another one is wanted, it gets a
    stand-in for the module.
 """
 
@@ -21,8 +20,6 @@ import io
 import threading
 from collections.abc import Iterator
 from typing import Any
-
-from coursebuild.render.woff2 import woff2
 
 _PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, _PER_MILLE.split()), strict=True))
@@ -82,7 +79,7 @@ def cut(
     if data[:4] == _WOFF2:
         return _cut_whole(data, characters, weights, flavor, quality)
     chosen = _chosen(data, characters)
-    return chosen if flavor is None else woff2(chosen, quality)
+    return chosen if flavor is None else _saved(chosen, flavor, quality)
 
 
 def _chosen(data: bytes, characters: str) -> bytes:
@@ -101,6 +98,17 @@ def _chosen(data: bytes, characters: str) -> bytes:
         everything.invert()
     part: bytes = wanted.subset(uharfbuzz.Face(data)).blob.data
     return part
+
+
+def _saved(font: bytes, flavor: str, quality: int) -> bytes:
+    """A font in another form."""
+    from fontTools.ttLib import TTFont
+
+    out = io.BytesIO()
+    with TTFont(io.BytesIO(font), recalcTimestamp=False) as parsed, _compression(quality):
+        parsed.flavor = flavor
+        parsed.save(out)
+    return out.getvalue()
 
 
 def _cut_whole(

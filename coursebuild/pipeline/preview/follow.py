@@ -4,8 +4,7 @@ Entry point: `follow(live, watcher, notice, said)`, which a thread of its own ru
 
 1. What one save of an editor comes to (an empty file that is written next, a new file that takes
    the place of the old one) counts once: when nothing more happened for some milliseconds. While
-   that is awaited the page is made already, so that it costs no time. Where it is known that the
-   file was written to its end, and nothing is wrong in it, nothing is awaited.
+   that is awaited the page is made already, so that it costs no time.
 2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
 3. A document that is gone or empty may be so only for a moment, and who has a file open may write
    more of it.
@@ -27,7 +26,7 @@ QUIET = 0.008
 QUIET_MANY = 0.060
 """The same where many files change."""
 QUIET_GONE = 0.100
-"""The same where a document is not there or empty, or is still being written."""
+"""The same where a document is not there or empty."""
 LONGEST = 0.250
 """Seconds after which what there is counts, whatever still happens; with many files, four times."""
 
@@ -71,11 +70,10 @@ def _take(
         last = began + LONGEST * (4 if many else 1)
         with live.changed, _without_collecting():
             plan = live.plan(paths)
-            soon = plan is not None and plan.whole and not watcher.writing
-            sure = plan is not None and plan.sound and watcher.exact
+            soon = plan is not None and plan.whole
             # So few milliseconds are waited for with the lock held: who asks for the page meanwhile
             # gets the new one.
-            more = _more(watcher, heard + (0 if sure else QUIET), last) if soon else frozenset()
+            more = _more(watcher, heard + QUIET, last) if soon else frozenset()
             if plan is not None and soon and not more:
                 live.commit(plan)
                 return bool(plan.found)

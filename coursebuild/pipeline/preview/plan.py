@@ -40,8 +40,3 @@ class Plan(Struct, frozen=True):
     def whole(self) -> bool:
         """Whether no document became empty."""
         return all(document.source.text.strip() for document in self.documents.values())
-
-    @property
-    def sound(self) -> bool:
-        """Whether nothing is wrong, and every page of it is drawn."""
-        return not any(self.found.values()) and len(self.drawn) == len(self.documents)
