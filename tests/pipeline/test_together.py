@@ -21,6 +21,8 @@ from coursebuild.pipeline.requests import OUTLINES
 from coursebuild.pipeline.together import Together
 from coursebuild.source import Source
 
+pytestmark = pytest.mark.site
+
 KINDS = frozenset({"note"})
 SCRIPT = "```python file=examples/{n}.py\nprint({n})\n```\n\nOutput:\n\n```text\n{n}\n```\n"
 Read = dict[str, tuple[Document, tuple[Diagnostic, ...]]]
