@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from markupsafe import Markup
@@ -12,8 +10,8 @@ from markupsafe import Markup
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import Frames, Names, frame_around
 from coursebuild.render.library import Library
+from support.rendered_course import Make
 
-Make = Callable[..., Any]
 NAMES = Names(
     style="assets/s.css",
     theme_script="assets/t.js",

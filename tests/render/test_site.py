@@ -6,19 +6,16 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 from coursebuild.render import SiteOptions, check_links
 from coursebuild.results import OutputFile
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 LESSON = """## First part
 
