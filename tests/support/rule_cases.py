@@ -118,6 +118,8 @@ class Layout:
                 self.folders.append(path)
             case "without":
                 del self.files[path]
+            case other:
+                raise ValueError(f"no kind of file {other!r}")
 
     def write(self, root: Path) -> None:
         """Put all but the later files into a folder, which is made."""
