@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+    from support.built_sites import BuiltCourses
 
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
 # `make test-slow` tries new ones.
@@ -32,13 +39,44 @@ STORES = ("fonts", "compressed")
 
 
 @pytest.fixture(scope="session")
-def stores(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all worker processes of a run share."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session")
+def stores(shared: Path) -> Path:
     """Stores for the `.coursebuild` of scratch courses, so that a font is cut once a session.
 
     Worker processes share it: an entry is named by what it is made from, and is whole or not there.
     """
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "stores"
+    folder = shared / "stores"
     for name in STORES:
         (folder / name).mkdir(parents=True, exist_ok=True)
     return folder
+
+
+@pytest.fixture(scope="session")
+def built_courses(shared: Path, stores: Path) -> BuiltCourses:
+    """Courses that are built once for all worker processes of a run."""
+    from support.built_sites import BuiltCourses
+
+    return BuiltCourses(shared / "built", stores)
+
+
+@pytest.fixture(scope="session")
+def browsers() -> Iterator[Mapping[str, Browser]]:
+    """The browsers of this process, `webgl` and `plain`, each started when it is asked for.
+
+    While Playwright runs, nothing else in the main thread can start an event loop, nor a second
+    Playwright: so all tests have this one.
+    """
+    from playwright.sync_api import sync_playwright
+
+    from support.chromium import Browsers
+
+    with sync_playwright() as playwright:
+        found = Browsers(playwright)
+        yield found
+        found.close()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -29,49 +31,10 @@ LAYERS: tuple[frozenset[str], ...] = (
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-
-def part_of(path: Path) -> str:
-    relative = path.relative_to(PACKAGE).parts
-    return relative[0].removesuffix(".py")
-
-
-def imports_of(path: Path) -> set[str]:
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            found.add(node.module or "")
-            if node.module == "coursebuild":
-                found |= {f"coursebuild.{alias.name}" for alias in node.names}
-    return found
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_go_down_and_never_sideways(path: Path) -> None:
-    own = part_of(path)
-    if own == "__init__":
-        return
-    for name in imports_of(path):
-        package, _, rest = name.partition(".")
-        if package == "mjcourse":
-            raise AssertionError(f"{own} imports mjcourse, which is for lesson scripts")
-        other = rest.split(".")[0]
-        if package != "coursebuild" or other in ("", own, "__version__"):
-            continue
-        assert LEVEL[other] < LEVEL[own], f"{path.name}: {own} must not import {other}"
-
-
-def test_every_part_has_its_place() -> None:
-    assert {part_of(path) for path in FILES} - {"__init__"} <= set(LEVEL)
-
-
-def test_mjcourse_never_imports_coursebuild() -> None:
-    for path in sorted((ROOT / "mjcourse").rglob("*.py")):
-        assert not {name for name in imports_of(path) if name.split(".")[0] == "coursebuild"}, path
-
-
+PURE = (
+    *("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model"),
+    *("drawing", "measured"),
+)
 IO_MODULES = {
     "os",
     "shutil",
@@ -83,26 +46,97 @@ IO_MODULES = {
     "multiprocessing",
     "signal",
 }
-PURE = (
-    *("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model"),
-    *("drawing", "measured"),
-)
+IO_CALLS = {"open", "print", "input"}
 
 
-@pytest.mark.parametrize(
-    "path", [p for p in FILES if part_of(p) in PURE], ids=lambda path: str(path.relative_to(ROOT))
-)
-def test_pure_parts_import_nothing_that_does_io(path: Path) -> None:
-    assert not imports_of(path) & IO_MODULES
-    calls = {
-        node.func.id
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    }
-    assert not calls & {"open", "print", "input"}
+class Module(NamedTuple):
+    """What a file says of itself; its tree is not kept, since the whole package's is large."""
+
+    imports: frozenset[str]
+    """A relative import stands here with its dots."""
+    calls: frozenset[str]
+    lines: int
+    has_docstring: bool
 
 
-def test_asking_for_help_imports_nothing_heavy() -> None:
+@cache
+def read(path: Path) -> Module:
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    imports: set[str] = set()
+    calls: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imports |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imports.add("." * node.level + (node.module or ""))
+            if node.module == "coursebuild":
+                imports |= {f"coursebuild.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            calls.add(node.func.id)
+    docstring = ast.get_docstring(tree)
+    return Module(frozenset(imports), frozenset(calls), text.count("\n"), bool(docstring))
+
+
+def part_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def is_allowed(own: str, name: str) -> bool:
+    """Whether a part may import a module; `mjcourse` is for lesson scripts."""
+    package, _, rest = name.partition(".")
+    if package != "coursebuild":
+        return package not in ("", "mjcourse")
+    other = rest.split(".")[0]
+    return other in ("", own, "__version__") or LEVEL[other] < LEVEL[own]
+
+
+def test_every_part_has_a_layer() -> None:
+    assert {part_of(path) for path in FILES} - {"__init__"} == set(LEVEL)
+
+
+def test_imports_go_down_and_never_sideways() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in FILES
+        if part_of(path) != "__init__"
+        for name in sorted(read(path).imports)
+        if not is_allowed(part_of(path), name)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_mjcourse_never_imports_coursebuild() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sorted((ROOT / "mjcourse").rglob("*.py"))
+        for name in sorted(read(path).imports)
+        if name.split(".")[0] == "coursebuild"
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_pure_parts_do_no_input_or_output() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} uses {name}"
+        for path in FILES
+        if part_of(path) in PURE
+        for name in sorted((read(path).imports & IO_MODULES) | (read(path).calls & IO_CALLS))
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_files_stay_small_and_say_what_they_are_for() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} has {module.lines} lines and a docstring: {module.has_docstring}"
+        for path, module in ((path, read(path)) for path in FILES)
+        if module.lines > 450 or not module.has_docstring
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.site
+def test_asking_for_the_version_imports_nothing_heavy() -> None:
     code = (
         "import sys\n"
         "from coursebuild.cli import main\n"
@@ -113,10 +147,3 @@ def test_asking_for_help_imports_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_stay_small_and_say_what_they_are_for(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert text.count("\n") <= 450, "split it"
-    assert ast.get_docstring(ast.parse(text)), "a module says its purpose"

@@ -24,14 +24,17 @@ _MEMORY = 1 << 30
 """Bytes: the engine's WebAssembly memory counts."""
 _START_SECONDS = 60.0
 _PIECES = Path(__file__).with_name("lab_pieces.js")
-_MARGIN = 15.0
-"""A trial ends itself when its time is over; this is for code that never returns."""
 
 
 class LabEngine:
-    """Tries labs, one after the other; a context manager for use in one thread."""
+    """Tries labs, one after the other; a context manager for use in one thread.
 
-    def __init__(self) -> None:
+    A trial ends itself when its time is over; code that never returns is ended `margin` seconds
+    later.
+    """
+
+    def __init__(self, margin: float = 15.0) -> None:
+        self._margin = margin
         self._isolate: Isolate | None = None
         self._stopped = False
         self.version = ""
@@ -74,7 +77,7 @@ class LabEngine:
         isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
-            text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + _MARGIN)
+            text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + self._margin)
         except LimitError as error:
             entry = _running(isolate) if error.resumable else []
             self.close()
@@ -116,7 +119,7 @@ class LabEngine:
 def _running(isolate: Isolate) -> list[str | int]:
     """The entry whose code was running when a trial was stopped; empty where none was."""
     with contextlib.suppress(LimitError, ScriptError):
-        told = json.loads(isolate.call("trying", "", _MARGIN))
+        told = json.loads(isolate.call("trying", "", _START_SECONDS))
         found: list[str | int] = told["entry"] or told["trying"] or []
         return found
     return []

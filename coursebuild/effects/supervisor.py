@@ -147,6 +147,7 @@ class Slot:
             start = time.monotonic()
             try:
                 folder = _temporary(job["scratch"])
+                parent = os.getppid()  # now, since a script may end it as soon as it runs
                 launched = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
                 return _unstartable(f"the script cannot be started: {error}\n")
@@ -155,7 +156,7 @@ class Slot:
                 return None
             run = Watched(launched, start, job["timeout"], self.awake)
             try:
-                run.watch(self.jobs)
+                run.watch(self.jobs, parent)
             finally:
                 run.end()
             return _finished(run, launched.notes)

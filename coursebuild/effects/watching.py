@@ -74,9 +74,12 @@ class Watched:
         for fd in self.pipes:
             os.set_blocking(fd, False)
 
-    def watch(self, tool: int) -> None:
-        """Return when the script has ended, or must; exit when `tool` closes its pipe."""
-        parent = os.getppid()
+    def watch(self, tool: int, parent: int) -> None:
+        """Return when the script has ended, or must.
+
+        Exit when `tool` closes its pipe, and when the parent of this process is no more `parent`,
+        which it was before the script was started.
+        """
         while not self._ended():
             now = time.monotonic()
             if now >= self.deadline:

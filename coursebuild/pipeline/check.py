@@ -55,7 +55,7 @@ def check(
 @contextlib.contextmanager
 def scripts_ahead(options: Options, names: tuple[str, ...] = ()) -> Iterator[RunAll | None]:
     """What runs the scripts, where it is worth beginning before the texts are read."""
-    if names or options.jobs == 1 or options.executor is not None:
+    if names or options.jobs == 1 or options.executor is not None or options.run_all is not None:
         yield None
         return
     with early_server(options.root, options.store) as run_all:

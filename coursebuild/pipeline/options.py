@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
@@ -18,6 +19,9 @@ from coursebuild.effects.errors import UsageError as UsageError
 from coursebuild.effects.read import find_root
 from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
+
+if TYPE_CHECKING:
+    from coursebuild.effects.foresight import RunAll
 
 
 class Options(Struct, frozen=True):
@@ -32,6 +36,9 @@ class Options(Struct, frozen=True):
     """What was made before; what is kept in the course's folder where nothing is said."""
     executor: str | None = None
     """Where scripts run, `dask://HOST:PORT`; here, where nothing is said."""
+    run_all: RunAll | None = None
+    """What runs scripts, such as a server that stays for the next command; one of this command's
+    own, where nothing is said."""
 
     @property
     def store(self) -> Store:

@@ -317,7 +317,7 @@ def _run(
 
             runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
         else:
-            run_all = run_all or run_scripts
+            run_all = run_all or options.run_all or run_scripts
             runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
     memory.close()
     return runs

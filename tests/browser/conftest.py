@@ -1,36 +1,28 @@
-"""A built course with labs, served, and a browser that draws without a graphics processor."""
+"""Built courses, served, and windows of a browser."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext
 
 from support import quiz_page
-from support.built_sites import Site, build_both, shared_folder
-from support.chromium import launch
+from support.built_sites import BuiltCourses, Site, lesson_files
 from support.folder_server import served
 from support.lab_course import LESSON, PENDULUM, TWIN, ZOO
 from support.reader_course import FILES
 from support.scratch_course import Folder
 from support.static_host import Host
 
-DRAWING = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
 
 @pytest.fixture(scope="session")
-def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def course(built_courses: BuiltCourses) -> Folder:
     """A course of one lesson with labs, built."""
-    folder = Folder(tmp_path_factory.mktemp("labs") / "course")
-    folder.fill([LESSON], stores)
-    folder.write("models/pendulum.xml", PENDULUM)
-    folder.write("models/zoo.xml", ZOO)
-    folder.write("content/labs/twin.js", TWIN.read_bytes())
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
-    return folder
+    models = {"models/pendulum.xml": PENDULUM, "models/zoo.xml": ZOO}
+    kinds = {"content/labs/twin.js": TWIN.read_bytes()}
+    return built_courses.of_files("labs", {**lesson_files(LESSON), **models, **kinds})
 
 
 @pytest.fixture(scope="session")
@@ -40,30 +32,17 @@ def base(course: Folder) -> Iterator[str]:
         yield address
 
 
-@pytest.fixture(scope="module")
-def browsers() -> Iterator[dict[str, Browser]]:
-    """Browsers: one with WebGL, one without."""
-    with sync_playwright() as playwright:
-        found = {
-            "webgl": launch(playwright, *DRAWING),
-            "plain": launch(playwright, *DRAWING, "--disable-3d-apis"),
-        }
-        yield found
-        for browser in found.values():
-            browser.close()
-
-
 @pytest.fixture
-def context(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
+def context(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
     """A window of a desk's size."""
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
         yield context
 
 
 @pytest.fixture(scope="session")
-def sites(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[dict[str, Site]]:
+def sites(built_courses: BuiltCourses) -> Iterator[Mapping[str, Site]]:
     """The course of this repository, and one with every construct; each on a host."""
-    roots = build_both(shared_folder(tmp_path_factory), stores)
+    roots = {"real": built_courses.real().root, "full": built_courses.of_case("full").root}
     bases = {"real": "/mujoco-course/", "full": "/constructs/"}  # the paths of their base addresses
     found = {
         name: Site(name, root, Host(root / "public", bases[name])) for name, root in roots.items()
@@ -74,14 +53,10 @@ def sites(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[di
 
 
 @pytest.fixture(scope="session")
-def quiz_files(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
+def quiz_files(built_courses: BuiltCourses) -> Path:
     """A site with every kind of question."""
-    folder = Folder(tmp_path_factory.mktemp("quizzes") / "course")
-    folder.fill([quiz_page.LESSON], stores)
-    folder.write("models/pendulum.xml", PENDULUM)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
-    return folder.root / "public"
+    files = {**lesson_files(quiz_page.LESSON), "models/pendulum.xml": PENDULUM}
+    return built_courses.of_files("quizzes", files).root / "public"
 
 
 @pytest.fixture(scope="session")
@@ -92,17 +67,9 @@ def quizzes(quiz_files: Path) -> Iterator[str]:
 
 
 @pytest.fixture(scope="session")
-def reader(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def reader(built_courses: BuiltCourses) -> Folder:
     """A course with questions, and a reader's way through it, built."""
-    folder = Folder(tmp_path_factory.mktemp("reader") / "course")
-    folder.root.mkdir()
-    folder.borrow(stores)
-    for path, text in FILES.items():
-        folder.write(path, text)
-    folder.write("models/pendulum.xml", PENDULUM)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
-    return folder
+    return built_courses.of_files("reader", {**FILES, "models/pendulum.xml": PENDULUM})
 
 
 @pytest.fixture(scope="session")
@@ -113,7 +80,7 @@ def site(reader: Folder) -> Iterator[str]:
 
 
 @pytest.fixture
-def calm(browsers: dict[str, Browser]) -> Iterator[BrowserContext]:
+def calm(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
     """A window without a service worker, which would keep pages that a test changes."""
     size = {"width": 1000, "height": 800}
     with browsers["plain"].new_context(viewport=size, service_workers="block") as context:

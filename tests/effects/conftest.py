@@ -1,4 +1,4 @@
-"""Scripts that several tests run stand beside them; ways to run them, and a user who may little."""
+"""Servers that run scripts, shared by all tests of a session, and a user who may little."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.effects.runner import ScriptServer
 from coursebuild.results import ScriptRun
-from support.runners import Run, job, run_scripts, way
+from support.runners import Run, job
 
 NOBODY = 65534
 
@@ -30,10 +31,25 @@ def held_back() -> Iterator[Path]:
                 os.seteuid(0)
 
 
-@pytest.fixture(params=[True, False], ids=["forked", "spawned"])
-def both_ways(request: pytest.FixtureRequest) -> None:
-    """Scripts are run forked from a server, and each with an interpreter of its own."""
-    way["fork"] = request.param
+@pytest.fixture(scope="session")
+def forking() -> Iterator[ScriptServer]:
+    """Runs scripts forked from one process that is started once."""
+    with ScriptServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def spawning() -> Iterator[ScriptServer]:
+    """Runs each script with an interpreter of its own."""
+    with ScriptServer(fork=False) as server:
+        yield server
+
+
+@pytest.fixture
+def server(request: pytest.FixtureRequest) -> ScriptServer:
+    """Runs scripts forked; in both ways where a test is marked `both_ways`."""
+    found: ScriptServer = request.getfixturevalue(getattr(request, "param", "forking"))
+    return found
 
 
 @pytest.fixture
@@ -44,11 +60,11 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(root: Path) -> Run:
+def run(root: Path, server: ScriptServer) -> Run:
     def run_one(code: str | bytes, **options: object) -> ScriptRun:
         data = code if isinstance(code, bytes) else code.encode()
         (root / "examples/x.py").write_bytes(data)
-        (result,) = run_scripts(root, [job(**options)], parallel=1)  # type: ignore[arg-type]
+        (result,) = server.run(root, [job(**options)], parallel=1)  # type: ignore[arg-type]
         return result
 
     return run_one

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,9 @@ import pytest
 
 from coursebuild.effects.runner import ScriptServer
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
+from support.runners import both_ways
+
+pytestmark = pytest.mark.site
 
 HEAD = """\
 import json
@@ -48,12 +51,6 @@ SIZE = 1e-12
 Told = Callable[..., dict[str, list[float]]]
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["forked", "spawned"])
-def server(request: pytest.FixtureRequest) -> Iterator[ScriptServer]:
-    with ScriptServer(fork=request.param) as server:
-        yield server
-
-
 @pytest.fixture
 def run(server: ScriptServer, tmp_path: Path) -> Callable[..., ScriptRun]:
     (tmp_path / "examples").mkdir()
@@ -61,7 +58,7 @@ def run(server: ScriptServer, tmp_path: Path) -> Callable[..., ScriptRun]:
     def run_script(text: str, perturbation: int) -> ScriptRun:
         whole = f"{HEAD}{text}\nprint(json.dumps(told))\n"
         (tmp_path / "examples/a.py").write_text(whole)
-        job = ScriptJob("examples/a.py", (), 60.0, (), False, perturbation)
+        job = ScriptJob("examples/a.py", (), 120.0, (), False, perturbation)
         [run] = server.run(tmp_path, [job], parallel=1)
         assert run.outcome is Outcome.OK, run.stderr
         return run
@@ -88,12 +85,14 @@ STEP = "mujoco.mj_step(model, data)\n"
 PULL = "data.qpos[:] = 0.5, 0.25\n"
 
 
+@both_ways
 def test_an_ordinary_run_is_as_ever(told: Told) -> None:
     text = PULL + STEP * 20 + "tell('q', data.qpos)"
     assert told(text, 0) == told(text, 0)
     assert told(text, 0) != told(text, 1)
 
 
+@both_ways
 def test_a_state_is_moved_before_anything_is_computed_from_it(told: Told) -> None:
     for function in ("mj_forward", "mj_step1", "mj_kinematics", "mj_inverse", "mj_fwdPosition"):
         found = told(f"{PULL}mujoco.{function}(model, data)\ntell('q', data.qpos)")
@@ -302,6 +301,7 @@ tell("end", end[:, -1, 1:3])
     assert all(moved(a, b) for a, b in zip(found["end"], found["given"], strict=True))
 
 
+@both_ways
 def test_what_became_of_the_states_is_noted(run: Callable[..., ScriptRun]) -> None:
     trace = run(PULL + STEP, 1).trace
     assert trace is not None

@@ -13,13 +13,15 @@ import struct
 import subprocess
 import sys
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from coursebuild.effects.runner import ScriptServer, clean_environment
 from coursebuild.results import ScriptJob, ScriptRun
+from support.runners import both_ways
+
+pytestmark = pytest.mark.site
 
 
 def png(level: int) -> bytes:
@@ -320,12 +322,6 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
 }
 
 
-@pytest.fixture(scope="module", params=["forked", "spawned"])
-def server(request: pytest.FixtureRequest) -> Iterator[ScriptServer]:
-    with ScriptServer(fork=request.param == "forked") as server:
-        yield server
-
-
 def write(root: Path, files: dict[str, bytes]) -> None:
     for name, data in files.items():
         path = root / name
@@ -335,7 +331,7 @@ def write(root: Path, files: dict[str, bytes]) -> None:
 
 def run(server: ScriptServer, root: Path, script: str) -> ScriptRun:
     write(root, {"examples/x.py": (SHOW + script).encode()})
-    (done,) = server.run(root, [ScriptJob("examples/x.py", (), 60.0, (), False)], parallel=1)
+    (done,) = server.run(root, [ScriptJob("examples/x.py", (), 120.0, (), False)], parallel=1)
     return done
 
 
@@ -367,6 +363,7 @@ def test_the_files_of_a_model(name: str, tmp_path: Path, server: ScriptServer) -
         shutil.rmtree(less)
 
 
+@both_ways
 def test_files_that_mujoco_writes(tmp_path: Path, server: ScriptServer) -> None:
     code = "model = text('<mujoco/>')\n{}\n"
     for call in (
@@ -382,12 +379,14 @@ def test_files_that_mujoco_writes(tmp_path: Path, server: ScriptServer) -> None:
         )
 
 
+@both_ways
 def test_plugins_of_the_project(tmp_path: Path, server: ScriptServer) -> None:
     (tmp_path / "plugins").mkdir()
     done = run(server, tmp_path, "mujoco.mj_loadAllPluginLibraries('plugins')")
     assert done.trace is not None and done.trace.opaque == "it loads native code of the project"
 
 
+@both_ways
 def test_wrappers_look_like_what_they_wrap(tmp_path: Path, server: ScriptServer) -> None:
     code = (
         "for f in (load, text, Spec.from_file, Spec.compile, Spec().attach, mujoco.mj_saveModel):"

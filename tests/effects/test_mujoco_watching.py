@@ -1,21 +1,20 @@
-"""No simulation of a script is lost unnoticed, and the script notices nothing of that.
-
-Each script runs both ways: forked by a server that has imported MuJoCo, and in an interpreter of
-its own.
-"""
+"""No simulation of a script is lost unnoticed, and the script notices nothing of that."""
 
 from __future__ import annotations
 
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coursebuild.effects.runner import ScriptServer, clean_environment
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign
+from support.runners import both_ways
+
+pytestmark = pytest.mark.site
 
 HEAD = """\
 import mujoco
@@ -57,19 +56,13 @@ def press(data, force):
 Run = Callable[[str], ScriptRun]
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["forked", "spawned"])
-def server(request: pytest.FixtureRequest) -> Iterator[ScriptServer]:
-    with ScriptServer(fork=request.param) as server:
-        yield server
-
-
 @pytest.fixture
 def run(server: ScriptServer, tmp_path: Path) -> Run:
     (tmp_path / "examples").mkdir()
 
     def run_script(text: str) -> ScriptRun:
         (tmp_path / "examples/a.py").write_text(text)
-        job = ScriptJob("examples/a.py", (), 60.0, (), False)
+        job = ScriptJob("examples/a.py", (), 120.0, (), False)
         [run] = server.run(tmp_path, [job], parallel=1)
         assert [path.name for path in tmp_path.iterdir()] == ["examples"], "something was left"
         return run
@@ -94,6 +87,7 @@ def test_a_sound_simulation_is_not_remarked_on(run: Run) -> None:
     assert found(run(HEAD + "data.qvel[0] = 3.0\n" + STEP * 5)) == ()
 
 
+@both_ways
 def test_a_warning_is_noticed_with_its_line_time_and_model(run: Run) -> None:
     assert found(run(HEAD + STEP * 4 + FAST + STEP)) == warned(LINE + 6, "0.0080")
 
@@ -193,6 +187,7 @@ pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
     assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", 0)
 
 
+@both_ways
 def test_a_state_that_is_no_number_at_the_end(run: Run) -> None:
     text = HEAD + STEP + "data.qvel[0] = float('nan')\n"
     assert found(run(text)) == (Divergence(Sign.STATE, "0.002", "spinner", "", 0),)
@@ -208,6 +203,7 @@ def test_copies_are_looked_at_as_well(run: Run) -> None:
     assert [one.sign for one in found(run(text))] == [Sign.STATE]
 
 
+@both_ways
 @pytest.mark.parametrize(
     "imported",
     [
@@ -330,7 +326,7 @@ def test_a_log_that_was_there_is_left(server: ScriptServer, tmp_path: Path) -> N
     (tmp_path / "examples").mkdir()
     (tmp_path / "examples/a.py").write_text(HEAD + FAST + STEP)
     (tmp_path / "MUJOCO_LOG.TXT").write_text("mine\n")
-    server.run(tmp_path, [ScriptJob("examples/a.py", (), 60.0, (), False)], parallel=1)
+    server.run(tmp_path, [ScriptJob("examples/a.py", (), 120.0, (), False)], parallel=1)
     assert (tmp_path / "MUJOCO_LOG.TXT").read_text() == "mine\n"
 
 

@@ -1,4 +1,4 @@
-"""Running scripts, well-behaved and not, forked and each with an interpreter of its own."""
+"""Running scripts, well-behaved and not."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from coursebuild.effects.runner import (
     RunEvent,
     RunFinished,
     RunStarted,
+    ScriptServer,
     clean_environment,
 )
 from coursebuild.results import Outcome
-from support.runners import SOURCE_TREE, TOOL, Run, job, run_scripts, way
+from support.runners import SOURCE_TREE, TOOL, Run, both_ways, hangs, job
 
-pytestmark = pytest.mark.usefixtures("both_ways")
+pytestmark = pytest.mark.site
 
 
 class TestOutcomes:
+    @both_ways
     def test_ok(self, run: Run) -> None:
         result = run("import sys\nprint('out')\nprint('err', file=sys.stderr)\n")
         assert (result.outcome, result.status) == (Outcome.OK, 0)
         assert (result.stdout, result.stderr) == ("out\n", "err\n")
-        assert 0.0 < result.seconds < 120.0
+        assert result.seconds > 0.0
         assert not result.cached
 
     @pytest.mark.parametrize(
@@ -67,13 +69,12 @@ class TestOutcomes:
         assert limits.stdout == "(0, 0)\n"
         assert [path.name for path in root.iterdir()] == ["examples"]
 
+    @both_ways
     def test_timeout_says_where(self, run: Run) -> None:
         code = "import time\nprint('so far', flush=True)\ndef hang(): time.sleep(600)\nhang()\n"
-        result = run(code, timeout=3.0)
-        assert result.outcome is Outcome.TIMEOUT
+        result = hangs(run, code)
         assert result.stdout == "so far\n"
         assert "line 3 in hang" in result.stderr
-        assert 3.0 <= result.seconds < 120.0
 
     @pytest.mark.parametrize(
         "code",
@@ -87,18 +88,16 @@ class TestOutcomes:
         ],
     )
     def test_timeout_of_the_stubborn(self, run: Run, code: str) -> None:
-        result = run(code, timeout=3.0)
-        assert (result.outcome, result.stdout) == (Outcome.TIMEOUT, "1\n")
-        assert result.seconds < 120.0
+        assert hangs(run, code).stdout == "1\n"
 
-    def test_skipped_and_norun(self, root: Path) -> None:
+    def test_skipped_and_norun(self, server: ScriptServer, root: Path) -> None:
         (root / "examples/x.py").write_text("print(1)")
         events: list[RunEvent] = []
         jobs = [
             job(requires=["no_such_module", "json", "json.no_such", "no_such_module.sub"]),
             job("examples/none.py", norun=True),
         ]
-        skipped, norun = run_scripts(root, jobs, parallel=4, on_event=events.append)
+        skipped, norun = server.run(root, jobs, parallel=4, on_event=events.append)
         assert skipped.outcome is Outcome.SKIPPED
         assert skipped.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
         assert (norun.outcome, norun.stdout) == (Outcome.NORUN, "")
@@ -113,11 +112,11 @@ class TestOutcomes:
         result = run("print('ran')", requires=names)
         assert (result.stdout, result.missing) == ("ran\n", ())
 
-    def test_vanished_or_a_folder(self, root: Path) -> None:
+    def test_vanished_or_a_folder(self, server: ScriptServer, root: Path) -> None:
         (root / "examples/folder.py").mkdir()
         (root / "examples/folder.py/__main__.py").write_text("print('must not run')")
         for path in ("examples/none.py", "examples/folder.py"):
-            (result,) = run_scripts(root, [job(path)], parallel=1)
+            (result,) = server.run(root, [job(path)], parallel=1)
             assert (result.outcome, result.stdout) == (Outcome.FAILED, "")
             assert result.stderr == f"there is no file {path}\n"
 
@@ -143,7 +142,7 @@ class TestOutput:
         "code",
         [
             "sys.stdout.write('x' * 1048577)",
-            "sys.stdout.write('é' * 50_000_000)",
+            "sys.stdout.write('é' * 2_000_000)",
             "while True: print('x' * 1000)",
         ],
     )
@@ -153,10 +152,10 @@ class TestOutput:
         assert len(result.stdout.encode()) <= 1 << 20
 
     def test_end_of_a_long_stderr(self, run: Run) -> None:
-        code = "import sys\nfor i in range(600000): sys.stderr.write(f'é{i:06}\\n')\nprint('done')"
+        code = "import sys\nfor i in range(60_000): sys.stderr.write(f'é{i:06}\\n')\nprint('done')"
         result = run(code)
         assert (result.outcome, result.stdout) == (Outcome.OK, "done\n")
-        assert result.stderr.endswith("é599999\n")
+        assert result.stderr.endswith("é059999\n")
         assert "\\x" not in result.stderr
         assert (1 << 16) - 4 <= len(result.stderr.encode()) <= 1 << 16
 
@@ -204,6 +203,7 @@ class TestSurroundings:
         " 'tmp': os.listdir(os.environ['TMPDIR']), 'warn': sys.warnoptions}))\n"
     )
 
+    @both_ways
     def test_what_a_script_sees(
         self, run: Run, root: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -279,14 +279,15 @@ class TestSurroundings:
         code = "try: open('/dev/tty')\nexcept OSError as e: print('no terminal')\n"
         assert run(code).stdout == "no terminal\n"
 
-    def test_signals_are_as_at_the_start(self, root: Path) -> None:
+    @pytest.mark.parametrize("fork", [True, False], ids=["forked", "spawned"])
+    def test_signals_are_as_at_the_start(self, root: Path, fork: bool) -> None:
         """A tool that runs under nohup ignores SIGHUP; its scripts must not, nor SIGINT."""
         (root / "examples/x.py").write_text(
             "import signal\nprint([signal.getsignal(n) is not signal.SIG_IGN for n in (1, 2, 15)])"
         )
         code = "import signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n" + TOOL
         done = subprocess.run(
-            [sys.executable, "-c", code, root, "1", str(way["fork"])],
+            [sys.executable, "-c", code, root, "1", str(fork)],
             capture_output=True,
             text=True,
             cwd=SOURCE_TREE,

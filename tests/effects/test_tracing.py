@@ -5,21 +5,18 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.results import Outcome, Trace
+from support.runners import Run, both_ways, hangs, job
+
+pytestmark = pytest.mark.site
 
 Traced = Callable[..., Trace]
-
-
-@pytest.fixture(scope="module", params=["forked", "spawned"])
-def server(request: pytest.FixtureRequest) -> Iterator[ScriptServer]:
-    with ScriptServer(fork=request.param == "forked") as server:
-        yield server
 
 
 @pytest.fixture
@@ -34,21 +31,9 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(root: Path, server: ScriptServer) -> Callable[..., ScriptRun]:
-    def run_one(code: str, timeout: float = 120.0) -> ScriptRun:
-        (root / "examples/x.py").write_text(code)
-        (result,) = server.run(
-            root, [ScriptJob("examples/x.py", (), timeout, (), False)], parallel=1
-        )
-        return result
-
-    return run_one
-
-
-@pytest.fixture
-def traced(run: Callable[..., ScriptRun]) -> Traced:
-    def trace_one(code: str, outcome: Outcome = Outcome.OK, timeout: float = 120.0) -> Trace:
-        result = run(code, timeout)
+def traced(run: Run) -> Traced:
+    def trace_one(code: str, outcome: Outcome = Outcome.OK) -> Trace:
+        result = run(code)
         assert result.outcome is outcome, result.stderr
         assert result.trace is not None
         return result.trace
@@ -114,6 +99,7 @@ class TestFiles:
         trace = traced(f"open({str(tmp_path / 'link/data/a.txt')!r})")
         assert (own(trace), trace.outside) == (["data/a.txt"], ())
 
+    @both_ways
     def test_folders(self, traced: Traced) -> None:
         trace = traced(
             "import os, glob, pathlib\nos.listdir('data')\nos.listdir()\nglob.glob('lib/*')\n"
@@ -123,16 +109,15 @@ class TestFiles:
         assert trace.folders == (".", "data", "examples", "lib", "none")
         assert trace.opaque == ""
 
+    @both_ways
     @pytest.mark.parametrize("end", ["os._exit(0)", "os.abort()", "os.kill(os.getpid(), 9)"])
-    def test_it_is_known_however_the_script_ends(
-        self, run: Callable[..., ScriptRun], end: str
-    ) -> None:
+    def test_it_is_known_however_the_script_ends(self, run: Run, end: str) -> None:
         result = run(f"import os\nopen('data/a.txt')\n{end}\n")
         assert result.trace is not None and own(result.trace) == ["data/a.txt"]
 
-    def test_time_limit(self, traced: Traced) -> None:
-        code = "open('data/a.txt')\nwhile True: pass"
-        assert own(traced(code, Outcome.TIMEOUT, 3.0)) == ["data/a.txt"]
+    def test_time_limit(self, run: Run) -> None:
+        result = hangs(run, "open('data/a.txt')\nprint('opened', flush=True)\nwhile True: pass")
+        assert result.trace is not None and own(result.trace) == ["data/a.txt"]
 
     def test_processes_that_it_forks(self, traced: Traced) -> None:
         code = "import os\nfor i in range(4):\n    if os.fork() == 0:\n"
@@ -146,14 +131,16 @@ class TestFiles:
         expected = sorted(f"data/{i}{end}" for i in range(4) for end in ("", "-inner"))
         assert own(traced(code)) == expected
 
-    def test_many(self, traced: Traced) -> None:
-        code = "for i in range(100_000):\n    try: open(f'data/{i}-with-a-long-name')\n"
+    def test_thousands_are_known_and_what_is_too_much_is_said(self, traced: Traced) -> None:
+        code = "for i in range({}):\n    try: open(f'data/{{i}}-with-a-long-name')\n"
         code += "    except OSError: pass\n"
-        trace = traced(code)
-        assert len(own(trace)) == 100_000 or "too many files" in trace.opaque
+        trace = traced(code.format(5_000))
+        assert (len(own(trace)), trace.opaque) == (5_000, "")
+        assert traced(code.format(40_000)).opaque == "it opens too many files to keep track of"
 
 
 class TestImports:
+    @both_ways
     def test_a_sibling(self, traced: Traced, root: Path) -> None:
         (root / "examples/sibling.py").write_text("value = 1")
         (root / "examples/pack").mkdir()
@@ -200,16 +187,14 @@ class TestImports:
         trace = traced("import random\nassert random.value == 'mine'")
         assert "examples/random.py" in trace.files
 
-    def test_forked_and_spawned_agree(self, root: Path) -> None:
+    def test_forked_and_spawned_agree(
+        self, root: Path, forking: ScriptServer, spawning: ScriptServer
+    ) -> None:
         (root / "examples/x.py").write_text(
             "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
             "numpy.random.rand()\n"
         )
-        jobs = [ScriptJob("examples/x.py", (), 60.0, (), False)]
-        traces = []
-        for fork in (True, False):
-            with ScriptServer(fork=fork) as server:
-                traces += [server.run(root, jobs, parallel=1)[0].trace]
+        traces = [server.run(root, [job()], parallel=1)[0].trace for server in (forking, spawning)]
         assert traces[0] == traces[1]
 
 
@@ -241,7 +226,7 @@ class TestOpaque:
             ("import os\nos.listdir('/usr')", "it lists folders outside the project"),
         ],
     )
-    def test_reasons(self, run: Callable[..., ScriptRun], code: str, why: str | None) -> None:
+    def test_reasons(self, run: Run, code: str, why: str | None) -> None:
         result = run(code)
         assert result.trace is not None
         assert result.trace.opaque == (why or "it starts other programs")
@@ -278,8 +263,9 @@ class TestOpaque:
         assert own(trace) == ["data/a.txt"]
 
 
+@pytest.mark.slow
 class TestCost:
-    def test_opening_and_computing_cost_what_they_cost(self, run: Callable[..., ScriptRun]) -> None:
+    def test_opening_and_computing_cost_what_they_cost(self, run: Run) -> None:
         """Seconds of the process, relative: a hundred thousand openings, a million of calls."""
         code = (
             "import time, sys, os\nname = os.environ['TMPDIR'] + '/x'\nopen(name, 'w').close()\n"

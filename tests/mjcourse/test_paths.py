@@ -322,9 +322,10 @@ def main():
     found.append(model_path("box"))
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         found += pool.map(model_path, ["box", "box"])
-    with multiprocessing.get_context(sys.argv[1]).Pool(1) as pool:
-        found += pool.map(model_path, ["box"])
-        found += pool.map(sibling.load_named, ["box"])
+    for method in multiprocessing.get_all_start_methods():
+        with multiprocessing.get_context(method).Pool(1) as pool:
+            found += pool.map(model_path, ["box"])
+            found += pool.map(sibling.load_named, ["box"])
     print(*found)
 
 if __name__ == "__main__":
@@ -343,20 +344,20 @@ def load_named(name):
 """
 
 
-@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+@pytest.mark.site
 @pytest.mark.parametrize("relative", [True, False])
-def test_a_real_script_from_any_folder(
-    course: Path, tmp_path: Path, method: str, relative: bool
-) -> None:
+def test_a_real_script_from_any_folder(course: Path, tmp_path: Path, relative: bool) -> None:
     script = write(course / "examples" / "x.py", SCRIPT)
     write(course / "examples" / "sibling.py", SIBLING)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     cwd = course if relative else elsewhere
-    out = run("examples/x.py" if relative else script, method, cwd=cwd)
-    assert out.split() == [str(course / "models" / "box.xml")] * 8
+    out = run("examples/x.py" if relative else script, cwd=cwd)
+    asked = 6 + 2 * len(multiprocessing.get_all_start_methods())
+    assert out.split() == [str(course / "models" / "box.xml")] * asked
 
 
+@pytest.mark.site
 def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
     want = str(course / "models" / "box.xml")
     write(course / "examples" / "x.py", ASK)
@@ -379,6 +380,7 @@ def test_a_stray_script_run_by_a_course_s_is_in_no_course(
         ask(tmp_path / "stray.py")
 
 
+@pytest.mark.site
 def test_a_shell_inside_a_course_s_environment_works_on_the_current_folder(
     course: Path, tmp_path: Path
 ) -> None:
@@ -390,12 +392,14 @@ def test_a_shell_inside_a_course_s_environment_works_on_the_current_folder(
     assert run("-c", code, cwd=other / "examples") == str(other / "models" / "box.xml")
 
 
+@pytest.mark.site
 def test_a_script_of_a_relative_path_may_change_folder(course: Path) -> None:
     write(course / "examples" / "x.py", "import os\nos.chdir('/')\n" + ASK)
     code = "import mjcourse, runpy; runpy.run_path('examples/x.py', run_name='__main__')"
     assert run("-c", code, cwd=course) == str(course / "models" / "box.xml")
 
 
+@pytest.mark.site
 def test_code_outside_any_course_says_where_it_looked(tmp_path: Path) -> None:
     code = (
         "from mjcourse import model_path\n"

@@ -1,3 +1,5 @@
+import itertools
+
 import mpmath
 import numpy as np
 import pytest
@@ -15,24 +17,21 @@ def orthonormality(mat: np.ndarray) -> float:
     return max(float(abs(p - i) / hp.ULP) for p, i in zip(product, IDENTITY, strict=True))
 
 
-@pytest.mark.parametrize(
-    "angle", [*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0]
-)
-def test_matrix_of_a_quaternion(angle: float) -> None:
-    for axis in hp.AXES:
-        for size in (1.0, -0.3, 1e-160, 1e-310, 1e300):
-            quat = spatial.axis_angle_to_quat(axis, angle) * size
-            got = spatial.quat_to_mat(quat)
-            assert hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat))) <= 4
-            assert orthonormality(got) <= 5
-
-
-def test_matrix_of_many_quaternions() -> None:
-    rng = np.random.default_rng(5)
-    for quat in rng.normal(size=(300, 4)):
-        got = spatial.quat_to_mat(quat)
-        assert hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat))) <= 4
-        assert orthonormality(got) <= 5
+def test_matrix_of_a_quaternion() -> None:
+    quats = [
+        spatial.axis_angle_to_quat(axis, angle) * size
+        for axis in hp.AXES
+        for angle in (*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0)
+        for size in (1.0, -0.3, 1e-160, 1e-310, 1e300)
+    ]
+    quats += list(np.random.default_rng(5).normal(size=(300, 4)))
+    errors, bends = {}, {}
+    for quat in quats:
+        got, case = spatial.quat_to_mat(quat), tuple(quat.tolist())
+        errors[case] = hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat)))
+        bends[case] = orthonormality(got)
+    assert hp.beyond(4, errors) == []
+    assert hp.beyond(5, bends) == []
 
 
 def test_matrices_that_doubles_hold_are_exact() -> None:
@@ -42,14 +41,16 @@ def test_matrices_that_doubles_hold_are_exact() -> None:
     assert spatial.quat_to_mat([1, 0, 0, 1])[2].tolist() == [0, 0, 1]
 
 
-@pytest.mark.parametrize("angle", [*hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 4.0, 1e-8, 1e-12])
-def test_quaternion_of_a_matrix_at_any_angle(angle: float) -> None:
-    for axis in hp.AXES:
+def test_quaternion_of_a_matrix_at_any_angle() -> None:
+    errors = {}
+    angles = (*hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 4.0, 1e-8, 1e-12)
+    for axis, angle in itertools.product(hp.AXES, angles):
         mat = spatial.exp_so3(np.array(axis) / np.linalg.norm(axis) * angle)
         got = spatial.mat_to_quat(mat)
         want = hp.same_up_to_sign(got, exact_quat(mat))
-        assert hp.ulps_of(ONE, got, want) <= 3
-        assert got[0] >= 0
+        errors[axis, angle] = hp.ulps_of(ONE, got, want)
+        assert got[0] >= 0, (axis, angle)
+    assert hp.beyond(3, errors) == []
 
 
 def exact_quat(mat: np.ndarray) -> hp.Vector:
@@ -71,33 +72,37 @@ def exact_quat(mat: np.ndarray) -> hp.Vector:
     return [vectors[k, 3] for k in range(4)]
 
 
-@pytest.mark.parametrize("angle", hp.SMALL_ANGLES)
-@pytest.mark.parametrize("axis", hp.AXES)
-def test_small_rotations_go_through_matrices_whole(axis: tuple[float, ...], angle: float) -> None:
-    rotvec = np.array(axis) / max(map(abs, axis)) * angle
-    got = spatial.log_so3(spatial.exp_so3(rotvec))
-    # A matrix entry of a rotation by 1e-8 is a sum of the small term and its square.
-    large = [k for k in range(3) if abs(rotvec[k]) >= 1e-3 * angle]
-    assert hp.own_ulps(got[large], hp.exact(rotvec[large])) <= 8
+def test_small_rotations_go_through_matrices_whole() -> None:
+    errors = {}
+    for axis, angle in itertools.product(hp.AXES, hp.SMALL_ANGLES):
+        rotvec = np.array(axis) / max(map(abs, axis)) * angle
+        got = spatial.log_so3(spatial.exp_so3(rotvec))
+        # A matrix entry of a rotation by 1e-8 is a sum of the small term and its square.
+        large = [k for k in range(3) if abs(rotvec[k]) >= 1e-3 * angle]
+        errors[axis, angle] = hp.own_ulps(got[large], hp.exact(rotvec[large]))
+    assert hp.beyond(8, errors) == []
 
 
-@pytest.mark.parametrize("angle", [*hp.PLAIN_ANGLES, *hp.NEAR_PI[:5], 1e-5])
-@pytest.mark.parametrize("axis", hp.AXES)
-def test_log_undoes_exp_up_to_pi(axis: tuple[float, ...], angle: float) -> None:
-    rotvec = np.array(axis) / np.linalg.norm(axis) * angle
-    got = spatial.log_so3(spatial.exp_so3(rotvec))
-    want = hp.exact(rotvec)
-    if angle > hp.PI - 1e-14 and got @ rotvec < 0:  # The matrix may be rounded beyond π.
-        want = [-entry for entry in want]
-    assert hp.ulps_of(ONE, got, want) <= 8
+def test_log_undoes_exp_up_to_pi() -> None:
+    errors = {}
+    angles = (*hp.PLAIN_ANGLES, *hp.NEAR_PI[:5], 1e-5)
+    for axis, angle in itertools.product(hp.AXES, angles):
+        rotvec = np.array(axis) / np.linalg.norm(axis) * angle
+        got = spatial.log_so3(spatial.exp_so3(rotvec))
+        want = hp.exact(rotvec)
+        if angle > hp.PI - 1e-14 and got @ rotvec < 0:  # The matrix may be rounded beyond π.
+            want = [-entry for entry in want]
+        errors[axis, angle] = hp.ulps_of(ONE, got, want)
+    assert hp.beyond(8, errors) == []
 
 
-@pytest.mark.parametrize("angle", [*hp.NEAR_PI, *hp.BEYOND_PI])
-def test_exp_beyond_pi(angle: float) -> None:
-    for axis in hp.AXES:
+def test_exp_beyond_pi() -> None:
+    errors = {}
+    for axis, angle in itertools.product(hp.AXES, (*hp.NEAR_PI, *hp.BEYOND_PI)):
         rotvec = np.array(axis) * angle
-        got = spatial.exp_so3(rotvec)
-        assert hp.ulps_of(ONE, got, hp.matrix(hp.exp(hp.exact(rotvec)))) <= 5
+        want = hp.matrix(hp.exp(hp.exact(rotvec)))
+        errors[axis, angle] = hp.ulps_of(ONE, spatial.exp_so3(rotvec), want)
+    assert hp.beyond(5, errors) == []
 
 
 def test_half_turns_have_one_quaternion_and_one_logarithm() -> None:

@@ -85,17 +85,17 @@ def check(html: str) -> Flow:
 
 
 @pytest.mark.parametrize("html", HOSTILE)
-def test_what_authors_write(html: str) -> None:
+def test_hostile_html_becomes_a_valid_item(html: str) -> None:
     check(html)
 
 
 @given(st.lists(PIECES, max_size=14).map("".join))
-def test_any_soup_of_tags(html: str) -> None:
+def test_random_tags_become_a_valid_item(html: str) -> None:
     check(html)
 
 
 @given(st.text())
-def test_any_text(html: str) -> None:
+def test_random_text_becomes_a_valid_item(html: str) -> None:
     check(html)
 
 
@@ -147,7 +147,7 @@ def bare(made: object) -> bytes:
          "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow></m:math></p>"),
     ],
 )  # fmt: skip
-def test_what_becomes_of_html(html: str, made: str) -> None:
+def test_html_becomes_the_nearest_qti_allows(html: str, made: str) -> None:
     assert blocks(html) == made
 
 
@@ -168,7 +168,7 @@ def test_what_becomes_of_html(html: str, made: str) -> None:
         ("<script>alert(1)</script><style>p{}</style><!-- no -->", []),
     ],
 )  # fmt: skip
-def test_what_is_lost_is_said(html: str, lost: list[str]) -> None:
+def test_html_that_qti_cannot_hold_is_told(html: str, lost: list[str]) -> None:
     assert check(html).lost == lost
 
 

@@ -10,12 +10,21 @@ import pytest
 from lxml import etree
 
 from coursebuild.render.packages.xml import identifier
-from support.archives import entries, formula_mistakes, mistakes, packaging_schema, referred
+from support.archives import (
+    Package,
+    entries,
+    formula_mistakes,
+    mistakes,
+    packaging_schema,
+    referred,
+)
 from support.hostile_html import HOSTILE, REFUSED
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
 from support.question_zoo import ANY, SCRIPT, SVG, quiz
 from support.scratch_course import GOOD, Done, Folder
+
+pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 ZIP = "quizzes-qti.zip"
@@ -58,10 +67,10 @@ def items(files: dict[str, bytes]) -> list[etree._Element]:
     return [etree.fromstring(files[unquote(name).removeprefix("../")]) for name in names]
 
 
-def item(make: Make, question: dict[str, object], **given: str) -> etree._Element:
-    folder = make(GOOD + SCRIPT + quiz("a", question), **given)
-    [found] = items(package(folder))
-    return found
+@pytest.fixture(scope="session")
+def zoo_items(qti: Package) -> dict[str, etree._Element]:
+    """The items by the names of their questions."""
+    return dict(zip(ANY, items(qti.files), strict=True))
 
 
 def shape(node: etree._Element, path: str) -> list[str]:
@@ -70,23 +79,20 @@ def shape(node: etree._Element, path: str) -> list[str]:
     return [part if isinstance(part, str) else "".join(part.itertext()) for part in found]
 
 
-def test_every_kind_of_question(make: Make) -> None:
-    folder = make(GOOD + SCRIPT + quiz("1.1-check", *ANY.values()))
-    done = export(folder)
-    assert done.status == 0, done.out + done.err
-    assert done.out.count("warning[package-reduced]") == 1, "the simulation"
-    assert "wrote 14 files to quizzes-qti.zip, 0.0 MB" in done.out
-    files = entries(folder.root / ZIP)
-    check(files)
-    found = dict(zip(ANY, items(files), strict=True))
-    kinds = {name: shape(one, "//q:responseDeclaration/@baseType") for name, one in found.items()}
-    assert kinds == {
+def test_package_of_every_kind_of_question_is_whole(
+    qti: Package, zoo_items: dict[str, etree._Element]
+) -> None:
+    assert qti.done.out.count("warning[package-reduced]") == 1, "the simulation"
+    assert "wrote 14 files to quizzes-qti.zip, 0.0 MB" in qti.done.out
+    check(qti.files)
+    bases = "//q:responseDeclaration/@baseType"
+    assert {name: shape(one, bases) for name, one in zoo_items.items()} == {
         "mcq": ["identifier"], "several": ["identifier"], "predict": ["identifier"],
         "numeric": ["float"], "zero": ["float"], "large": ["float"], "output": ["string"],
         "marks": ["string"], "open": ["string"], "order": ["identifier"],
     }  # fmt: skip
-    assert files["files/lessons/sketch.svg"] == SVG.encode()
-    titles = [one.get("title") for one in found.values()]
+    assert qti.files["files/lessons/sketch.svg"] == SVG.encode()
+    titles = [one.get("title") for one in zoo_items.values()]
     assert titles == [f"Check: Question {n}" for n in range(1, 11)]
 
 
@@ -94,8 +100,10 @@ def right(one: etree._Element) -> list[str]:
     return shape(one, "//q:correctResponse/q:value")
 
 
-def test_a_choice(make: Make) -> None:
-    one = item(make, ANY["mcq"])
+def test_item_of_a_choice_holds_all_that_its_question_says(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["mcq"]
     assert right(one) == ["B"]
     assert shape(one, "//q:choiceInteraction/@maxChoices") == ["1"]
     assert shape(one, "//q:simpleChoice") == ["1 < 2", "two", "three"]
@@ -107,8 +115,10 @@ def test_a_choice(make: Make) -> None:
     assert shape(one, "//q:itemBody/q:ul/q:li") == ["☑ done", "☐ not"]
 
 
-def test_choose_all(make: Make) -> None:
-    one = item(make, ANY["several"])
+def test_item_with_several_right_options_asks_for_all(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["several"]
     assert right(one) == ["A", "C"]
     assert shape(one, "//q:responseDeclaration/@cardinality") == ["multiple"]
     assert shape(one, "//q:choiceInteraction/@maxChoices") == ["0"]
@@ -119,24 +129,26 @@ def test_choose_all(make: Make) -> None:
     ("name", "value", "within"),
     [("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)],
 )
-def test_numbers(make: Make, name: str, value: float, within: float) -> None:
-    one = item(make, ANY[name])
+def test_item_of_a_number_has_its_tolerance(
+    zoo_items: dict[str, etree._Element], name: str, value: float, within: float
+) -> None:
+    one = zoo_items[name]
     assert [float(text) for text in right(one)] == [value]
     [tolerance] = shape(one, "//q:equal/@tolerance")
     assert [float(text) for text in tolerance.split()] == pytest.approx([within, within])
 
 
-def test_units_are_text(make: Make) -> None:
-    one = item(make, ANY["numeric"])
+def test_unit_of_a_number_is_text(zoo_items: dict[str, etree._Element]) -> None:
+    one = zoo_items["numeric"]
     assert shape(one, "//q:p[q:textEntryInteraction]") == [" kg m2"]
     assert shape(one, "//q:sup") == ["2"]
 
 
-def test_what_a_script_prints(make: Make) -> None:
-    folder = make(GOOD + SCRIPT + quiz("a", ANY["output"], ANY["marks"]))
-    files = package(folder)
-    assert [right(one) for one in items(files)] == [["drift  +6.6 %"], ["<b>&amp;"]]
-    one = items(files)[0]
+def test_item_of_an_output_asks_for_the_printed_line(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["output"]
+    assert (right(one), right(zoo_items["marks"])) == (["drift  +6.6 %"], ["<b>&amp;"])
     assert shape(one, "//q:stringMatch/@caseSensitive") == ["true"]
     assert "What does examples/fall.py print in line 1 of its output?" in shape(one, "//q:p")
 
@@ -150,8 +162,10 @@ def test_a_question_whose_script_was_not_run_is_left_out_and_said(make: Make) ->
     assert len(items(entries(folder.root / ZIP))) == 1
 
 
-def test_an_open_question_is_for_people_to_score(make: Make) -> None:
-    one = item(make, ANY["open"])
+def test_open_question_is_for_people_to_score(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["open"]
     assert right(one) == []
     assert shape(one, "//q:rubricBlock/@view") == ["scorer"]
     assert shape(one, "//q:rubricBlock/q:p[1]") == ["A good answer"]
@@ -160,8 +174,10 @@ def test_an_open_question_is_for_people_to_score(make: Make) -> None:
     assert said.startswith("A good answer") and said.endswith("Because.")
 
 
-def test_an_order_is_not_given_away(make: Make) -> None:
-    one = item(make, ANY["order"])
+def test_item_of_an_order_does_not_give_it_away(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["order"]
     texts = dict(zip(shape(one, "//q:simpleChoice/@identifier"), shape(one, "//q:simpleChoice"),
                      strict=True))  # fmt: skip
     assert [texts[name] for name in right(one)] == ["first", "second", "3", "fourth"]
@@ -186,7 +202,7 @@ def test_a_simulation_is_linked_where_the_course_has_an_address(make: Make) -> N
 # --- names
 
 
-def test_names_hang_on_the_question_and_not_on_its_place(make: Make) -> None:
+def test_names_depend_on_the_question_and_not_on_its_place(make: Make) -> None:
     folder = make(GOOD + quiz("a", ANY["zero"], ANY["several"]))
     before = set(package(folder))
     folder.write(folder.lesson(), GOOD + quiz("a", ANY["large"], ANY["several"], ANY["zero"]))
@@ -197,26 +213,23 @@ def test_names_hang_on_the_question_and_not_on_its_place(make: Make) -> None:
     assert "items/q.a.why.xml" in package(folder)
 
 
-@pytest.mark.parametrize("id", ["4.2-check", "x-" * 40, "con", "a_b", "A..b", "7"])
-def test_names_are_short_and_of_xml(make: Make, id: str) -> None:
-    folder = make(GOOD + quiz(id, ANY["zero"], {**ANY["zero"], "q": "Again?"}))
-    files = package(folder)
+def test_names_are_short_and_of_xml_and_stay_apart(make: Make) -> None:
+    ids = ["4.2-check", "x-" * 40, "con", "A..b", "7"]
+    ids += ["a-b", "a_b", "a.b", "ab", "x" * 60 + "1", "x" * 60 + "2"]
+    questions = [ANY["zero"], {**ANY["zero"], "q": "Again?"}]
+    files = package(make(GOOD + "".join(quiz(id, *questions) for id in ids)))
     names = [one.get("identifier") for one in items(files)]
-    assert len(set(names)) == 2
-    for name in (*names, *(path.rpartition("/")[2][:-4] for path in files if "/" in path)):
-        assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}", name)
-
-
-def test_like_names_stay_apart(make: Make) -> None:
-    ids = ["a-b", "a_b", "a.b", "ab", "x" * 60 + "1", "x" * 60 + "2"]
-    folder = make(GOOD + "".join(quiz(id, ANY["zero"]) for id in ids))
-    files = package(folder)
-    assert len([path for path in files if path.startswith("tests/")]) == 6
-    assert len([path for path in files if path.startswith("items/")]) == 6
+    assert len(set(names)) == 2 * len(ids)
+    paths = [path for path in files if "/" in path]
+    assert len([path for path in paths if path.startswith("tests/")]) == len(ids)
+    assert len([path for path in paths if path.startswith("items/")]) == 2 * len(ids)
+    wanted = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}")
+    every = [*names, *(path.rpartition("/")[2][:-4] for path in paths)]
+    assert [name for name in every if not wanted.fullmatch(name)] == []
 
 
 @pytest.mark.parametrize("most", [0, 32])
-def test_names_out_of_any_text(most: int) -> None:
+def test_identifiers_of_any_texts_are_valid_and_differ(most: int) -> None:
     texts = [
         "",
         "ä",
@@ -240,7 +253,7 @@ def test_names_out_of_any_text(most: int) -> None:
 # --- hostile texts
 
 
-def test_whatever_stands_in_a_text_the_package_is_valid(make: Make) -> None:
+def test_package_of_hostile_texts_is_valid(make: Make) -> None:
     """What a page cannot hold either is a mistake of the author's, and not tried here."""
     questions = [
         {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
@@ -252,7 +265,7 @@ def test_whatever_stands_in_a_text_the_package_is_valid(make: Make) -> None:
     assert len(items(files)) == len(questions) > 15
 
 
-def test_nothing_is_left_out_in_silence(make: Make) -> None:
+def test_everything_left_out_is_warned_of(make: Make) -> None:
     texts = {
         "<video src='a.mp4'>words</video>": "`<video>` has no place in QTI and is left out",
         "<ol start='5'><li>five</li></ol>": "a numbered list counts from 1",
@@ -282,7 +295,7 @@ def test_mathml_is_of_version_2(make: Make) -> None:
         r" \raisebox{2pt}{x} \phantom{x} \binom{n}{k} \xrightarrow{abc} x'' \not= \lim_{x\to0}"
     )
     question = {**ANY["zero"], "q": f"Inline ${formulas}$ and\n\n$${formulas}$$"}
-    one = item(make, question)
+    [one] = items(package(make(GOOD + quiz("a", question))))
     found = one.findall(f".//{{{MATHML}}}math")
     assert len(found) == 2, "a formula that a page cuts in pieces is whole"
     assert not [key for math in found for node in math.iter() for key in node.attrib
@@ -296,14 +309,12 @@ def test_mathml_is_of_version_2(make: Make) -> None:
 # --- the command
 
 
-def test_the_same_course_gives_the_same_bytes(make: Make) -> None:
-    folder = make(GOOD + SCRIPT + quiz("a", *ANY.values()), GOOD.replace("hello.py", "b.py"))
-    package(folder)
-    once = folder.read(ZIP)
-    folder.main("export", "qti")
-    assert folder.read(ZIP) == once, "from what is kept"
-    folder.main("export", "qti", "--no-cache", "--jobs", "1", "--out", "sub/other.zip")
-    assert folder.read("sub/other.zip") == once
+def test_same_course_gives_the_same_bytes(qti: Package) -> None:
+    once = qti.folder.read(ZIP)
+    export(qti.folder)
+    assert qti.folder.read(ZIP) == once, "from what is kept"
+    export(qti.folder, "--no-cache", "--jobs", "1", "--out", "sub/other.zip")
+    assert qti.folder.read("sub/other.zip") == once
 
 
 def test_a_course_without_quizzes_has_no_package(make: Make) -> None:
@@ -326,21 +337,18 @@ def test_nothing_is_written_where_something_is_wrong(make: Make) -> None:
     assert folder.read(ZIP) == once
 
 
-@pytest.mark.parametrize(
-    ("out", "said"),
-    [
+def test_package_is_written_nowhere_where_it_would_be_in_the_way(make: Make) -> None:
+    folder = make(GOOD + quiz("a", ANY["zero"]))
+    folder.write("notes.txt", "mine")
+    assert folder.main("build").status == 0
+    for out, said in (
         ("content/q.zip", "lies in content/ of the project, where no archive goes"),
         ("notes.txt", "is there, and is no such archive"),
         (".", "is a folder"),
         ("public/q.zip", "lies in a published site, which the next build replaces"),
-    ],
-)
-def test_where_no_package_goes(make: Make, out: str, said: str) -> None:
-    folder = make(GOOD + quiz("a", ANY["zero"]))
-    folder.write("notes.txt", "mine")
-    assert folder.main("build").status == 0
-    done = export(folder, "--out", out)
-    assert done.status == 2 and said in done.err
+    ):
+        done = export(folder, "--out", out)
+        assert done.status == 2 and said in done.err, out
     assert folder.text("notes.txt") == "mine"
 
 

@@ -25,7 +25,7 @@ GOOD = f"""\
 </assessmentItem>"""
 
 
-def test_a_good_item_has_no_mistakes() -> None:
+def test_rules_accept_a_good_item() -> None:
     assert mistakes(GOOD.encode()) == []
 
 
@@ -54,12 +54,12 @@ def test_a_good_item_has_no_mistakes() -> None:
         ("<p>Which", "<p><m:math><m:math/></m:math>Which"),
     ],
 )
-def test_a_mistake_is_found(old: str, new: str) -> None:
+def test_rules_find_a_mistake_in_an_item(old: str, new: str) -> None:
     assert GOOD.count(old) == 1
     assert mistakes(GOOD.replace(old, new).encode()) != []
 
 
-def test_the_published_schemas_find_mistakes_too() -> None:
+def test_published_schemas_find_mistakes() -> None:
     manifest = (
         '<manifest xmlns="{space}" identifier="m"><organizations/><resources>'
         '<resource identifier="r" type="t"{more}><file/></resource></resources></manifest>'

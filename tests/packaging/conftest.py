@@ -1,5 +1,6 @@
 """Fixtures for the packaging tests: copies of the project to build in, and a way to run things."""
 
+import fcntl
 import os
 import shutil
 import subprocess
@@ -11,9 +12,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = shutil.ignore_patterns("node_modules", "dist", ".bundle*", "__pycache__")
+LEFT_OUT = ("node_modules", ".bundle*", "__pycache__")
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
+Build = Callable[[Path, str], Path]
 
 
 @pytest.fixture(scope="session")
@@ -58,23 +60,27 @@ def run() -> Run:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=600,
         )
 
     return run_command
 
 
 @pytest.fixture(scope="session")
-def copy_project(pyproject: dict, packages: Path) -> Callable[[Path], Path]:
-    """Copies what the source distribution is made of, with the installed npm packages linked in."""
+def copy_project(pyproject: dict, packages: Path) -> Callable[..., Path]:
+    """Copies what the source distribution is made of, with the installed npm packages linked in.
+
+    The browser's half comes along as it was bundled, unless it is to be bundled anew.
+    """
     names = pyproject["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
 
-    def copy(target: Path) -> Path:
+    def copy(target: Path, *, bundled: bool) -> Path:
+        ignored = shutil.ignore_patterns(*LEFT_OUT, *(() if bundled else ("dist",)))
         target.mkdir(parents=True)
         for name in [*names, "/pyproject.toml", "/.gitignore"]:
             source = ROOT / name.removeprefix("/")
             if source.is_dir():
-                shutil.copytree(source, target / source.name, ignore=LEFT_OUT)
+                shutil.copytree(source, target / source.name, ignore=ignored)
             elif source.is_file():
                 shutil.copy2(source, target / source.name)
         (target / "site" / "node_modules").symlink_to(packages)
@@ -84,7 +90,7 @@ def copy_project(pyproject: dict, packages: Path) -> Callable[[Path], Path]:
 
 
 @pytest.fixture(scope="session")
-def build(run: Run) -> Callable[[Path, str], Path]:
+def build(run: Run) -> Build:
     """Builds a "wheel" or an "sdist" of a project folder as pip would; returns its path."""
 
     def build_target(project: Path, target: str) -> Path:
@@ -95,3 +101,36 @@ def build(run: Run) -> Callable[[Path, str], Path]:
         return made
 
     return build_target
+
+
+@pytest.fixture(scope="session")
+def built(shared: Path, copy_project: Callable[..., Path], build: Build) -> Path:
+    """A copy of the project with its wheel and its source distribution in `built`.
+
+    One for all processes of a run: the first that comes makes it, the others wait.
+    """
+    project = shared / "packaging" / "project"
+    project.parent.mkdir(exist_ok=True)
+    with (project.parent / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (project.parent / "done").exists():
+            shutil.rmtree(project, ignore_errors=True)
+            copy_project(project, bundled=True)
+            build(project, "wheel")
+            build(project, "sdist")
+            (project.parent / "done").touch()
+    return project
+
+
+@pytest.fixture(scope="session")
+def wheel(built: Path) -> Path:
+    (made,) = (built / "built" / "wheel").iterdir()
+    return made
+
+
+@pytest.fixture(scope="session")
+def sdist(built: Path) -> Path:
+    """Made where site/dist and node_modules are there to be left out."""
+    assert (built / "site" / "dist").is_dir()
+    (made,) = (built / "built" / "sdist").iterdir()
+    return made

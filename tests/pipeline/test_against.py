@@ -17,6 +17,8 @@ import pytest
 from coursebuild.effects.versions import engine_version
 from support.scratch_course import Done, Folder, block, ended, wait_until_alone
 
+pytestmark = pytest.mark.site
+
 HERE = engine_version()
 OTHER = "9.1.0"
 REAL_NUMBER = int("{:d}{:03d}{:03d}".format(*map(int, HERE.split("."))))
@@ -88,7 +90,9 @@ NUMBER = block(
 FAILING = block("failing.py", "import mujoco\nmujoco.mju_isBad(1.0)\nprint(1)", "1")
 
 
-def test_what_changes_is_told_number_by_number(make: Callable[..., Folder], wheels: Path) -> None:
+def test_changed_outputs_are_told_number_by_number(
+    make: Callable[..., Folder], wheels: Path
+) -> None:
     course = make(f"## A\n\n{PLAIN}{NUMBER}{FAILING}")
     assert course.main("check", "-q").out == ""
     quiet, done = against(course, "-q"), against(course)
@@ -136,7 +140,7 @@ def python() -> str:
     return sys.version.split()[0]
 
 
-def test_as_json_with_lessons_chosen(make: Callable[..., Folder], wheels: Path) -> None:
+def test_json_report_is_of_the_chosen_lessons(make: Callable[..., Folder], wheels: Path) -> None:
     course = make(f"## A\n\n{NUMBER}", f"## B\n\n{PLAIN}")
     done = against(course, "1.2", "--format", "json", "-q")
     told = json.loads(done.out)
@@ -176,7 +180,7 @@ def test_another_cause_than_mujoco_is_not_blamed_on_it(
     )
 
 
-def test_scripts_of_which_nothing_can_be_said(make: Callable[..., Folder], wheels: Path) -> None:
+def test_scripts_that_cannot_be_compared_say_why(make: Callable[..., Folder], wheels: Path) -> None:
     random = "import mujoco, os\nprint(mujoco.__version__, os.urandom(8).hex())"
     fixed = (
         f"import mujoco, os\nprint('{HERE}' if mujoco.__version__ == '{HERE}' else os.urandom(8))"
@@ -206,7 +210,7 @@ def test_scripts_of_which_nothing_can_be_said(make: Callable[..., Folder], wheel
     }
 
 
-def test_models_that_no_longer_compile(make: Callable[..., Folder], wheels: Path) -> None:
+def test_model_that_no_longer_compiles_is_told(make: Callable[..., Folder], wheels: Path) -> None:
     course = make(f"## A\n\n{PLAIN}")
     course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     course.write("models/broken.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
@@ -216,7 +220,7 @@ def test_models_that_no_longer_compile(make: Callable[..., Folder], wheels: Path
     assert done.out.endswith("; 0 of 1 MJCF text compiles there\n")
 
 
-def test_what_cannot_be_asked(make: Callable[..., Folder]) -> None:
+def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> None:
     course = make(f"## A\n\n{PLAIN}")
     for more, told in (
         (("--format", "sarif"), "--against cannot be combined with --format sarif"),
@@ -236,7 +240,7 @@ def test_what_cannot_be_asked(make: Callable[..., Folder]) -> None:
     assert done.err.startswith("coursebuild: the course cannot be read: content/course.toml:1: ")
 
 
-def test_versions_that_are_not_there_leave_nothing(
+def test_version_that_cannot_be_installed_leaves_nothing(
     make: Callable[..., Folder], wheels: Path
 ) -> None:
     course = make(f"## A\n\n{PLAIN}")
@@ -265,7 +269,7 @@ time.sleep(60)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_an_interrupted_installation_leaves_nothing(
+def test_interrupted_installation_leaves_nothing(
     make: Callable[..., Folder], wheels: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
     mark = tmp_path / "importing"
@@ -288,7 +292,7 @@ def test_an_interrupted_installation_leaves_nothing(
     assert [name.split("-")[1] for name in environments(course)] == [OTHER]
 
 
-def test_two_runs_at_once_install_once(make: Callable[..., Folder], wheels: Path) -> None:
+def test_two_commands_at_once_install_once(make: Callable[..., Folder], wheels: Path) -> None:
     course = make(f"## A\n\n{NUMBER}")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with (

@@ -15,6 +15,8 @@ from support.live_course import Live
 from support.live_course import live as live
 from support.scratch_course import GOOD, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 Start = Callable[[Folder], Live]
 

@@ -29,7 +29,7 @@ def course(tmp_path: Path) -> Path:
 # --- which
 
 
-def test_every_model_that_is_no_part_of_another(course: Path) -> None:
+def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> None:
     write(course / "models" / "arms" / "left arm.xml", BOX)
     write(course / "models" / "part.xml", "<mujocoinclude/>")
     write(course / "models" / "legs.xml", BOX)
@@ -45,14 +45,14 @@ def test_every_model_that_is_no_part_of_another(course: Path) -> None:
     assert [s.model for s in bench(options(course), ("legs",), measuring=fake).scenes] == ["legs"]
 
 
-def test_a_name_that_is_none(course: Path) -> None:
+def test_unknown_model_name_is_wrong_usage(course: Path) -> None:
     with pytest.raises(UsageError, match="no model is called `bix`; did you mean `box`\\?"):
         bench(options(course), ("bix",), measuring=Fake())
     with pytest.raises(UsageError, match="no model is called `\\*`; known: `box`"):
         bench(options(course), ("*",), measuring=Fake())
 
 
-def test_what_does_not_compile_is_told_and_the_others_are_measured(course: Path) -> None:
+def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: Path) -> None:
     write(course / "models" / "bad.xml", BOX.replace('size="0.1"', 'size="-1"'))
     write(course / "models" / "worse.xml", "<mujoco>\n  <worldbody>\n")
     found = bench(options(course), measuring=Fake())
@@ -68,7 +68,7 @@ def test_what_does_not_compile_is_told_and_the_others_are_measured(course: Path)
     assert second.span.path == "models/worse.xml"
 
 
-def test_what_is_declared_wrongly_is_told(course: Path) -> None:
+def test_mistakes_in_scenario_files_are_told(course: Path) -> None:
     write(course / "models" / "box.toml", TOML + 'keyframe = "up"\n')
     write(course / "models" / "arm.xml", BOX)
     write(course / "models" / "arm.toml", "[[scenarjo]]\n")
@@ -95,7 +95,7 @@ def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
 # --- what is kept
 
 
-def test_measured_again_only_where_something_changed(course: Path) -> None:
+def test_model_is_measured_again_only_where_something_changed(course: Path) -> None:
     write(course / "models" / "box.toml", TOML)
     fake = Fake()
 
@@ -119,7 +119,7 @@ def test_measured_again_only_where_something_changed(course: Path) -> None:
     assert fake.asked == [("box", 0, True, True)]
 
 
-def test_files_that_a_model_pulls_in_count(course: Path) -> None:
+def test_included_file_changes_the_digest_of_a_model(course: Path) -> None:
     write(course / "models" / "in" / "legs.xml", BOX)
     write(course / "models" / "box.xml", '<mujoco><include file="in/legs.xml"/></mujoco>')
     before = find_scenes(course).scenes[0].digest
@@ -128,7 +128,7 @@ def test_files_that_a_model_pulls_in_count(course: Path) -> None:
     assert find_scenes(course).scenes[0].digest != before
 
 
-def test_what_was_done_before_a_run_was_stopped_is_kept(course: Path) -> None:
+def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> None:
     fake = Fake(swing(), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         bench(options(course), measuring=fake)
@@ -139,7 +139,7 @@ def test_what_was_done_before_a_run_was_stopped_is_kept(course: Path) -> None:
     assert [one.name for one in found.scenes[0].scenarios] == ["swing", "other"]
 
 
-def test_what_is_damaged_is_measured_again(course: Path) -> None:
+def test_damaged_measurement_is_made_again(course: Path) -> None:
     fake = Fake()
     bench(options(course), measuring=fake)
     for kind in ("bench", "bench-scenarios"):
@@ -183,7 +183,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_terminal_is_told_what_is_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_terminal_shows_what_is_measured_just_now(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     terminal = Terminal()
     progress = Progress(terminal)

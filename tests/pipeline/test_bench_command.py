@@ -18,6 +18,8 @@ from coursebuild.measured.records import decode_bench, encode_bench
 from support.measured_course import BOX, PATH, TOML, bench_course, write
 from support.scratch_course import ROOT
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
@@ -29,7 +31,7 @@ def run(course: Path, *arguments: str) -> int:
 
 
 @pytest.mark.slow
-def test_the_command_from_end_to_end(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_prints_table_json_and_plot(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(course / "models" / "box.toml", TOML)
     plot = course / "plot.svg"
     assert run(course, "--quick", "--plot", str(plot)) == 0
@@ -50,7 +52,7 @@ def test_the_command_from_end_to_end(course: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
-def test_recorded_by_one_command_and_checked_by_another(
+def test_bench_check_compares_with_what_was_recorded(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(course / "models" / "box.toml", TOML)
@@ -71,7 +73,9 @@ def test_recorded_by_one_command_and_checked_by_another(
     assert "error of velocity " in out and "0.5" in out and "± 5 %" in out
 
 
-def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_with_wrong_arguments_gives_2(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(course, "bix") == 2
     assert "no model is called `bix`; did you mean `box`?" in capsys.readouterr().err
     assert run(course, "--check", "--quick") == 2
@@ -85,13 +89,15 @@ def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert caught.value.code == 2
 
 
-def test_a_course_without_models(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_without_models_says_so(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (course / "models" / "box.xml").unlink()
     assert run(course, "-q") == 0
     assert capsys.readouterr().out == "there is no model to measure\n"
 
 
-def test_a_model_that_does_not_compile(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_of_broken_model_points_at_its_element(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     write(course / "models" / "box.xml", BOX.replace("<joint", "<joynt"))
     assert run(course, "-q") == 1
     out = capsys.readouterr().out
@@ -100,7 +106,7 @@ def test_a_model_that_does_not_compile(course: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_it_and_leaves_no_litter(course: Path) -> None:
+def test_ctrl_c_ends_bench_and_leaves_no_litter(course: Path) -> None:
     write(course / "models" / "box.toml", TOML.replace("0.2", "2000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(

@@ -12,6 +12,8 @@ import pytest
 
 from support.scratch_course import FIRST, GOOD, SECOND, Folder, block, without_seconds
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 
@@ -122,14 +124,14 @@ def test_asking_for_help_gives_0(tmp_path: Path, arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize("name", ["quiz", "lab", "course"])
-def test_schemas(tmp_path: Path, name: str) -> None:
+def test_schema_prints_json_schema(tmp_path: Path, name: str) -> None:
     done = Folder(tmp_path).main("schema", name)
     assert done.status == 0
     schema = json.loads(done.out)
     assert "$defs" in schema or "properties" in schema
 
 
-def test_as_a_module_of_python(make: Make) -> None:
+def test_tool_runs_as_a_module_of_python(make: Make) -> None:
     done = make(GOOD).run("check")
     assert (done.status, without_seconds(done.out)) == (
         0,
@@ -145,20 +147,20 @@ def test_a_course_is_found_from_below(make: Make) -> None:
     assert folder.main("check", cwd=folder.root / "content/lessons").status == 0
 
 
-def test_c_takes_any_folder_from_anywhere(make: Make, tmp_path: Path) -> None:
+def test_option_c_takes_any_folder_from_anywhere(make: Make, tmp_path: Path) -> None:
     folder = make(GOOD, name="with spaces, quotes ' \" and ünïcödé 物理 🤖")
     elsewhere = tmp_path / "else where"
     elsewhere.mkdir()
     relative = os.path.relpath(folder.root, elsewhere)
     for where in (str(folder.root), relative, f"{relative}/", f"{folder.root}/content/.."):
-        done = folder.run("-C", where, "build", cwd=elsewhere)
+        done = folder.main("-C", where, "build", cwd=elsewhere)
         assert done.status == 0, done.err
         assert (folder.root / "public/lessons/1.1-one.html").is_file()
     assert not any(elsewhere.iterdir())
     link = tmp_path / "link"
     link.symlink_to(folder.root)
     assert folder.main("-C", str(link), "check", cwd=elsewhere).status == 0
-    done = folder.run("-C", str(folder.root), "build", "--out", "../a site/öut", cwd=elsewhere)
+    done = folder.main("-C", str(folder.root), "build", "--out", "../a site/öut", cwd=elsewhere)
     assert done.status == 0
     assert (tmp_path / "a site/öut/index.html").is_file()
 
@@ -166,13 +168,13 @@ def test_c_takes_any_folder_from_anywhere(make: Make, tmp_path: Path) -> None:
 def test_a_folder_whose_name_is_not_utf8(make: Make) -> None:
     odd = make(GOOD).root.with_name("caf\udce9")
     make(GOOD, name="other").root.rename(odd)
-    done = Folder(odd).run("build")
+    done = Folder(odd).main("build")
     assert (done.status, done.out) == (2, "")
     assert "the path of the course is not UTF-8: " in done.err
     assert "caf\\xe9" in done.err
 
 
-def test_without_c_the_nearest_course_counts(make: Make) -> None:
+def test_nearest_course_above_counts_without_option_c(make: Make) -> None:
     outer = make(GOOD)
     inner = Folder(outer.root / "inner")
     inner.write("content/course.toml", outer.text("content/course.toml"))
@@ -198,7 +200,7 @@ def test_without_c_the_nearest_course_counts(make: Make) -> None:
         "ABSOLUTE",
     ],
 )
-def test_a_lesson_by_id_slug_and_file(make: Make, name: str) -> None:
+def test_lesson_is_named_by_id_slug_or_file(make: Make, name: str) -> None:
     folder = make(FIRST, SECOND)
     name = str(folder.root / folder.lesson()) if name == "ABSOLUTE" else name
     done = folder.main("check", name)
@@ -208,7 +210,7 @@ def test_a_lesson_by_id_slug_and_file(make: Make, name: str) -> None:
     )
 
 
-def test_a_file_from_where_one_stands(make: Make, tmp_path: Path) -> None:
+def test_lesson_file_is_named_from_the_working_directory(make: Make, tmp_path: Path) -> None:
     folder = make(FIRST, SECOND)
     inside = folder.root / "content/lessons"
     assert "examples/two.py" in folder.main("check", "1.2-two.md", cwd=inside).out
@@ -220,7 +222,7 @@ def test_a_file_from_where_one_stands(make: Make, tmp_path: Path) -> None:
     assert (done.status, done.out) == (2, "")
 
 
-def test_a_page_by_id_and_file(make: Make) -> None:
+def test_page_is_named_by_id_or_file(make: Make) -> None:
     folder = make(FIRST)
     map_ = folder.text("content/course.toml")
     page = '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n'

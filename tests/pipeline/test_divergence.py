@@ -5,7 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
+import pytest
+
 from support.scratch_course import Folder, block
+
+pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 
@@ -36,7 +40,7 @@ def rules(folder: Folder, *arguments: str) -> list[str]:
     return [each["rule"] for each in json.loads(done.out)["diagnostics"]]
 
 
-def test_a_run_that_was_reset_and_ends_with_no_error_fails(make: Make) -> None:
+def test_check_fails_where_mujoco_reset_a_lost_simulation(make: Make) -> None:
     folder = make(lesson(LOST))
     done = folder.main("check")
     assert done.status == 1
@@ -44,7 +48,7 @@ def test_a_run_that_was_reset_and_ends_with_no_error_fails(make: Make) -> None:
     assert "diverged examples/a.py" in done.out
 
 
-def test_a_remembered_run_fails_as_well(make: Make) -> None:
+def test_remembered_divergence_fails_again(make: Make) -> None:
     folder = make(lesson(LOST))
     first = folder.main("check")
     again = folder.main("check")
@@ -53,46 +57,46 @@ def test_a_remembered_run_fails_as_well(make: Make) -> None:
     assert first.out.split("\n\n")[0] == again.out.split("\n\n")[0]
 
 
-def test_nothing_is_published(make: Make) -> None:
+def test_divergence_is_not_published(make: Make) -> None:
     folder = make(lesson(LOST))
     assert folder.main("build").status == 1
     assert not (folder.root / "public").exists()
 
 
-def test_update_records_it_and_says_so(make: Make) -> None:
+def test_update_tells_divergence(make: Make) -> None:
     folder = make(lesson(LOST).replace(OUTPUT, "error 1.0"))
     done = folder.main("update")
     assert done.status == 1
     assert "error[script-diverged]" in done.out
 
 
-def test_a_script_may_say_that_it_diverges(make: Make) -> None:
+def test_script_that_says_it_diverges_may(make: Make) -> None:
     assert rules(make(lesson(LOST, "diverges"))) == []
 
 
-def test_a_script_may_not_say_so_without_need(make: Make) -> None:
+def test_script_that_says_it_diverges_and_does_not_is_told(make: Make) -> None:
     assert rules(make(lesson(SOUND, "diverges"))) == ["script-stable"]
 
 
-def test_a_sound_script_is_not_remarked_on(make: Make) -> None:
+def test_sound_script_is_not_remarked_on(make: Make) -> None:
     assert rules(make(lesson(SOUND))) == []
 
 
-def test_saying_so_counts_at_once_for_what_is_remembered(make: Make) -> None:
+def test_saying_diverges_counts_for_a_remembered_run(make: Make) -> None:
     folder = make(lesson(LOST))
     assert rules(folder) == ["script-diverged"]
     folder.replace(folder.lesson(), "file=examples/a.py", "file=examples/a.py diverges")
     assert rules(folder) == []
 
 
-def test_the_machine_forms_do_not_call_it_good(make: Make) -> None:
+def test_json_and_junit_tell_divergence(make: Make) -> None:
     folder = make(lesson(LOST))
     report = json.loads(folder.main("check", "--format", "json").out)
     assert [script["status"] for script in report["scripts"]] == ["diverged"]
     assert '<failure type="diverged"' in folder.main("check", "--format", "junit").out
 
 
-def test_a_shown_block_cannot_diverge(make: Make) -> None:
+def test_block_without_file_cannot_say_diverges(make: Make) -> None:
     folder = make("## One\n\n```python diverges\nx = 1\n```\n\n" + block("b.py", "print(1)"))
     assert rules(folder) == ["fence-key-value"]
 

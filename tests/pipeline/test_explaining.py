@@ -14,6 +14,8 @@ import pytest
 
 from support.scratch_course import HELLO, ROOT, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 READS = 'from pathlib import Path\nprint(len(Path("models/data.txt").read_text()))\n'
@@ -48,7 +50,7 @@ def explained(folder: Folder, path: str) -> str:
     return re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC, \d+\.\d\d s", "WHEN", done.out)
 
 
-def test_nothing_runs_twice(course: Folder) -> None:
+def test_second_check_runs_no_script(course: Folder) -> None:
     assert ran(course) == ["hello", "reads", "helper", "helped"]
     assert ran(course) == []
     done = course.main("check", "--shard", "1/1")
@@ -92,7 +94,7 @@ def test_a_new_lesson_runs_its_own_scripts_only(make: Make) -> None:
     assert ran(folder) == ["helper", "helped"]
 
 
-def test_a_file_beside_the_scripts_with_the_name_of_a_module(course: Folder) -> None:
+def test_new_file_with_the_name_of_an_imported_module_runs_its_importers(course: Folder) -> None:
     """What a script imports may be found elsewhere from now on."""
     ran(course)
     course.write("examples/pathlib.py", "raise ValueError\n")
@@ -107,7 +109,9 @@ def test_a_moved_course_runs_nothing(course: Folder) -> None:
     assert ran(moved) == []
 
 
-def test_results_are_shared(course: Folder, make: Make, tmp_path: Path) -> None:
+def test_shared_cache_spares_runs_in_other_courses(
+    course: Folder, make: Make, tmp_path: Path
+) -> None:
     shared = str(tmp_path / "shared")
     assert ran(course, "--cache", shared) == ["hello", "reads", "helper", "helped"]
     other = make(LESSON, OTHER, name="another")
@@ -134,7 +138,7 @@ def test_no_cache_runs_everything(course: Folder) -> None:
     assert ran(course) == []
 
 
-def test_damage_is_told_on_standard_error(course: Folder) -> None:
+def test_damaged_entry_is_told_on_standard_error(course: Folder) -> None:
     ran(course)
     (path, *_) = sorted(p for p in (course.root / ".coursebuild/scripts").rglob("*") if p.is_file())
     path.write_bytes(path.read_bytes()[:-1])
@@ -154,7 +158,7 @@ def test_an_unreachable_cache_is_told_once_and_no_mistake(course: Folder) -> Non
     assert told == [said]
 
 
-def test_the_environment_names_a_cache(course: Folder, tmp_path: Path) -> None:
+def test_environment_variable_names_a_shared_cache(course: Folder, tmp_path: Path) -> None:
     shared = tmp_path / "shared"
     done = course.run("check", env={"COURSEBUILD_CACHE": str(shared)})
     assert done.status == 0, done.err
@@ -171,7 +175,9 @@ def test_the_environment_names_a_cache(course: Folder, tmp_path: Path) -> None:
         (["--cache", "gopher://x/y"], None),
     ],
 )  # fmt: skip
-def test_wrong_usage(course: Folder, arguments: list[str], said: str | None) -> None:
+def test_wrong_cache_arguments_give_2(
+    course: Folder, arguments: list[str], said: str | None
+) -> None:
     done = course.main("check", *arguments)
     assert done.status == 2
     if said is not None:
@@ -181,7 +187,7 @@ def test_wrong_usage(course: Folder, arguments: list[str], said: str | None) -> 
 # --- update
 
 
-def test_update_writes_what_two_runs_printed(course: Folder) -> None:
+def test_update_runs_again_what_is_remembered_and_differs(course: Folder) -> None:
     """A remembered result is one of them, so that what varies is still found."""
     course.write("models/count.txt", "0")
     lesson = "## A\n\n" + block(
@@ -206,7 +212,7 @@ def test_update_takes_a_remembered_result_that_holds(course: Folder) -> None:
 # --- explain
 
 
-def test_a_script_that_never_ran(course: Folder) -> None:
+def test_explain_script_that_never_ran(course: Folder) -> None:
     assert explained(course, "examples/hello.py") == (
         "examples/hello.py would run\n"
         "  because there is no result of it on this machine\n"
@@ -214,7 +220,7 @@ def test_a_script_that_never_ran(course: Folder) -> None:
     )
 
 
-def test_a_script_that_is_remembered(course: Folder) -> None:
+def test_explain_remembered_script(course: Folder) -> None:
     course.main("check")
     told = explained(course, "examples/reads.py")
     assert told.startswith(
@@ -234,7 +240,9 @@ def test_a_script_that_is_remembered(course: Folder) -> None:
          "its option `timeout` changed: 60 → 9"),
     ],
 )  # fmt: skip
-def test_why_a_script_would_run(course: Folder, path: str, old: str, new: str, reason: str) -> None:
+def test_explain_says_why_a_script_would_run_again(
+    course: Folder, path: str, old: str, new: str, reason: str
+) -> None:
     course.main("check")
     course.replace(path, old, new)
     told = explained(course, "examples/reads.py")
@@ -243,13 +251,15 @@ def test_why_a_script_would_run(course: Folder, path: str, old: str, new: str, r
     )
 
 
-def test_a_file_that_is_gone(course: Folder) -> None:
+def test_explain_names_a_file_that_is_gone(course: Folder) -> None:
     course.main("check")
     (course.root / "models/data.txt").unlink()
     assert "  because models/data.txt is gone\n" in explained(course, "examples/reads.py")
 
 
-def test_another_environment(course: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_explain_names_a_changed_environment_variable(
+    course: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     course.main("check")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
@@ -257,7 +267,7 @@ def test_another_environment(course: Folder, monkeypatch: pytest.MonkeyPatch) ->
     assert "  because environment variable MUJOCO_GL: unset → osmesa\n" in told
 
 
-def test_what_is_never_remembered(make: Make) -> None:
+def test_explain_script_that_starts_other_programs(make: Make) -> None:
     code = 'import subprocess, sys\nsubprocess.run([sys.executable, "-c", ""])\nprint(1)\n'
     folder = make("## A\n\n" + block("starts.py", code, "1"))
     folder.main("check")
@@ -267,7 +277,7 @@ def test_what_is_never_remembered(make: Make) -> None:
     )
 
 
-def test_a_time_limit(make: Make) -> None:
+def test_explain_script_that_was_stopped_after_its_time(make: Make) -> None:
     code = "import time\ntime.sleep(60)\n"
     folder = make("## A\n\n" + block("slow.py", code, info="timeout=0.3"))
     folder.main("check")
@@ -275,14 +285,14 @@ def test_a_time_limit(make: Make) -> None:
     assert "because its last result is not remembered: it was stopped after its time limit" in told
 
 
-def test_a_script_that_is_never_run(make: Make) -> None:
+def test_explain_script_that_is_never_run(make: Make) -> None:
     folder = make("## A\n\n" + block("idle.py", "print(1)\n", info="norun"))
     told = explained(folder, "examples/idle.py")
     assert told.startswith("examples/idle.py is never run: its lesson says `norun`\n")
 
 
 @pytest.mark.parametrize("name", ["1.1", "one", "1.1-one", "content/lessons/1.1-one.md"])
-def test_a_lesson(course: Folder, name: str) -> None:
+def test_explain_lesson_by_any_of_its_names(course: Folder, name: str) -> None:
     course.main("check")
     course.write("models/data.txt", "changed")
     assert explained(course, name) == (
@@ -293,7 +303,7 @@ def test_a_lesson(course: Folder, name: str) -> None:
     )
 
 
-def test_a_file(course: Folder) -> None:
+def test_explain_file_lists_what_depends_on_it(course: Folder) -> None:
     course.main("check")
     assert explained(course, "models/data.txt") == (
         "models/data.txt\n\n"
@@ -308,14 +318,14 @@ def test_a_file(course: Folder) -> None:
     )
 
 
-def test_a_path_from_where_one_stands(course: Folder) -> None:
+def test_explain_takes_a_path_from_the_working_directory(course: Folder) -> None:
     course.main("check")
     done = course.main("explain", "data.txt", cwd=course.root / "models")
     assert done.status == 0
     assert done.out.startswith("models/data.txt\n")
 
 
-def test_as_json(course: Folder) -> None:
+def test_explain_as_json(course: Folder) -> None:
     course.main("check")
     course.write("models/data.txt", "changed")
     value = json.loads(course.main("explain", "examples/reads.py", "--format", "json").out)
@@ -329,13 +339,13 @@ def test_as_json(course: Folder) -> None:
     assert isinstance(own["made"], int)
 
 
-def test_nothing_is_called_so(course: Folder) -> None:
+def test_explain_unknown_name_proposes_a_near_one(course: Folder) -> None:
     done = course.main("explain", "examples/helo.py")
     said = "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
     assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
 
 
-def test_a_broken_map(course: Folder) -> None:
+def test_explain_with_broken_map_gives_2(course: Folder) -> None:
     course.write("content/course.toml", "[")
     done = course.main("explain", "1.1")
     said = "the course map cannot be read; `coursebuild check` says why"

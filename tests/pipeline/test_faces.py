@@ -26,6 +26,8 @@ from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
 from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
 
+pytestmark = pytest.mark.site
+
 PROSE = ["Plain words.\n\n", "More of *them*, `code`.\n\n", "- a\n- b\n\n", "***\n\n", "\n"]
 SECOND = "".join(PARTS[:9])
 

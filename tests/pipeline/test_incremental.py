@@ -11,6 +11,8 @@ from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
 from support.edited_course import nothing_is_held as nothing_is_held
 
+pytestmark = pytest.mark.site
+
 
 def lesson(id: str) -> str:
     return f"lessons/{id}-l{id.replace('.', '')}.html"

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from support.lab_lessons import RIGHT, Make, checked, course, fence
+
+pytestmark = pytest.mark.engine
 
 
 def test_a_lab_in_which_everything_holds(make: Make) -> None:

@@ -22,6 +22,8 @@ from support.preview_process import serving
 from support.recorded_course import BOX, NUMERICS, PAGE, Course
 from support.scratch_course import GOOD, Folder
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(make: Callable[..., Folder]) -> Course:
@@ -119,7 +121,7 @@ def test_damaged_reports_keep_nothing_from_being_published(course: Course) -> No
     assert "notes.json" not in told
 
 
-def test_a_check_tells_it_too_and_can_be_told_to_be_silent(course: Course) -> None:
+def test_check_warns_of_stale_reports_unless_silenced(course: Course) -> None:
     course.folder.write("models/box.xml", BOX.replace("<mujoco>", "<mujoco >"))
     assert course.folder.main("check", "-q").out.count("warning[report-stale]") == 2
     text = course.folder.text("content/course.toml")

@@ -54,7 +54,7 @@ def test_failures_are_remembered_with_their_message(
 
 
 @pytest.mark.parametrize("outcome", [Outcome.TIMEOUT, Outcome.KILLED, Outcome.SKIPPED])
-def test_what_may_end_otherwise_is_not(desk: Desk, outcome: Outcome) -> None:
+def test_stopped_and_killed_runs_are_not_remembered(desk: Desk, outcome: Outcome) -> None:
     desk.run(outcome=outcome, status=9)
     assert desk.recall() is None
     last = desk.memory().last(PATH)
@@ -88,7 +88,9 @@ def test_another_text_is_another_result(desk: Desk) -> None:
     assert desk.recall() is not None
 
 
-def test_the_environment_that_can_matter(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_counts_only_where_a_script_can_see_it(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     desk.run()
     monkeypatch.setenv("MUJOCO_GL", "egl")
@@ -124,7 +126,7 @@ def test_a_damaged_result_is_told_and_run_again(desk: Desk) -> None:
         desk.run()
 
 
-def test_a_result_under_another_ones_name(desk: Desk) -> None:
+def test_result_under_the_name_of_another_is_not_taken(desk: Desk) -> None:
     desk.run()
     (one,) = entries(desk)
     other = replace(JOB, args=("-v",))
@@ -203,7 +205,7 @@ def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
     assert third.recall() is None
 
 
-def test_a_shared_result_that_lies(desk: Desk, tmp_path: Path) -> None:
+def test_shared_entry_that_holds_no_record_is_not_taken(desk: Desk, tmp_path: Path) -> None:
     """An entry that is whole, and holds what no record holds, or one of another script."""
     shared = tmp_path / "shared"
     desk.shared = str(shared)
@@ -246,7 +248,7 @@ edits = st.tuples(st.sampled_from(FILES), st.sampled_from([b"1", b"2", b"", None
 
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(edits, max_size=6), st.sets(st.sampled_from(FILES)))
-def test_it_runs_again_if_and_only_if_something_changed(
+def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
     tmp_path_factory: pytest.TempPathFactory,
     changes: list[tuple[str, bytes | None]],
     looked: set[str],

@@ -9,6 +9,8 @@ import pytest
 from coursebuild.cli import main
 from support.measured_course import TOML, write
 
+pytestmark = pytest.mark.site
+
 SINGULAR = """\
 <mujoco>
   <worldbody>
@@ -23,7 +25,7 @@ SINGULAR = """\
 """MuJoCo warns of its inertia when it is compiled, and in each `mj_forward`."""
 
 
-def test_the_model_is_one_of_which_mujoco_warns(
+def test_mujoco_warns_of_the_model_of_these_tests(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import mujoco
@@ -43,7 +45,7 @@ def test_the_model_is_one_of_which_mujoco_warns(
     ],
     ids=" ".join,
 )
-def test_no_log_is_left(
+def test_measuring_leaves_no_log_of_mujoco(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
@@ -73,7 +75,7 @@ CROWDED = f"""\
 """Its contacts need more memory than it asks for."""
 
 
-def test_a_model_that_mujoco_gives_up_is_told(
+def test_bench_tells_a_model_that_mujoco_gives_up(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path / "content" / "course.toml", "")

@@ -13,6 +13,8 @@ from support.live_course import builds as builds
 from support.live_course import live as live
 from support.scratch_course import GOOD, Folder
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 OTHER = GOOD.replace("hello.py", "other.py")
 

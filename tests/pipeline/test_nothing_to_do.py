@@ -13,6 +13,8 @@ from coursebuild.effects.conditions import _SAYS_NOTHING
 from coursebuild.effects.surroundings import _PASSED_ON
 from support.scratch_course import FIRST, ROOT, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 
@@ -81,7 +83,7 @@ def test_wrong_usage_is_told_also_where_there_is_nothing_to_do(
     assert folder.main("check", *wrong).status == 2
 
 
-def test_a_stamp_goes_by_the_words_of_its_command(make: Make) -> None:
+def test_nothing_changed_counts_for_the_same_command_only(make: Make) -> None:
     """And not by how it is said which course is meant."""
     folder = make(FIRST)
     aged(folder)
@@ -98,7 +100,7 @@ def test_a_stamp_goes_by_the_words_of_its_command(make: Make) -> None:
         assert told not in folder.main(*elsewhere).out
 
 
-def test_what_changed_is_looked_at_again(make: Make) -> None:
+def test_edit_is_seen_after_a_check_with_nothing_to_do(make: Make) -> None:
     folder = make(FIRST)
     aged(folder)
     assert folder.main("check").status == 0
@@ -106,7 +108,7 @@ def test_what_changed_is_looked_at_again(make: Make) -> None:
     assert folder.main("check").status == 1
 
 
-def test_a_lesson_in_whose_place_is_a_link_out_of_the_course_is_looked_at(make: Make) -> None:
+def test_lesson_replaced_by_a_link_out_of_the_course_is_seen(make: Make) -> None:
     folder = make(FIRST)
     aged(folder)
     assert folder.main("check").status == 0
@@ -119,7 +121,7 @@ def test_a_lesson_in_whose_place_is_a_link_out_of_the_course_is_looked_at(make: 
 
 
 @pytest.mark.parametrize("name", sorted({*_PASSED_ON} - _SAYS_NOTHING))
-def test_what_scripts_see_of_the_environment_is_looked_at(
+def test_changed_environment_variable_is_seen(
     make: Make, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     folder = make(FIRST)
@@ -130,7 +132,7 @@ def test_what_scripts_see_of_the_environment_is_looked_at(
     assert "nothing has changed" not in folder.main("check").out
 
 
-def test_from_where_a_path_is_meant_is_looked_at(make: Make) -> None:
+def test_relative_path_from_another_folder_is_another_command(make: Make) -> None:
     folder = make(FIRST)
     (folder.root / "data").mkdir()
     aged(folder)
@@ -144,7 +146,7 @@ def test_from_where_a_path_is_meant_is_looked_at(make: Make) -> None:
     assert "no lesson or page is called" in done.err
 
 
-def test_a_course_without_a_name_is_here(make: Make) -> None:
+def test_empty_folder_argument_is_the_working_directory(make: Make) -> None:
     folder = make(FIRST)
     aged(folder)
     assert folder.main("-C", "", "check").status == 0
@@ -154,7 +156,7 @@ def test_a_course_without_a_name_is_here(make: Make) -> None:
     assert "map-missing" in done.out
 
 
-def test_a_working_directory_that_is_gone(make: Make) -> None:
+def test_working_directory_that_is_gone_gives_2(make: Make) -> None:
     folder = make(FIRST)
     gone = folder.root / "gone"
     gone.mkdir()

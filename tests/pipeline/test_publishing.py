@@ -13,6 +13,8 @@ import pytest
 
 from support.scratch_course import GOOD, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 TABLE = """## Table
@@ -41,7 +43,7 @@ def drift_in(folder: Folder) -> tuple[int, int, str, str]:
 
 @pytest.mark.parametrize("how", ["exact", "digits", "rtol=1e-9", "ellipsis"])
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_one_digit_is_found_where_it_stands(make: Make, how: str, newline: str) -> None:
+def test_check_points_at_first_differing_digit(make: Make, how: str, newline: str) -> None:
     code = 'print("alpha", 1.25)\nprint("beta  2.50 and 3.75")'
     lesson = "## One\n\n> " + block("one.py", code, "alpha 1.25\nbeta  2.50 and 3.75", how).replace(
         "\n", "\n> "
@@ -58,7 +60,7 @@ def test_one_digit_is_found_where_it_stands(make: Make, how: str, newline: str) 
     )
 
 
-def test_one_digit_of_a_table(make: Make) -> None:
+def test_check_points_at_differing_cell_of_table(make: Make) -> None:
     folder = make(TABLE)
     assert folder.main("build").status == 0
     folder.replace(folder.lesson(), "| 3.50e-09 |", "| 3.51e-09 |")
@@ -98,7 +100,7 @@ def test_drift_is_not_published_and_update_puts_it_back(make: Make) -> None:
     ],
     ids=["link", "math", "script", "mjcf", "image", "json", "binding", "encoding"],
 )
-def test_no_mistake_is_published(make: Make, mistake: str | bytes) -> None:
+def test_site_stays_as_it_was_whatever_the_mistake(make: Make, mistake: str | bytes) -> None:
     folder = make(GOOD)
     assert folder.main("build").status == 0
     site = folder.tree("public")
@@ -200,7 +202,7 @@ def test_a_damaged_cache_is_made_again(make: Make, stores: Path, damage: bytes) 
     assert folder.tree() == site
 
 
-def test_caches_that_cannot_be_written(make: Make) -> None:
+def test_check_works_where_caches_cannot_be_written(make: Make) -> None:
     folder = make(GOOD)
     shutil.rmtree(folder.root / ".coursebuild")
     (folder.root / ".coursebuild").write_text("a file in their place")

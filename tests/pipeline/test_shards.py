@@ -53,12 +53,12 @@ def test_a_name_without_a_time_counts_as_the_usual_one() -> None:
 
 
 @pytest.mark.parametrize("text", "1 / 0/2 3/2 1/0 -1/2 1/2/3 a/b 1/99999 ²/3".split())
-def test_parts_that_are_none(text: str) -> None:
+def test_wrong_shard_argument_is_wrong_usage(text: str) -> None:
     with pytest.raises(UsageError, match=r"^--shard: "):
         read_shard(text, [])
 
 
-def test_times_without_parts() -> None:
+def test_timings_without_shard_are_wrong_usage() -> None:
     with pytest.raises(UsageError) as caught:
         read_shard(None, ["x.json"])
     assert str(caught.value) == "--timings says how `--shard` divides the work: it needs `--shard`"
@@ -81,7 +81,7 @@ def test_times_without_parts() -> None:
         b"[" * 99999,
     ],
 )
-def test_a_file_that_holds_no_times(tmp_path: Path, data: bytes) -> None:
+def test_file_that_holds_no_timings_is_refused_and_kept(tmp_path: Path, data: bytes) -> None:
     file = tmp_path / "times.json"
     file.write_bytes(data)
     with pytest.raises(UsageError) as caught:
@@ -93,7 +93,7 @@ def test_a_file_that_holds_no_times(tmp_path: Path, data: bytes) -> None:
     assert file.read_bytes() == data, "what somebody else put there stays"
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_file_of_timings_is_told(tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
         read_timings(str(tmp_path / "none.json"))
     said = f"--timings: {tmp_path}/none.json cannot be read: no such file or directory"
@@ -118,7 +118,7 @@ def test_several_files_of_times_make_one(tmp_path: Path) -> None:
     assert first is not None and dict(first.seconds) == {"a": 1.0, "b": 9.0, "c": 3.0}
 
 
-def test_times_that_cannot_be_written(tmp_path: Path) -> None:
+def test_timings_that_cannot_be_written_are_told(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"^--write-timings: "):
         write_timings(str(tmp_path / "no folder/times.json"), {"a": 1.0}, ["a"])
 
@@ -134,6 +134,7 @@ def scripts_of(report: str) -> list[str]:
     return sorted(script["path"] for script in json.loads(report)["scripts"])
 
 
+@pytest.mark.site
 def test_all_parts_together_are_the_course(make: Make) -> None:
     folder = make(LESSON)
     times = folder.root / "times.json"
@@ -148,6 +149,7 @@ def test_all_parts_together_are_the_course(make: Make) -> None:
         assert sorted(found) == [f"examples/s{number}.py" for number in range(5)]
 
 
+@pytest.mark.site
 def test_a_part_with_nothing_to_do_is_no_mistake(make: Make) -> None:
     folder = make("## A\n\n" + block("a.py", "print(1)\n", "1"))
     reports = [folder.main("check", "--shard", f"{part}/3") for part in (1, 2, 3)]
@@ -157,20 +159,23 @@ def test_a_part_with_nothing_to_do_is_no_mistake(make: Make) -> None:
     assert "this was part 1/3 of the work: " in reports[0].out
 
 
-def test_a_course_without_scripts_is_one_in_parts_too(make: Make) -> None:
+@pytest.mark.site
+def test_part_of_a_course_without_scripts_is_a_mistake(make: Make) -> None:
     folder = make("## A\n\nNothing to run.\n")
     done = folder.main("check", "--shard", "1/3")
     assert done.status == 1
     assert "error[no-scripts]" in done.out
 
 
+@pytest.mark.site
 def test_a_mistake_in_a_script_is_found_by_its_part_alone(make: Make) -> None:
     folder = make(LESSON + block("bad.py", "print(1)\n", "2"))
     found = [folder.main("check", "--shard", f"{part}/3") for part in (1, 2, 3)]
     assert sorted(done.status for done in found) == [0, 0, 1]
 
 
-def test_wrong_usage(make: Make) -> None:
+@pytest.mark.site
+def test_wrong_shard_on_the_command_line_gives_2(make: Make) -> None:
     folder = make(LESSON)
     done = folder.main("check", "--shard", "4/3")
     assert (done.status, done.err) == (2, "coursebuild: --shard: there is no part 4 of 3\n")

@@ -17,6 +17,8 @@ from support.preview_process import serving
 from support.recorded_course import PAGE, Course
 from support.scratch_course import GOOD, Folder
 
+pytestmark = pytest.mark.site
+
 SCENARIOS = '[[scenario]]\nname = "swing"\n\n[[scenario]]\nname = "awkward"\n'
 FENCES = """## Speed
 
@@ -76,7 +78,7 @@ def test_a_report_stands_in_the_lesson(course: Course) -> None:
     assert "1.2" in course.page().split('id="used"')[1]  # the lesson uses the model
 
 
-def test_it_is_in_the_other_forms_of_the_lesson(course: Course) -> None:
+def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None:
     course.build()
     root = course.folder.root / "public"
     twin = lesson(course, "md")

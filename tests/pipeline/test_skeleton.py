@@ -41,6 +41,8 @@ from coursebuild.syntax.coursemap import parse_course_map
 from support.scratch_course import ROOT
 from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
 
+pytestmark = pytest.mark.site
+
 FIXTURES = sorted((ROOT / "tests" / "fixtures").rglob("*.md")) + sorted(
     (ROOT / "tests" / "courses").rglob("*.md")
 )

@@ -9,6 +9,8 @@ import pytest
 
 from coursebuild.cli import main
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
@@ -17,7 +19,9 @@ def course(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_text_then_json_from_what_is_kept(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_stability_prints_text_and_then_json_without_measuring_again(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["-C", str(course), "stability", "projectile"]) == 0
     out, err = capsys.readouterr()
     assert out.startswith("projectile  case 4: Projectile\n")
@@ -36,7 +40,9 @@ def test_text_then_json_from_what_is_kept(course: Path, capsys: pytest.CaptureFi
     assert {one["integrator"] for one in report["errors"]} == set(figures)
 
 
-def test_measured_again_only_when_asked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_stability_measures_again_only_when_asked(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     command = ["-C", str(course), "stability", "projectile"]
     assert main(command) == 0
     first = capsys.readouterr()
@@ -48,7 +54,9 @@ def test_measured_again_only_when_asked(course: Path, capsys: pytest.CaptureFixt
     assert "measured after" in capsys.readouterr().err
 
 
-def test_a_family_and_a_name_that_is_none(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_stability_of_a_family_and_of_an_unknown_case(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
     said = capsys.readouterr().err
     assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in said

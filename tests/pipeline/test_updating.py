@@ -8,6 +8,8 @@ import pytest
 
 from support.scratch_course import DRIFTED, GOOD, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 EVERYTHING = """## Everything
@@ -120,7 +122,9 @@ UPDATED = (
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
-def test_every_form_byte_for_byte(make: Make, newline: str, mark: str) -> None:
+def test_update_changes_outputs_of_every_form_and_no_other_byte(
+    make: Make, newline: str, mark: str
+) -> None:
     folder = make((mark + EVERYTHING).replace("\n", newline).encode())
     done = folder.main("update")
     assert done.status == 0, done.out
@@ -137,7 +141,7 @@ def clock(text: str) -> str:
     return text[text.rindex("volatile") :].split()[1]
 
 
-def test_twice_changes_nothing(make: Make) -> None:
+def test_second_update_changes_nothing(make: Make) -> None:
     steady = EVERYTHING[: EVERYTHING.index("```python file=examples/clock.py")]
     folder = make(steady, GOOD)
     assert folder.main("update").status == 0
@@ -150,7 +154,7 @@ def test_twice_changes_nothing(make: Make) -> None:
     assert {p: (folder.root / "content" / p).stat().st_mtime_ns for p in once} == times
 
 
-def test_what_was_remembered_and_had_to_run_again_counts_as_run(make: Make) -> None:
+def test_update_counts_a_script_that_ran_again_as_run(make: Make) -> None:
     folder = make(DRIFTED, GOOD)
     assert folder.main("check").status == 1
     done = folder.main("update")
@@ -159,7 +163,7 @@ def test_what_was_remembered_and_had_to_run_again_counts_as_run(make: Make) -> N
     assert "\n2 lessons, 0 scripts run, 2 cached" in folder.main("update").out
 
 
-def test_dry_run_writes_nothing_and_shows_what_it_would(make: Make) -> None:
+def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
     folder = make(GOOD.replace("hello 3.14159\n", "hello 3.14158\n"), GOOD.replace("hello", "two"))
     folder.main("extract")
     before = folder.tree()
@@ -178,7 +182,7 @@ def test_dry_run_writes_nothing_and_shows_what_it_would(make: Make) -> None:
     assert folder.tree() == before
 
 
-def test_only_the_chosen_lessons(make: Make) -> None:
+def test_update_writes_only_the_chosen_lessons(make: Make) -> None:
     stale = [f"## {n}\n\n" + block(f"{n}.py", f"print('{n}')", "OLD") for n in "abc"]
     folder = make(*stale)
     assert folder.main("update", "1.2", "three").status == 0
@@ -276,7 +280,9 @@ def test_what_is_printed_in_the_place_of_a_number_is_told(make: Make) -> None:
         ("print('new', 1)", "ellipsis", "cannot be brought up to date here"),
     ],
 )
-def test_what_cannot_be_recorded(make: Make, code: str, how: str, says: str) -> None:
+def test_output_that_cannot_be_recorded_is_told_and_nothing_written(
+    make: Make, code: str, how: str, says: str
+) -> None:
     lesson = "## One\n\n" + block("x.py", code, "old ... line\nother", how)
     folder = make(lesson)
     done = folder.main("update")

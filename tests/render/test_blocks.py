@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from html import unescape
 from re import findall, sub
-from typing import Any
 
 import pytest
 
 from coursebuild.results import Outcome, ScriptRun
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 SCRIPT = """```python file=examples/a.py
 print("<one>")

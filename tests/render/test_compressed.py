@@ -9,7 +9,6 @@ from collections.abc import Callable
 import brotli
 import pytest
 
-from coursebuild.render import compressed
 from coursebuild.render.compressed import compressed_files
 from coursebuild.results import OutputFile
 
@@ -69,13 +68,18 @@ def test_the_same_bytes_each_time_and_no_time_in_them() -> None:
     assert first[1].data[4:8] == b"\0\0\0\0", "gzip's time"
 
 
-def test_each_content_is_compressed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_content_is_compressed_once() -> None:
     keep = Kept()
     files = [OutputFile("assets/a.js", TEXT), OutputFile("assets/b.js", TEXT)]
     assert len(compressed_files(files, keep)) == 4
     assert keep.made == 2
     compressed_files(files, keep)
     assert keep.made == 2
-    monkeypatch.setattr(compressed, "_LARGE", 100)
-    compressed_files(files, keep)
-    assert keep.made == 4, "another quality is another result"
+
+
+def test_what_is_large_is_compressed_less_finely() -> None:
+    """From 2 MiB on, where the finer way takes long."""
+    large = (TEXT * 600)[: 2 << 20]
+    for data, quality in ((large[:-1], 10), (large, 9)):
+        brotli_copy, _ = copies("assets/x.js", data)
+        assert brotli_copy.data == brotli.compress(data, quality=quality)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from html.parser import HTMLParser
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -20,8 +18,7 @@ from coursebuild.render.quantities import (
     text_html,
     unit_length,
 )
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 
 @pytest.mark.parametrize(

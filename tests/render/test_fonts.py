@@ -6,14 +6,18 @@ import io
 
 import pytest
 from fontTools.ttLib import TTFont
+from msgspec.structs import replace
 
+from coursebuild.effects.prepared import prepared_source
 from coursebuild.render import Assets, FontJob, subset_font
 from coursebuild.render.fonts import (
     CODE,
     MATH,
     TEXT,
+    VERSION,
     characters_in,
     face_rules,
+    finest_font,
     font_jobs,
     italic_letter,
     read_faces,
@@ -24,22 +28,34 @@ FORMULAS = "I=∫Vρ(‖𝐫‖2𝟙−⊤)dω∑√{}[]⟨⟩≥·˙ˆ𝝎mkc�
 
 
 def jobs(assets: Assets, text: str, mathematics: str = FORMULAS) -> tuple[FontJob, ...]:
+    """As a build has them: what is cut is the smaller font made ahead, where that is enough."""
     faces = read_faces(assets.file("fonts/fonts.json"))
     data = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
-    return font_jobs(data, text, mathematics)
+    return tuple(map(prepared, font_jobs(data, text, mathematics)))
+
+
+def prepared(job: FontJob) -> FontJob:
+    return replace(job, data=prepared_source(job.data, job.characters, VERSION) or job.data)
 
 
 def only(found: tuple[FontJob, ...], family: str, style: str = "normal") -> list[FontJob]:
     return [job for job in found if (job.face.family, job.face.style) == (family, style)]
 
 
-def cut(job: FontJob) -> TTFont:
-    return TTFont(io.BytesIO(subset_font.__wrapped__(job)))
+def font_of(job: FontJob) -> TTFont:
+    return TTFont(io.BytesIO(subset_font(job)))
+
+
+@pytest.fixture(scope="module")
+def mathematical(assets: Assets) -> TTFont:
+    (job,) = only(jobs(assets, ""), MATH)
+    assert len(subset_font(job)) < 80_000
+    return font_of(job)
 
 
 def test_a_text_font_has_what_the_pages_use_and_its_axes(assets: Assets) -> None:
     (latin,) = only(jobs(assets, "ordinary text"), TEXT)
-    font = cut(latin)
+    font = font_of(latin)
     assert set("The quick brown fox, 1–2 “x” …") <= set(map(chr, font.getBestCmap()))
     axes = {axis.axisTag: (axis.minValue, axis.maxValue) for axis in font["fvar"].axes}
     assert axes["wght"] == (400, 700)
@@ -62,9 +78,8 @@ def test_no_character_is_in_two_files_of_a_face(assets: Assets) -> None:
         assert len(given) == len(set(given))
 
 
-def test_the_math_font_keeps_its_table_variants_and_italics(assets: Assets) -> None:
-    (job,) = only(jobs(assets, ""), MATH)
-    font = cut(job)
+def test_the_math_font_keeps_its_table_variants_and_italics(mathematical: TTFont) -> None:
+    font = mathematical
     cmap = font.getBestCmap()
     wanted = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝜕", "𝛻"}
     assert {c for c in wanted if ord(c) not in cmap} == set()
@@ -78,13 +93,11 @@ def test_the_math_font_keeps_its_table_variants_and_italics(assets: Assets) -> N
     assert len(assembly.PartRecords) >= 3
     assert stretchy[cmap[ord("∫")]].VariantCount >= 2
     assert {part.glyph for part in assembly.PartRecords} <= set(font.getGlyphOrder())
-    assert len(subset_font(job)) < 80_000
 
 
-def test_no_radical_is_much_wider_than_the_smallest(assets: Assets) -> None:
+def test_no_radical_is_much_wider_than_the_smallest(mathematical: TTFont) -> None:
     """A browser leaves room for the widest behind each root."""
-    (job,) = only(jobs(assets, ""), MATH)
-    font = cut(job)
+    font = mathematical
     radical = font.getBestCmap()[ord("√")]
     variants = font["MATH"].table.MathVariants
     drawn = variants.VertGlyphConstruction[variants.VertGlyphCoverage.glyphs.index(radical)]
@@ -98,6 +111,7 @@ def test_no_radical_is_much_wider_than_the_smallest(assets: Assets) -> None:
         assert font["glyf"][name].xMax >= 0.7 * advance, "it meets the line"
 
 
+@pytest.mark.site
 def test_even_every_math_letter_stays_far_below_the_whole_font(assets: Assets) -> None:
     letters = "".join(map(chr, [*range(0x1D400, 0x1D7FF), *range(0x2200, 0x2300)]))
     (job,) = only(jobs(assets, "", letters), MATH)
@@ -112,7 +126,9 @@ def test_a_site_without_formulas_has_no_math_font(assets: Assets) -> None:
 def test_the_same_job_gives_the_same_bytes_and_key(assets: Assets) -> None:
     one, two = jobs(assets, "text"), jobs(assets, "text")
     assert [job.key for job in one] == [job.key for job in two]
-    assert subset_font.__wrapped__(one[0]) == subset_font.__wrapped__(two[0])
+    small, again = (only(jobs(assets, "привет"), CODE)[1] for _ in range(2))
+    assert small.face.subset == "cyrillic"
+    assert finest_font(small) == finest_font(again), "`subset_font` would have kept the first"
     assert {job.key for job in one}.isdisjoint(
         job.key for job in jobs(assets, "text é ñ", FORMULAS + "ℵ") if job.face.subset == "latin"
     )
@@ -122,9 +138,13 @@ def test_the_same_job_gives_the_same_bytes_and_key(assets: Assets) -> None:
     ("css", "text"),
     [("U+61-63, U+65", "abce"), ("u+0041", "A"), ("U+003?", "0123456789:;<=>?"), ("U+1F600", "😀")],
 )
-def test_ranges(css: str, text: str) -> None:
+def test_characters_of_a_unicode_range(css: str, text: str) -> None:
     assert characters_in(css) == set(text)
     assert characters_in(unicode_range("".join(sorted(text)))) == set(text)
+
+
+def test_unicode_range_joins_characters_that_follow_each_other() -> None:
+    assert unicode_range("abce") == "U+61-63, U+65"
 
 
 def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:

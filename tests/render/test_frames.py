@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 from markupsafe import Markup
 from msgspec.structs import replace
@@ -12,8 +9,8 @@ from msgspec.structs import replace
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import Frames, Names, frame_around
 from coursebuild.render.library import Library
+from support.rendered_course import Make
 
-Make = Callable[..., Any]
 NAMES = Names(
     style="assets/s.css",
     theme_script="assets/t.js",

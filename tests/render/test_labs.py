@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from typing import Any
 
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 FULL: dict[str, Any] = {
     "title": "A <lab>",

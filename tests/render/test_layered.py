@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations, pairwise
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.drawing.layered import Edge, Layout, layered, reduced
@@ -46,6 +46,7 @@ def crossings(layout: Layout) -> int:
     )
 
 
+@settings(max_examples=50)
 @given(graphs())
 def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
     layout = laid_out(*graph)
@@ -59,6 +60,7 @@ def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
         assert (edge.xs[0], edge.xs[-1]) == (start.x, end.x)
 
 
+@settings(max_examples=50)
 @given(graphs(), st.floats(0, 30))
 def test_nothing_overlaps_or_sticks_out(graph: Graph, gap: float) -> None:
     layout = laid_out(*graph, gap=gap)
@@ -70,11 +72,13 @@ def test_nothing_overlaps_or_sticks_out(graph: Graph, gap: float) -> None:
     assert max(node.x for node in layout.nodes) <= layout.width - 20 + 1e-6
 
 
+@settings(max_examples=50)
 @given(graphs())
 def test_the_same_graph_gives_the_same_layout(graph: Graph) -> None:
     assert laid_out(*graph) == laid_out(*graph)
 
 
+@settings(max_examples=50)
 @given(graphs())
 def test_what_is_reduced_leads_as_far_with_no_arrow_too_many(graph: Graph) -> None:
     nodes, edges = graph
@@ -89,11 +93,12 @@ def test_arrows_of_unknown_nodes_and_repeated_ones_are_left_out() -> None:
     assert reduced(["a", "b"], [("a", "b"), ("a", "b"), ("a", "x"), ("x", "b")]) == (("a", "b"),)
 
 
-def test_a_long_chain_is_no_matter() -> None:
-    nodes = [str(n) for n in range(3000)]
+def test_a_chain_longer_than_the_stack_is_laid_out() -> None:
+    """Python calls functions a thousand deep."""
+    nodes = [str(n) for n in range(1100)]
     edges = list(pairwise(nodes))
-    assert reduced(nodes, [*edges, ("0", "2999")]) == tuple(edges)
-    assert laid_out(nodes, edges).layers == 3000
+    assert reduced(nodes, [*edges, ("0", "1099")]) == tuple(edges)
+    assert laid_out(nodes, edges).layers == 1100
 
 
 @given(st.permutations("abcdefg"))

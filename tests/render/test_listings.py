@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 import segno
@@ -17,8 +15,7 @@ from coursebuild.render.links import check_links, has, without_lines
 from coursebuild.render.listings import numbered
 from coursebuild.render.qr import qr_svg
 from coursebuild.results import OutputFile
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 
 def test_names() -> None:

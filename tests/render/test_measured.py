@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -13,8 +11,7 @@ from coursebuild.measured.shown import Reports
 from coursebuild.render import SiteOptions
 from coursebuild.render.figures import bounded, exact, factor, percent, power, sentence, size
 from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from hypothesis import strategies as st
 
 from coursebuild.render.offline import PAPER, facts_of, listing, short_name
 from coursebuild.results import FileFacts, OutputFile
+from support.rendered_course import Make
 
-Make = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 SHELL = frozenset({"index.html", "offline/index.html", "assets/site.0123abcd.css"})
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,8 +11,7 @@ import pytest
 from coursebuild.render.quizzes import letter, shuffle, unit_html
 from coursebuild.results import Outcome, ScriptRun
 from coursebuild.syntax.question_keys import text_key
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 SCRIPT = "```python file=examples/a.py\nprint(1)\n```\n\n"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -15,8 +14,7 @@ from coursebuild.render.asked import asked, count
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from coursebuild.syntax.question_keys import text_key
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 
 def quiz(id: str, *questions: dict[str, Any]) -> str:

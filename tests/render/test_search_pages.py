@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -16,8 +14,7 @@ from coursebuild.render.search.drawn import drawn_sections
 from coursebuild.render.search.page import page_text, searched, terms
 from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.search.values import PageText, Piece, Section
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]
 

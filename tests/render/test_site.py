@@ -6,10 +6,8 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from html import unescape
 from html.parser import HTMLParser
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -17,8 +15,7 @@ from msgspec.structs import replace
 
 from coursebuild.render import SiteOptions, check_links
 from coursebuild.results import OutputFile
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 LESSON = """## First part
 

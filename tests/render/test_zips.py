@@ -6,7 +6,6 @@ import io
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,7 @@ from coursebuild.render import Package, SiteOptions, Surroundings, imported_modu
 from coursebuild.render.zips import imports
 from coursebuild.results import CompileResult, ModelFacts, OutputFile
 from coursebuild.source import Source
-
-Make = Callable[..., Any]
+from support.rendered_course import Make
 
 ONE = """```python file=examples/one.py
 import json, sys

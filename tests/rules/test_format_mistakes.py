@@ -1,31 +1,28 @@
-"""Each mistake that the lesson format names, alone, through the command line; and the good cases.
+"""Mistakes whose place only a whole course shows, each alone; and the good cases beside them.
 
 The cases are fixtures in `tests/fixtures/mistakes/`. Where a mistake is expected its place is
 marked in the input by `‸`, which is taken out before the course is written; the expected text is
-the rule. A case whose expected text is empty must be found good.
+the rule. A case whose expected text is empty must be found good. Words are tested elsewhere: those
+of each rule in `fixtures/rules`, those of each parser in `tests/syntax`.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from coursebuild.cli import main
+from coursebuild.pipeline.check import check
 from coursebuild.rules import RULES
-from support.rule_cases import SECOND, Case, Layout, put, read_cases
+from support.fixture_cases import Case, read_cases
+from support.rule_cases import Layout, Workshop
 
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "mistakes"
 MARK = "‸"
-CASES = [
-    pytest.param(case, id=f"{path.stem}:{case.line}")
-    for path in sorted(FIXTURES.glob("*.md"))
-    for case in read_cases(path)
-]
+FILES = sorted(FIXTURES.glob("*.md"))
+TIERS = {"labs": pytest.mark.engine, "scripts": pytest.mark.site}
 
 
 @dataclass(frozen=True, order=True)
@@ -39,6 +36,12 @@ class Place:
 
     def __str__(self) -> str:
         return f"{self.rule} {self.path}:{self.line}:{self.column}"
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
+    with Workshop(tmp_path_factory.mktemp("workshop")) as workshop:
+        yield workshop
 
 
 def marked(layout: Layout) -> list[tuple[str, int, int]]:
@@ -65,40 +68,39 @@ def expected(case: Case, marks: list[tuple[str, int, int]]) -> list[Place]:
             places.append(Place(path, int(row), int(column), rule))
         else:
             places.append(Place(*left.pop(0), rule))
-    assert not left, "a mark without a rule"
+    assert not left, f"{case.title}: a mark without a rule"
+    assert len(places) <= 1, f"{case.title}: one mistake at a time"
     return sorted(places)
 
 
-def run(root: Path, *arguments: str) -> tuple[int, dict[str, list[dict[str, object]]]]:
-    """The exit status and the report of a command."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
-        status = main(["-C", str(root), *arguments, "--jobs", "1"])
-    return status, json.loads(out.getvalue())
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_a_mistake_is_told_once_at_its_place(case: Case, tmp_path: Path) -> None:
+def compared(case: Case, root: Path, workshop: Workshop) -> str | None:
+    """How what is found differs from what is expected, if it does."""
     layout = Layout.of(case.input)
-    places = marked(layout)
-    wrong = any(RULES[line.split()[0]].severity == "error" for line in case.expected.splitlines())
-    if wrong and "examples/" not in case.input and SECOND in layout.files:
-        # Nothing leans on the script that every scratch course has, so it need not be run.
-        layout.files[SECOND] = layout.files[SECOND].replace(b"second.py\n", b"second.py norun\n")
-    layout.write(tmp_path)
+    wanted = expected(case, marked(layout))
+    layout.write(root)
     if layout.later:
-        run(tmp_path, "check", "--format", "json")
-        for path, data in layout.later.items():
-            put(tmp_path / path, data)
-    status, report = run(tmp_path, "check", "--format", "json")
-    found = sorted(
-        Place(str(d["path"]), int(str(d["line"])), int(str(d["column"])), str(d["rule"]))
-        for d in report["diagnostics"]
-    )
-    wanted = expected(case, places)
-    assert [str(place) for place in found] == [str(place) for place in wanted]
-    assert status == (1 if wrong else 0)
-    assert len(wanted) <= 1, "one mistake at a time"
+        check(workshop.options(root))
+        layout.write_later(root)
+    if "```lab" in case.input:
+        diagnostics = workshop.try_labs(root)
+    else:
+        diagnostics = check(workshop.options(root)).diagnostics
+    found = sorted(Place(d.span.path, d.span.line, d.span.column, d.rule) for d in diagnostics)
+    assert all(d.severity.value == RULES[d.rule].severity for d in diagnostics)
+    if found == wanted:
+        return None
+    return f"line {case.line}, {case.title}: {[*map(str, found)]}, not {[*map(str, wanted)]}"
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=path.stem, marks=TIERS.get(path.stem, ())) for path in FILES]
+)
+def test_each_mistake_is_told_once_at_its_place(
+    path: Path, workshop: Workshop, tmp_path: Path
+) -> None:
+    cases = read_cases(path)
+    wrong = [compared(case, tmp_path / str(case.line), workshop) for case in cases]
+    assert [one for one in wrong if one is not None] == []
 
 
 TOGETHER = """\
@@ -190,12 +192,14 @@ model-error
 """
 
 
-def test_everything_wrong_is_told_in_one_run_in_order(tmp_path: Path) -> None:
+def test_everything_wrong_is_told_in_one_run_in_order(workshop: Workshop, tmp_path: Path) -> None:
     layout = Layout.of(TOGETHER)
     places = marked(layout)
     layout.write(tmp_path)
-    status, report = run(tmp_path, "check", "--format", "json")
-    found = [f"{d['rule']} {d['path']}:{d['line']}:{d['column']}" for d in report["diagnostics"]]
+    found = [
+        str(Place(d.span.path, d.span.line, d.span.column, d.rule))
+        for d in check(workshop.options(tmp_path)).diagnostics
+    ]
     rules = [line.split() for line in RULES_TOGETHER.splitlines()]
     wanted = [
         f"{rule} {path}:{row}:{column}"
@@ -204,4 +208,3 @@ def test_everything_wrong_is_told_in_one_run_in_order(tmp_path: Path) -> None:
     ]
     assert sorted(found) == sorted(wanted)
     assert [line.rsplit(" ", 1)[1] for line in found] == [line.rsplit(" ", 1)[1] for line in wanted]
-    assert status == 1

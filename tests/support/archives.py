@@ -9,6 +9,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import unquote
@@ -16,13 +17,23 @@ from urllib.parse import unquote
 import pytest
 from lxml import etree
 
-ROOT = Path(__file__).parents[2]
+from support.scratch_course import ROOT, Done, Folder
+
 SCHEMAS = ROOT / "site/node_modules/node-scorm-packager/lib/schemas/definitionFiles"
 NAMESPACES = {
     "imscp_rootv1p1p2.xsd": "http://www.imsproject.org/xsd/imscp_rootv1p1p2",
     "adlcp_rootv1p2.xsd": "http://www.adlnet.org/xsd/adlcp_rootv1p2",
     "imsmd_rootv1p2p1.xsd": "http://www.imsglobal.org/xsd/imsmd_rootv1p2p1",
 }
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package of a course, and what the command said that wrote it."""
+
+    folder: Folder
+    done: Done
+    files: dict[str, bytes]
 
 
 def entries(path: Path) -> dict[str, bytes]:

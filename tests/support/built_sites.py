@@ -1,22 +1,20 @@
-"""What the tests of standards share: two built courses, and every kind of page in them.
+"""Courses that are built once for all processes of a test run, and sites of them on a host.
 
-One is the course of this repository, the other has every construct of the lesson format. Which
-pages there are is found out from the built sites, so that a new kind of page is tested as soon as
+Which pages a site has is found out from its files, so that a new kind of page is tested as soon as
 there is one.
 """
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
-import os
 import re
 import shutil
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
-
-from support.scratch_course import ROOT, Folder
+from support.scratch_course import ROOT, Folder, course_map
 from support.static_host import Host
 
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
@@ -55,27 +53,59 @@ class Site:
         return self.host.url + path.removesuffix("index.html")
 
 
-def build_both(shared: Path, stores: Path) -> dict[str, Path]:
-    """Build the two courses, once for all processes that run tests."""
-    shared.mkdir(exist_ok=True)
-    roots = {name: shared / name for name in ("real", "full")}
-    with (shared / "lock").open("w") as lock:
+@dataclass(frozen=True, slots=True)
+class BuiltCourses:
+    """Courses in a folder that all processes of a run share; the first that asks builds one."""
+
+    shared: Path
+    stores: Path
+
+    def of_files(self, name: str, files: Mapping[str, str | bytes]) -> Folder:
+        """A course of these files."""
+        folder = Folder(self.shared / name / "a course")
+        with _locked(self.shared / name):
+            if not self._done(name).exists():
+                shutil.rmtree(folder.root, ignore_errors=True)
+                for path, data in files.items():
+                    folder.write(path, data)
+                folder.borrow(self.stores)
+                _build(folder)
+                self._done(name).touch()
+        return folder
+
+    def of_case(self, name: str) -> Folder:
+        """The course of a folder in tests/courses."""
+        origin = ROOT / "tests" / "courses" / name / "course"
+        paths = [path for path in sorted(origin.rglob("*")) if path.is_file()]
+        files = {path.relative_to(origin).as_posix(): path.read_bytes() for path in paths}
+        return self.of_files(name, files)
+
+    def real(self) -> Folder:
+        """The course of this repository: where `make site` has been run, nothing is to do."""
+        folder = Folder(ROOT)
+        with _locked(self.shared / "real"):
+            _build(folder)
+        return folder
+
+    def _done(self, name: str) -> Path:
+        return self.shared / name / "done"
+
+
+def lesson_files(*texts: str) -> dict[str, str | bytes]:
+    """The files of a course of these lessons."""
+    named = Folder(ROOT)
+    lessons = {named.lesson(number): text for number, text in enumerate(texts, 1)}
+    return {"content/course.toml": course_map(len(texts)), **lessons}
+
+
+def _build(folder: Folder) -> None:
+    done = folder.main("build", "--quiet")
+    assert done.status == 0, done.out + done.err
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (shared / "done").exists():
-            for name, root in roots.items():
-                shutil.rmtree(root, ignore_errors=True)
-                origin = ROOT if name == "real" else ROOT / "tests/courses/full/course"
-                for part in ("content", "models", "docs"):
-                    if (origin / part).is_dir():
-                        shutil.copytree(origin / part, root / part)
-                folder = Folder(root)
-                folder.borrow(stores)
-                done = folder.main("build")
-                assert done.status == 0, done.out + done.err
-            (shared / "done").touch()
-    return roots
-
-
-def shared_folder(factory: pytest.TempPathFactory) -> Path:
-    base = factory.getbasetemp()
-    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "standards"
+        yield

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from playwright.sync_api import Browser, BrowserContext, Playwright, expect
@@ -10,6 +11,38 @@ from playwright.sync_api import Browser, BrowserContext, Playwright, expect
 SLOW = 120_000
 """Milliseconds that a slow machine may take until what is waited for is there."""
 expect.set_options(timeout=SLOW)
+
+_KINDS = {
+    "webgl": ("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    "plain": ("--disable-3d-apis",),
+}
+
+
+class Browsers(Mapping[str, Browser]):
+    """Chromium that draws labs without a graphics processor, and one without WebGL.
+
+    Each is started when it is first asked for, and once more should it have crashed.
+    """
+
+    def __init__(self, playwright: Playwright) -> None:
+        self._playwright = playwright
+        self._started: dict[str, Browser] = {}
+
+    def __getitem__(self, kind: str) -> Browser:
+        browser = self._started.get(kind)
+        if browser is None or not browser.is_connected():
+            browser = self._started[kind] = launch(self._playwright, *_KINDS[kind])
+        return browser
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_KINDS)
+
+    def __len__(self) -> int:
+        return len(_KINDS)
+
+    def close(self) -> None:
+        for browser in self._started.values():
+            browser.close()
 
 
 def launch(playwright: Playwright, *arguments: str) -> Browser:

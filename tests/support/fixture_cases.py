@@ -1,47 +1,73 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-`read_cases` gives the cases of a file; `rewritten` is its text with other expected parts.
+Entry point: `read_cases(path)`; `rewrite(path, cases)` writes them again. Lines before a title that
+are empty or begin with `#` are for readers of the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+_LINE = re.compile(r"[^\n]*\n|[^\n]+")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Case:
+    """One case of a fixture file."""
+
     title: str
     input: str
     expected: str
     line: int
-    """Where it begins in its file, from 1."""
+    """Of the title in the fixture file, from 1."""
+    remarks: str = ""
+    """The lines before the title, for readers."""
+
+    @property
+    def text(self) -> str:
+        """The case as it stands in the file."""
+        parts = (f"{self.title}\n", self.input, self.expected)
+        return self.remarks + "".join(f"{part}.\n" for part in parts)
 
 
 def read_cases(path: Path) -> list[Case]:
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    """The cases of a fixture file.
+
+    Raises:
+        ValueError: the file ends inside a case, or two cases have the same title.
+    """
+    lines = text_lines(path.read_text(encoding="utf-8"))
     cases: list[Case] = []
     at = 0
     while at < len(lines):
-        if not lines[at].strip():
+        start = at
+        while at < len(lines) and (lines[at].startswith("#") or not lines[at].strip()):
             at += 1
-            continue
-        marks = [i for i in range(at, len(lines)) if lines[i] == ".\n"][:3]
-        assert len(marks) == 3, f"{path}:{at + 1}: a case has three lines of a single dot"
-        first, second, third = marks
-        title = "".join(lines[at:first]).strip()
-        given, expected = "".join(lines[first + 1 : second]), "".join(lines[second + 1 : third])
-        cases.append(Case(title, given, expected, at + 1))
-        at = third + 1
+        if at == len(lines):
+            break
+        remarks, title_line, parts = "".join(lines[start:at]), at + 1, []
+        for _ in range(3):
+            end = next((i for i in range(at, len(lines)) if lines[i] == ".\n"), None)
+            if end is None:
+                raise ValueError(f"{path.name}:{title_line}: the case has no third `.`")
+            parts.append("".join(lines[at:end]))
+            at = end + 1
+        cases.append(Case(parts[0].rstrip("\n"), parts[1], parts[2], title_line, remarks))
     titles = [case.title for case in cases]
-    assert len(set(titles)) == len(titles), f"{path}: a title occurs twice"
+    if len(set(titles)) != len(titles):
+        raise ValueError(f"{path.name}: a title occurs twice")
     return cases
 
 
-def rewritten(cases: Sequence[Case], expected: Sequence[str]) -> str:
-    parts = (
-        f"{case.title}\n.\n{case.input}.\n{text}.\n"
-        for case, text in zip(cases, expected, strict=True)
-    )
-    return "\n".join(parts)
+def rewrite(path: Path, cases: Iterable[Case]) -> None:
+    """Write a fixture file anew."""
+    text = "".join(case.text for case in cases)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def text_lines(text: str) -> list[str]:
+    """Split at LF alone: a form feed in a lesson is no line end."""
+    return _LINE.findall(text)

@@ -5,7 +5,7 @@ textbook formula; with mpmath's unbounded exponents none of the cases that are h
 hard here.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mpmath
 import numpy as np
@@ -99,13 +99,29 @@ def turned(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
 
 def ulps_of(size: mpmath.mpf, got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
     """The largest error, in ulp of one common size."""
-    return float(max(abs(g - w) for g, w in zip(exact(got), want, strict=True)) / (ULP * size))
+    pairs = zip(exact(got), want, strict=True)
+    return _largest(abs(g - w) / (ULP * size) for g, w in pairs)
 
 
 def own_ulps(got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
     """The largest error, each in ulp of its entry, or in denormal steps if those are larger."""
-    pairs = list(zip(exact(got), want, strict=True))
-    return float(max(abs(g - w) / max(ULP * abs(w), DENORMAL) for g, w in pairs))
+    pairs = zip(exact(got), want, strict=True)
+    return _largest(abs(g - w) / max(ULP * abs(w), DENORMAL) for g, w in pairs)
+
+
+def _largest(errors: Iterable[mpmath.mpf]) -> float:
+    """The largest, or nan where there is one, which `max` alone may pass over."""
+    return float(max(errors, key=lambda error: (mpmath.isnan(error), error)))
+
+
+def beyond(bound: float, errors: Mapping[object, float]) -> list[str]:
+    """What to say of each case whose error, in ulp, is over the bound or is no number."""
+    assert errors, "no case was looked at"
+    return [
+        f"{case}: {error:.4g} ulp, over {bound}"
+        for case, error in errors.items()
+        if not error <= bound
+    ]
 
 
 def same_up_to_sign(got: ArrayLike, want: Sequence[mpmath.mpf]) -> Vector:

@@ -1,13 +1,10 @@
-"""Kills what writes files at every call of the system that it makes, and looks at what is left.
+"""Kills what writes files wherever it changes what a folder holds, and looks at what is left.
 
-    python killed_writers.py SCENARIO FOLDER
-
-A scenario is prepared afresh in FOLDER and run in a forked child that ends itself, without any
-cleaning up, at its first call that changes something on the disk; then again at its second; and so
-on until it gets through. A write that is hit has written half. After each death `whole` looks at
-what is there, the scenario is run to its end as the next run would, and `done` looks again.
-
-Prints how many deaths there were.
+A scenario is prepared afresh in a folder and run in a forked child that ends itself, without any
+cleaning up, at its first call that makes, renames, links, removes or saves a file or a folder; then
+again at its second; and so on until it gets through. A file that is opened to be written has been
+emptied by then, or holds half of the first that is written into it. After each death `whole` looks
+at what is there, the scenario is run to its end as the next run would, and `done` looks again.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ import io
 import itertools
 import os
 import shutil
-import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -31,56 +27,48 @@ from coursebuild.effects.site_swap import MARKER, publish, recover
 from coursebuild.effects.write import write_atomic
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 
-CALLS = (
-    "open",
-    "write",
-    "pwrite",
-    "close",
-    "fsync",
-    "rename",
-    "replace",
-    "link",
-    "unlink",
-    "rmdir",
-    "mkdir",
-    "chmod",
-    "fchmod",
-    "fchown",
-    "ftruncate",
-)
+CALLS = ("fsync", "rename", "replace", "link", "symlink", "unlink", "rmdir", "mkdir")
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 DIED = 9
 
 
 def arm(fatal: int) -> None:
     """Make this process end at its call number `fatal`."""
     counter = itertools.count(1)
+    dying = False
+    really_open, really_write, really_io_open = os.open, os.write, io.open
 
-    def deadly(name: str, really: Callable[..., Any]) -> Callable[..., Any]:
+    def deadly(really: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **named: Any) -> Any:
-            if next(counter) == fatal:
-                if name == "write":
-                    fd, data = arguments
-                    really(fd, bytes(data)[: len(data) // 2])
+            if next(counter) == fatal or dying:
                 os._exit(DIED)
             return really(*arguments, **named)
 
         return call
 
-    for name in CALLS:
-        setattr(os, name, deadly(name, getattr(os, name)))
-    before, after = deadly("before", lambda: None), deadly("after", lambda: None)
-    really_open = io.open
+    def deadly_open(path: Any, flags: int, *rest: Any, **named: Any) -> int:
+        nonlocal dying
+        if flags & WRITING and next(counter) == fatal:
+            dying = True
+        return really_open(path, flags, *rest, **named)
 
-    def deadly_open(file: Any, mode: str = "r", *rest: Any, **named: Any) -> Any:
-        if mode.startswith("r"):
-            return really_open(file, mode, *rest, **named)
-        before()
-        opened = really_open(file, mode, *rest, **named)
-        after()
+    def deadly_write(fd: int, data: Any) -> int:
+        if dying:
+            really_write(fd, bytes(data)[: len(data) // 2])
+            os._exit(DIED)
+        return really_write(fd, data)
+
+    def deadly_io_open(file: Any, mode: str = "r", *rest: Any, **named: Any) -> Any:
+        opened = really_io_open(file, mode, *rest, **named)
+        if not mode.startswith("r") and next(counter) == fatal:
+            os._exit(DIED)
         return opened
 
-    io.open = builtins.open = deadly_open  # type: ignore[assignment]
-    site_swap.exchange = deadly("exchange", site_swap.exchange)
+    for name in CALLS:
+        setattr(os, name, deadly(getattr(os, name)))
+    os.open, os.write = deadly_open, deadly_write
+    io.open = builtins.open = deadly_io_open  # type: ignore[assignment]
+    site_swap.exchange = deadly(site_swap.exchange)
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -299,7 +287,7 @@ class ExtractAndChange(Extract):
         super().again(root)
 
 
-KINDS = (
+SCENARIOS = (
     Publish,
     PublishByRenames,
     PublishAgain,
@@ -309,7 +297,6 @@ KINDS = (
     Extract,
     ExtractAndChange,
 )
-SCENARIOS = {kind.__name__: kind for kind in KINDS}
 
 
 def in_child(action: Callable[[], None]) -> int:
@@ -330,27 +317,23 @@ def die(scenario: Publish | Update | Extract, root: Path, fatal: int) -> None:
     scenario.run(root)
 
 
-def main(name: str, folder: Path) -> None:
-    scenario = SCENARIOS[name]()
+def deaths(kind: type[Publish | Update | Extract], folder: Path) -> int:
+    """Let a scenario die at each of its calls; how many there were."""
+    scenario = kind()
     for fatal in itertools.count(1):
         root = folder / str(fatal)
         root.mkdir()
         scenario.prepare(root)
-
         status = in_child(functools.partial(die, scenario, root, fatal))
-        assert status in (0, DIED), status
         try:
+            assert status in (0, DIED), status
             scenario.whole(root)
             scenario.again(root)
             scenario.done(root)
-        except AssertionError:
-            print(f"after death at call {fatal}:", file=sys.stderr)
+        except AssertionError as error:
+            error.add_note(f"after death at call {fatal}")
             raise
         shutil.rmtree(root)
         if status == 0:
-            print(fatal - 1)
-            return
-
-
-if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+            return fatal - 1
+    raise AssertionError

@@ -45,9 +45,9 @@ def xml_of(lab: Lab) -> str:
 class Bench:
     """Both engines."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, browser: LabEngine | None = None) -> None:
         self.native = NativeEngine(root)
-        self.browser = LabEngine()
+        self.browser = LabEngine() if browser is None else browser
 
     def trial(self, lab: Lab, wall: float = 30.0, **more: Any) -> dict[str, Any]:
         mjb = self.native.save("models/x.xml", xml_of(lab))

@@ -1,10 +1,6 @@
-"""Scratch courses, written out of the input of a fixture, and the fixture files themselves.
+"""Scratch courses, written out of the input of a fixture, and what is found in them.
 
-Entry points: `read_cases` (a fixture file), `Layout.of` (an input as files), `parts` (the same as
-texts).
-
-A fixture file holds cases: a title, the input and the expected text, each ended by a line that
-holds only `.`; what stands before a title on lines that begin with `#` is for its readers.
+Entry points: `Layout.of` (an input as files), `parts` (the same as texts), `Workshop` (checks).
 
 An input is the text of `content/lessons/1.1-first.md`, or several files, each after a line `=== …`:
 
@@ -26,6 +22,22 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
+
+from msgspec.structs import replace
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.lab_engine import LabEngine
+from coursebuild.effects.runner import ScriptServer
+from coursebuild.effects.shared import shared_cache
+from coursebuild.effects.store import Store
+from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.labs import Engines, try_labs
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.verify import compile_models
+from support.fixture_cases import text_lines
 
 FIRST = "content/lessons/1.1-first.md"
 SECOND = "content/lessons/1.2-second.md"
@@ -68,54 +80,8 @@ it runs
 """,
 }
 
-_LINE = re.compile(r"[^\n]*\n|[^\n]+")
 _HEADER = re.compile(r"=== (?:(crlf|bytes|link|folder|without|later) )?(\S.*)")
 _ESCAPE = re.compile(rb"\\(?:x([0-9a-f]{2})|(.))")
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One case of a fixture file."""
-
-    title: str
-    input: str
-    expected: str
-    line: int
-    """Of the title in the fixture file, from 1."""
-    remarks: str = ""
-    """The lines before the title, for readers."""
-
-    @property
-    def text(self) -> str:
-        """The case as it stands in the file."""
-        parts = [f"{self.title}\n", self.input, self.expected]
-        return self.remarks + "".join(f"{part}.\n" for part in parts)
-
-
-def read_cases(path: Path) -> list[Case]:
-    """The cases of a fixture file.
-
-    Raises:
-        ValueError: the file ends inside a case.
-    """
-    lines = _lines(path.read_text(encoding="utf-8"))
-    cases: list[Case] = []
-    at = 0
-    while at < len(lines):
-        start = at
-        while at < len(lines) and (lines[at].startswith("#") or not lines[at].strip()):
-            at += 1
-        if at == len(lines):
-            break
-        remarks, title_line, parts = "".join(lines[start:at]), at + 1, []
-        for _ in range(3):
-            end = next((i for i in range(at, len(lines)) if lines[i] == ".\n"), None)
-            if end is None:
-                raise ValueError(f"{path.name}:{title_line}: the case has no third `.`")
-            parts.append("".join(lines[at:end]))
-            at = end + 1
-        cases.append(Case(parts[0].rstrip("\n"), parts[1], parts[2], title_line, remarks))
-    return cases
 
 
 @dataclass(slots=True)
@@ -154,9 +120,12 @@ class Layout:
                 self.folders.append(path)
             case "without":
                 del self.files[path]
+            case other:
+                raise ValueError(f"no kind of file {other!r}")
 
     def write(self, root: Path) -> None:
-        """Put all but the later files into a folder."""
+        """Put all but the later files into a folder, which is made."""
+        root.mkdir(parents=True, exist_ok=True)
         for folder in self.folders:
             (root / folder).mkdir(parents=True)
         for path, data in self.files.items():
@@ -165,10 +134,10 @@ class Layout:
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).symlink_to(target)
 
-
-def _lines(text: str) -> list[str]:
-    """Split at LF alone: a form feed in a lesson is no line end."""
-    return _LINE.findall(text)
+    def write_later(self, root: Path) -> None:
+        """Put the later files there."""
+        for path, data in self.later.items():
+            put(root / path, data)
 
 
 def put(path: Path, data: bytes) -> None:
@@ -184,7 +153,7 @@ def parts(text: str) -> Iterator[tuple[str, str, str]]:
         return
     header: re.Match[str] | None = None
     body: list[str] = []
-    for line in _lines(text):
+    for line in text_lines(text):
         found = _HEADER.fullmatch(line.rstrip("\n"))
         if found is None:
             body.append(line)
@@ -200,3 +169,54 @@ def _byte(found: re.Match[bytes]) -> bytes:
     if found[1]:
         return bytes([int(found[1], 16)])
     return {b"n": b"\n", b"r": b"\r", b"t": b"\t", b"\\": b"\\"}[found[2]]
+
+
+class Workshop:
+    """What checks of many small courses share: results, the process of scripts, both engines."""
+
+    def __init__(self, folder: Path) -> None:
+        self._results = shared_cache(str(folder / "results"))
+        self._scripts = ScriptServer()
+        self._engines = OpenEngines(folder)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._scripts.close()
+        self._engines.close()
+
+    def options(self, root: Path, *, fresh: bool = False) -> Options:
+        """For a command on a course; `fresh`: all is to be made again."""
+        store = Store(root, shared=self._results, fresh=fresh)
+        return Options(root, jobs=1, quiet=True, cache=store, run_all=self._scripts.run)
+
+    def try_labs(self, root: Path, browser: LabEngine | None = None) -> tuple[Diagnostic, ...]:
+        """What is found in a course whose scripts are not run; `browser` may be another engine."""
+        loaded = load(root)
+        assert loaded.course is not None
+        options = self.options(root)
+        models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
+        engines = self._engines if browser is None else self._engines.with_browser(browser)
+        # What labs did is not shared: it would not be tried by another engine.
+        own = replace(options, cache=Store(root))
+        _, found = try_labs(loaded.course, dict(models), own, engines, wrong=wrong)
+        diagnostics = [*loaded.diagnostics, *wrong, *found]
+        return judge(loaded.course, diagnostics, (), 0.0, lessons=2).diagnostics
+
+
+class OpenEngines(Engines):
+    """Both engines of labs, which stay for the next course."""
+
+    def __exit__(self, *_: object) -> None:
+        """Leave them open."""
+
+    def close(self) -> None:
+        """End them."""
+        super().__exit__()
+
+    def with_browser(self, browser: LabEngine) -> Engines:
+        """The same native engine, beside another one."""
+        engines = OpenEngines.__new__(OpenEngines)
+        engines.native, engines.browser = self.native, browser
+        return engines

@@ -1,4 +1,4 @@
-"""What the tests of the runner share: to run scripts in both ways, and to watch processes."""
+"""What the tests of the runner share: scripts to be run in both ways, and processes to watch."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+
+import pytest
 
 from coursebuild.effects import runner
-from coursebuild.results import ScriptJob, ScriptRun
+from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
 SOURCE_TREE = Path(runner.__file__).parents[2]
 Run = Callable[..., ScriptRun]
-way = {"fork": True}
+both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=True)
+"""Scripts are run forked from a server, and each with an interpreter of its own: a smoke test."""
 TOOL = """
 import sys
 from pathlib import Path
@@ -28,10 +30,6 @@ except KeyboardInterrupt:
     print("interrupted")
 """
 """A command that runs scripts; its arguments: a folder, how many, and whether forked."""
-
-
-def run_scripts(*args: Any, **options: Any) -> tuple[ScriptRun, ...]:
-    return runner.run_scripts(*args, **way, **options)
 
 
 def job(
@@ -57,18 +55,32 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
+def wait_until(happened: Callable[[], object], what: str = "") -> None:
+    """Look again and again; what takes two minutes hangs."""
+    until = time.monotonic() + 120
+    while not happened():
+        assert time.monotonic() < until, f"this never came: {what}"
+        time.sleep(0.005)
+
+
 def wait_for(path: Path) -> int:
     """The process whose number a script writes into a file."""
-    until = time.monotonic() + 120
-    while time.monotonic() < until:
-        if path.exists() and path.read_text():
-            return int(path.read_text())
-        time.sleep(0.005)
-    raise AssertionError(f"{path} was never written")
+    wait_until(lambda: path.exists() and path.read_text(), str(path))
+    return int(path.read_text())
 
 
-def gone(pid: int, seconds: float = 120.0) -> bool:
-    until = time.monotonic() + seconds
-    while alive(pid) and time.monotonic() < until:
-        time.sleep(0.005)
-    return not alive(pid)
+def gone(pid: int) -> bool:
+    """That a process ends."""
+    wait_until(lambda: not alive(pid), f"the end of process {pid}")
+    return True
+
+
+def hangs(run: Run, code: str, said: Callable[[str], object] = bool) -> ScriptRun:
+    """What a script that does not end does, given a limit that lets it say something before."""
+    for limit in (0.5, 8.0, 120.0):
+        result = run(code, timeout=limit)
+        assert result.outcome is Outcome.TIMEOUT
+        assert result.seconds >= limit
+        if said(result.stdout):
+            break
+    return result

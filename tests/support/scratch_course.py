@@ -19,7 +19,7 @@ from coursebuild.effects.prune import HASH
 from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]
-SLUGS = ("one", "two", "three", "four", "five", "six")
+SLUGS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 HELLO = 'print("hello", 3.14159)\n'
 
 

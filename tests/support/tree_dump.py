@@ -6,6 +6,7 @@ Spans are `line:column-line:column`, from 1, the end exclusive.
 from __future__ import annotations
 
 from collections.abc import Iterator
+
 from msgspec.structs import fields
 
 from coursebuild.diagnostics import Diagnostic, Parsed

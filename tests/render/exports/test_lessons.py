@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from typing import Any
 
 import nbformat
@@ -15,10 +14,11 @@ from msgspec.structs import replace
 
 from coursebuild.render import SiteOptions, check_links
 from coursebuild.render.exports import twin
+from coursebuild.render.exports.book import books
+from coursebuild.render.library import Library
 from coursebuild.render.urls import Place
 from coursebuild.results import Outcome, OutputFile, ScriptRun
-
-Make = Callable[..., Any]
+from support.rendered_course import MAP, Made, Make
 
 LESSON = """## Part {#part}
 
@@ -237,11 +237,26 @@ def test_the_whole_course_is_one_page(files: dict[str, bytes]) -> None:
     assert check_links(sound, "https://example.org/course/") == ()
 
 
-def test_a_long_course_is_a_page_for_each_level(
-    make: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("coursebuild.render.exports.book.MOST", 1)
-    files = site(make)
+def long_course(make: Make, written: int) -> Made:
+    """A course of so many written lessons, of which those that `MAP` names link to each other."""
+    more = [f"1.{number}" for number in range(3, written + 1)]
+    lesson = '[[level.lesson]]\nid = "{0}"\nslug = "x"\ntitle = "X"\nstatus = "draft"\n\n'
+    texts = {"1.1": OTHER, **dict.fromkeys(more, "Text.")}
+    return make(LESSON, course=MAP + "".join(map(lesson.format, more)), **texts)
+
+
+def test_a_course_is_one_page_up_to_250_lessons(make: Make) -> None:
+    def pages(written: int) -> list[str]:
+        made = long_course(make, written)
+        return [book.path for book in books(Library.of(made.course, made.results, made.assets))]
+
+    assert pages(250) == ["course/index.html"]
+    assert pages(251) == ["course/index.html", "course/0.html", "course/1.html"]
+
+
+@pytest.mark.site
+def test_a_longer_course_is_a_page_for_each_level(make: Make) -> None:
+    files = long_course(make, 251).site()
     assert {path for path in files if path.startswith("course/")} == {
         "course/0.html",
         "course/1.html",

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.render.exports import tags
 from coursebuild.render.exports.addresses import filled, site_path, xml_id
 from coursebuild.render.exports.cut import Cut
 from coursebuild.render.exports.rewrite import Rewriter, Rules
-from coursebuild.render.exports.tags import VOID, End, Start, pieces
+from coursebuild.render.exports.tags import VOID, End, Start, pieces, read
 from coursebuild.render.formulas import Woven
 from coursebuild.render.mathml import is_ours
 from coursebuild.render.settling import settle_with
@@ -66,7 +65,6 @@ OURS = st.sampled_from(
 ALL = st.lists(st.one_of(OURS, PIECES), max_size=20).map("".join)
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.one_of(PAGES, ALL))
 def test_whatever_is_written_becomes_well_formed(html: str) -> None:
     ElementTree.fromstring(f"<body>{xml(html)}</body>".encode("utf-8", "replace"))
@@ -119,14 +117,14 @@ RULES = (
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150)
 @given(st.sampled_from(RULES), ALL)
 def test_runs_are_what_their_tags_become(rules: Rules, html: str) -> None:
     slowly, fast = Slowly(rules), Rewriter(rules)
     assert fast.text(html) == slowly.text(html)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150)
 @given(st.sampled_from(RULES), ALL, st.sampled_from(("", "\x01", "<h1>&lt;</h1>\n<p>")))
 def test_formulas_that_were_settled_are_what_their_tags_become(
     rules: Rules, html: str, before: str
@@ -137,7 +135,6 @@ def test_formulas_that_were_settled_are_what_their_tags_become(
     assert fast.of(Cut(whole)) == slowly.text(whole.html)
 
 
-@settings(deadline=None)
 @given(ALL)
 def test_a_cut_text_is_whole(html: str) -> None:
     for woven in (Woven((html,)), settle_with(html, html)[1]):
@@ -309,11 +306,9 @@ ATTRIBUTES = st.sampled_from(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(name=NAMES, attributes=st.lists(ATTRIBUTES, max_size=4).map("".join))
-def test_a_tag_as_most_are_is_read_as_any(name: str, attributes: str) -> None:
-    mark = f"<{name}{attributes}>"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tags, "_PLAIN", re.compile("(?!)"))
-        slowly = tags._read(mark)
-    assert tags._read(mark) == slowly
+def test_a_blank_before_the_end_of_a_tag_changes_nothing(name: str, attributes: str) -> None:
+    """Though a tag without one is mostly read in a quicker way."""
+    (close, *rest), loose = read(f"<{name}{attributes}>"), read(f"<{name}{attributes} >")
+    assert [close, *rest] == [*loose] or {type(close), *map(type, loose)} == {str}

@@ -1,0 +1,102 @@
+"""Courses made of texts, without files, and what checks say of them.
+
+Entry points: `make_course`; `told`, a diagnostic in a line: its rule and what it points at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from msgspec.structs import replace
+
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.model import Course, Document, MjcfModel
+from coursebuild.results import ModelFacts
+from coursebuild.source import Source
+from coursebuild.syntax.coursemap import parse_course_map
+from coursebuild.syntax.document import parse_document
+from coursebuild.syntax.scenarios import parse_declarations
+from coursebuild.vocabulary import CALLOUTS
+
+KINDS = frozenset(kind.name for kind in CALLOUTS)
+LESSON = """
+[[level.lesson]]
+id = "{0}"
+slug = "{1}"
+title = "T"
+status = "{2}"
+"""
+MAP = (
+    '[course]\ntitle = "T"\n[[level]]\nid = "1"\ntitle = "One"\n'
+    + LESSON.format("1.1", "first", "complete")
+    + LESSON.format("1.2", "second", "draft")
+    + LESSON.format("1.3", "third", "planned")
+    + '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n'
+)
+BOX = "<mujoco>\n  <worldbody/>\n</mujoco>\n"
+
+
+def make_course(
+    first: str = "Text.\n",
+    second: str = "Text.\n",
+    about: str = "Text.\n",
+    *,
+    models: Mapping[str, str] | None = None,
+    declared: Mapping[str, str] | None = None,
+    files: Iterable[str] = (),
+) -> Course:
+    """A course of two lessons, a planned one and a page.
+
+    `models` and `declared` are the texts of `models/NAME.xml` and `models/NAME.toml` by name.
+    """
+    course = parse_course_map(Source("content/course.toml", MAP)).value
+    assert course is not None
+    (level,) = course.levels
+    one, two, planned = level.lessons
+    lessons = (
+        replace(one, document=document(one.path, first)),
+        replace(two, document=document(two.path, second)),
+        planned,
+    )
+    (page,) = course.pages
+    declarations = [
+        parse_declarations(Source(f"models/{name}.toml", text)).value
+        for name, text in (declared or {}).items()
+    ]
+    return replace(
+        course,
+        levels=(replace(level, lessons=lessons),),
+        pages=(replace(page, document=document(page.path, about)),),
+        models=tuple(
+            MjcfModel(name, Source(f"models/{name}.xml", text))
+            for name, text in (models or {}).items()
+        ),
+        files=tuple(files),
+        declarations=tuple(one for one in declarations if one is not None),
+    )
+
+
+def document(path: str, text: str) -> Document:
+    """A text without mistakes of its own."""
+    parsed = parse_document(Source(path, text), KINDS, lesson="lessons" in path)
+    assert parsed.diagnostics == (), [d.message for d in parsed.diagnostics]
+    return parsed.value
+
+
+def told(diagnostics: Iterable[Diagnostic]) -> list[str]:
+    """The rule of each, and the text that it points at."""
+    return [f"{d.rule}: {d.span.text}" for d in diagnostics]
+
+
+def said(diagnostics: Iterable[Diagnostic]) -> list[str]:
+    """The message of each, with its help."""
+    return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
+
+
+def facts(**known: Any) -> ModelFacts:
+    """What a compiled model holds; nothing, but for what is said."""
+    empty: dict[str, Any] = dict.fromkeys(("bodies", "geoms", "joints", "nq", "nv", "nu"), 0)
+    empty |= {"timestep": 0.002, "integrator": "Euler", "total_mass": 0.0}
+    empty |= dict.fromkeys(("keyframes", "sites", "body_names"), ())
+    return ModelFacts(**(empty | known))

@@ -1,0 +1,225 @@
+"""Small courses made without files: a map, texts, and what running them is said to have found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from coursebuild.model import (
+    Course,
+    Document,
+    Math,
+    MathBlock,
+    MjcfModel,
+    Recording,
+    Script,
+    document_blocks,
+    document_inlines,
+)
+from coursebuild.render import Assets, FontJob, SiteOptions, render_site
+from coursebuild.render.context import PageContext
+from coursebuild.render.library import Library
+from coursebuild.render.urls import Place, lesson_path
+from coursebuild.results import (
+    CompileResult,
+    Formula,
+    ModelFacts,
+    Outcome,
+    Results,
+    ScriptRun,
+    Verdict,
+)
+from coursebuild.source import Source
+from coursebuild.syntax.coursemap import parse_course_map
+from coursebuild.syntax.document import parse_document
+from coursebuild.vocabulary import CALLOUTS
+
+ROOT = Path(__file__).parents[2]
+
+MAP = r"""
+[course]
+title = "Bodies & <axes>"
+summary = "A \"short\" course."
+language = "en"
+base_url = "https://example.org/course/"
+repository = "https://example.org/repo"
+licence = "CC-BY-4.0"
+engine = "3.14.0"
+
+[[page]]
+id = "about"
+title = "About"
+file = "content/pages/about.md"
+
+[[level]]
+id = "0"
+title = "Start"
+summary = "First things."
+
+[[level.lesson]]
+id = "0.1"
+slug = "falling"
+title = "Falling"
+status = "complete"
+summary = "A body falls."
+objectives = ["Say what falls", "Measure it"]
+minutes = 20
+
+[[level]]
+id = "1"
+title = "More"
+
+[[level.lesson]]
+id = "1.1"
+slug = "spinning"
+title = "Spinning <fast>"
+status = "draft"
+prerequisites = ["0.1"]
+
+[[level.lesson]]
+id = "1.2"
+slug = "later"
+title = "Later"
+status = "planned"
+summary = "Comes later."
+prerequisites = ["1.1"]
+minutes = 1
+"""
+
+BOX = '<mujoco model="box">\n  <worldbody/>\n</mujoco>\n'
+
+
+def read_assets() -> Assets:
+    """The templates of this checkout and the bundle that was made from it."""
+    templates, dist = ROOT / "templates", ROOT / "site" / "dist"
+    assert (dist / "fonts" / "fonts.json").is_file(), "no bundle: run `python site/bundle.py`"
+    return Assets(
+        tuple(
+            (path.relative_to(templates).as_posix(), path.read_text(encoding="utf-8"))
+            for path in sorted(templates.rglob("*"))
+            if path.is_file()
+        ),
+        tuple(
+            (path.relative_to(dist).as_posix(), path.read_bytes())
+            for path in sorted(dist.rglob("*"))
+            if path.is_file()
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A course, what running it is said to have found, and the tool's own files."""
+
+    course: Course
+    results: Results
+    assets: Assets
+
+    def page(self, lesson: str = "0.1") -> PageContext:
+        """The context of a lesson's page."""
+        library = Library.of(self.course, self.results, self.assets)
+        found = library.lessons[lesson]
+        assert found.document is not None
+        return PageContext.of(library, Place(lesson_path(found)), found.document)
+
+    def html(self, lesson: str = "0.1") -> str:
+        """The text of a lesson as HTML."""
+        page = self.page(lesson)
+        return f"{page.blocks(page.document.blocks)}\n{page.footnotes()}"
+
+    def site(self, options: SiteOptions | None = None) -> dict[str, bytes]:
+        """The whole site; fonts are not cut, to save time."""
+        options = options or SiteOptions(subset=whole_font)
+        files = render_site(self.course, self.results, self.assets, options)
+        assert [file.path for file in files] == sorted({file.path for file in files})
+        return {file.path: file.data for file in files}
+
+
+def whole_font(job: FontJob) -> bytes:
+    return job.data
+
+
+@dataclass(frozen=True, slots=True)
+class Make:
+    """Makes courses of texts."""
+
+    assets: Assets
+
+    def __call__(
+        self,
+        text: str,
+        *,
+        course: str = MAP,
+        runs: Mapping[str, ScriptRun] | None = None,
+        status: str = "verified",
+        **texts: str,
+    ) -> Made:
+        """A course of one lesson's text (0.1); other texts by id."""
+        parsed = parse_course_map(Source("content/course.toml", course))
+        assert parsed.value is not None and not parsed.diagnostics, parsed.diagnostics
+        made = with_documents(
+            parsed.value, {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
+        )
+        return Made(made, results_of(made, runs or {}, status), self.assets)
+
+
+def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
+    known = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
+
+    def document(id: str, path: str, lesson: bool) -> Document | None:
+        if id not in texts:
+            return None
+        parsed = parse_document(Source(path, texts[id]), known, lesson=lesson)
+        assert not parsed.diagnostics, parsed.diagnostics
+        return parsed.value
+
+    levels = tuple(
+        replace(
+            level,
+            lessons=tuple(replace(x, document=document(x.id, x.path, True)) for x in level.lessons),
+        )
+        for level in course.levels
+    )
+    pages = tuple(
+        replace(page, document=document(page.id, page.path, False)) for page in course.pages
+    )
+    models = (MjcfModel("box", Source("models/box.xml", BOX)),)
+    return replace(course, levels=levels, pages=pages, models=models)
+
+
+def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
+    """Every script printed `one`, `two` unless `runs` says otherwise; every formula is its TeX."""
+    made: list[ScriptRun] = []
+    verdicts: list[Verdict] = []
+    formulas: dict[Formula, str] = {}
+    for document in course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, Script):
+                ran = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
+                made.append(runs.get(block.path, ran))
+            elif isinstance(block, Recording):
+                comparison = block.comparison or course.comparison
+                verdicts.append(Verdict(block, comparison, status))  # type: ignore[arg-type]
+            elif isinstance(block, MathBlock):
+                formulas[Formula(block.tex.text, True)] = mathml(block.tex.text, "display")
+        for inline in document_inlines(document):
+            if isinstance(inline, Math):
+                formulas[Formula(inline.tex.text, inline.display)] = mathml(
+                    inline.tex.text, "inline"
+                )
+    facts = ModelFacts(1, 2, 1, 7, 6, 0, 0.002, "RK4", 1.5, ("start", ""), (), ("box",))
+    return Results(
+        tuple(made),
+        tuple(verdicts),
+        tuple(formulas.items()),
+        (("box", CompileResult("", None, facts)),),
+        "3.11.7",
+        "3.14.0",
+    )
+
+
+def mathml(tex: str, kind: str) -> str:
+    return f'<math class="{kind}"><mi>{tex.strip()}</mi></math>'
