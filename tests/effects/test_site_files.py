@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from coursebuild.effects import pool, site_files
-from coursebuild.effects.aside import Aside
 from coursebuild.effects.published import Entry
 from coursebuild.effects.site_files import writing
 from coursebuild.results import KeptFile, OutputFile, SiteFile
@@ -31,14 +30,12 @@ def pieces(count: int) -> Iterator[bytes]:
     return (b"%d\n" % n for n in range(count))
 
 
-def many(tmp_path: Path) -> list[tuple[SiteFile, str]]:
-    """Of all kinds: bytes, made, in pieces, and put aside in this process."""
-    aside = Aside(tmp_path)
+def many() -> list[tuple[SiteFile, str]]:
+    """Of all kinds: bytes, made, and in pieces."""
     files: list[tuple[SiteFile, str]] = []
     for n in range(60):
         files.append((OutputFile(f"a/{n}", b"%d" % n), f"{n}"))
         files.append(kept(f"b/{n}", lambda n=n: b"made %d" % n * n))  # type: ignore[misc]
-        files.append(kept(f"d/{n}", aside.put(b"aside %d" % n)))
         piece = KeptFile(
             f"c/{n}",
             "k",
@@ -50,7 +47,7 @@ def many(tmp_path: Path) -> list[tuple[SiteFile, str]]:
 
 
 def write(folder: Path, files: list[tuple[SiteFile, str]], jobs: int) -> dict[str, Entry]:
-    for top in "abcd":
+    for top in "abc":
         (folder / top).mkdir(parents=True)
     with writing(folder, files, jobs) as written:
         return written()
@@ -71,7 +68,7 @@ def check(folder: Path, files: list[tuple[SiteFile, str]], entries: dict[str, En
 
 
 def test_copies_write_what_one_process_does(tmp_path: Path) -> None:
-    files = many(tmp_path)
+    files = many()
     alone = write(tmp_path / "alone", files, 1)
     check(tmp_path / "alone", files, alone)
     together = write(tmp_path / "together", files, 3)
@@ -117,7 +114,7 @@ def test_what_is_put_together_of_all_lessons_comes_first(tmp_path: Path) -> None
 
 def test_copies_that_are_killed(tmp_path: Path) -> None:
     """What they have begun is written anew, here."""
-    files = many(tmp_path)
+    files = many()
     here = os.getpid()
 
     def die() -> bytes:
@@ -134,7 +131,7 @@ def test_copies_that_are_killed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_a_file_raises_is_raised(tmp_path: Path, jobs: int) -> None:
-    files = many(tmp_path)
+    files = many()
 
     def fail() -> bytes:
         raise OSError(28, "No space left on device")
@@ -146,5 +143,5 @@ def test_what_a_file_raises_is_raised(tmp_path: Path, jobs: int) -> None:
 
 def test_few_files_are_written_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "fork", lambda: pytest.fail("nobody needs a copy"))
-    files = many(tmp_path)[: site_files._MANY - 1]
+    files = many()[: site_files._MANY - 1]
     check(tmp_path / "site", files, write(tmp_path / "site", files, 8))

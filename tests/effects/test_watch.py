@@ -1,11 +1,9 @@
-"""Watching a course: both ways of it tell the same."""
+"""Watching a course: every change of its files is told of, and nothing else."""
 
 from __future__ import annotations
 
-import gc
 import os
 import shutil
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,14 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import watch_inotify
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.watch import Watcher, watcher
-from coursebuild.effects.watch_files import FilesWatcher
-from coursebuild.effects.watch_inotify import InotifyWatcher
+from coursebuild.effects.watch import Watcher
 
-LINUX = pytest.mark.skipif(sys.platform != "linux", reason="inotify is Linux's")
-WAYS = [pytest.param(InotifyWatcher, marks=LINUX), FilesWatcher]
 LESSON = "content/lessons/1.1-one.md"
 
 
@@ -33,9 +25,9 @@ def root(tmp_path: Path) -> Path:
     return root
 
 
-@pytest.fixture(params=WAYS)
-def saves(request: pytest.FixtureRequest, root: Path) -> Iterator[Watcher]:
-    found: Watcher = request.param(root)
+@pytest.fixture
+def saves(root: Path) -> Iterator[Watcher]:
+    found = Watcher(root)
     found.watch_also(frozenset({"docs/guide.md", "own.md", LESSON}))
     found.start()
     found.wait()
@@ -57,13 +49,12 @@ def told(saves: Watcher, wanted: set[str], seconds: float = 120.0) -> set[str]:
 
 
 def told_of_a_save(root: Path, saves: Watcher, path: str) -> None:
-    """The portable one begins with what is in a new folder when it gets to it."""
+    """A new folder is watched a moment after it is there: its files are saved until then."""
     until = time.monotonic() + 120
     found: frozenset[str] = frozenset()
     while path not in found:
         assert time.monotonic() < until
-        if not found or isinstance(saves, FilesWatcher):
-            (root / path).write_text("more")
+        (root / path).write_text("more")
         found |= saves.get(1.0)
 
 
@@ -148,119 +139,21 @@ def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: Watcher
     told_of_a_save(root, saves, "docs/guide.md")
 
 
-@LINUX
-class TestInotify:
-    @pytest.fixture
-    def linux(self, root: Path) -> InotifyWatcher:
-        found = InotifyWatcher(root)
-        found.start()
-        return found
+def test_files_in_a_linked_folder(root: Path, saves: Watcher) -> None:
+    (root / "far").mkdir()
+    (root / "content/near").symlink_to(root / "far")
+    told(saves, {"content/near"})
+    told_of_a_save(root, saves, "content/near/a.svg")
 
-    def test_it_is_what_linux_has(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.delenv("WATCHFILES_FORCE_POLLING", raising=False)
-        assert isinstance(watcher(root), InotifyWatcher) != ("microsoft" in os.uname().release)
-        monkeypatch.setenv("WATCHFILES_FORCE_POLLING", "1")
-        assert isinstance(watcher(root), FilesWatcher)
 
-    def test_a_file_is_told_of_when_it_is_closed(self, root: Path, linux: InotifyWatcher) -> None:
-        def write() -> None:
-            with (root / LESSON).open("w") as file:
-                for _ in range(20):
-                    file.write("x")
-                    file.flush()
-                    time.sleep(0.0002)
+def test_odd_names(root: Path, saves: Watcher) -> None:
+    for name in ("a\nb.md", "é ß.md", "x" * 255):
+        (root / "content" / name).write_text("x")
+        told(saves, {f"content/{name}"})
 
-        thread = threading.Thread(target=write)
-        thread.start()
-        while not linux.get(1.0) or linux.writing:
-            pass
-        assert (root / LESSON).read_text() == 20 * "x"
-        thread.join()
 
-    def test_who_keeps_a_file_open_is_not_waited_for(
-        self, root: Path, linux: InotifyWatcher
-    ) -> None:
-        with (root / LESSON).open("w") as file:
-            file.write("x")
-            file.flush()
-            began = time.monotonic()
-            assert linux.get(600.0) == {LESSON}
-            assert time.monotonic() - began < 300.0
-            assert linux.writing
-            assert not linux.get(0.05)
-            assert not linux.writing  # nothing more was written
-        assert linux.get(1.0) == {LESSON}  # it is closed
-
-    def test_a_moved_folder(self, root: Path, linux: InotifyWatcher) -> None:
-        (root / "content/lessons").rename(root / "content/others")
-        assert told(linux, {"content/lessons"}) >= {"content/others", "content/others/1.1-one.md"}
-        (root / "content/others/1.1-one.md").write_text("x")
-        assert linux.get(1.0) == {"content/others/1.1-one.md"}
-        (root / "content/others").rename(root / "away")
-        assert linux.get(1.0) == {"content/others"}
-        (root / "away/1.1-one.md").write_text("y")
-        assert not linux.get(0.1)
-
-    def test_a_folder_that_another_took_the_place_of(
-        self, root: Path, linux: InotifyWatcher
-    ) -> None:
-        shutil.copytree(root / "content", root / "new")
-        (root / "content").rename(root / "old")
-        (root / "new").rename(root / "content")
-        assert "content" in told(linux, {"content"})
-        (root / LESSON).write_text("x")
-        assert linux.get(1.0) == {LESSON}
-        (root / "old/lessons/1.1-one.md").write_text("x")
-        assert not linux.get(0.1)
-
-    def test_links_to_folders(self, root: Path, linux: InotifyWatcher) -> None:
-        (root / "far").mkdir()
-        (root / "content/near").symlink_to(root / "far")
-        (root / "content/loop").symlink_to(root / "content")
-        told(linux, {"content/near", "content/loop"})
-        (root / "far/a.svg").write_text("x")
-        assert linux.get(1.0) == {"content/near/a.svg"}
-        (root / LESSON).write_text("x")
-        assert linux.get(1.0) == {LESSON}
-        (root / "content/near").unlink()
-        assert linux.get(1.0) == {"content/near"}
-        (root / "far/a.svg").write_text("y")
-        assert not linux.get(0.1)
-
-    def test_more_than_the_kernel_keeps(
-        self, root: Path, linux: InotifyWatcher, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(linux._kernel, "messages", lambda: [(-1, watch_inotify._OVERFLOW, "")])
-        assert "content" in linux.get(1.0)
-        (root / LESSON).write_text("x")
-        assert linux.get(1.0) == {LESSON}
-
-    def test_odd_names(self, root: Path, linux: InotifyWatcher) -> None:
-        for name in ("a\nb.md", "é ß.md", os.fsdecode(b"\xff.md"), "x" * 255):
-            (root / "content" / name).write_text("x")
-            assert linux.get(1.0) == {f"content/{name}"}
-
-    def test_it_ends_at_once(self, linux: InotifyWatcher) -> None:
-        threading.Timer(0.05, linux.stop).start()
-        began = time.monotonic()
-        assert not linux.get(600.0)
-        assert time.monotonic() - began < 300.0
-
-    def test_descriptors_are_given_back(self, root: Path) -> None:
-        gc.collect()  # what others left goes now, and not meanwhile
-        before = len([*Path("/proc/self/fd").iterdir()])
-        for _ in range(5):
-            found = InotifyWatcher(root)
-            found.start()
-            found.stop()
-            del found
-        assert len([*Path("/proc/self/fd").iterdir()]) <= before
-
-    def test_too_many_folders(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        def full(*_: object) -> None:
-            raise OSError(28, "no space")
-
-        found = InotifyWatcher(root)
-        monkeypatch.setattr(found._kernel, "watch", full)
-        with pytest.raises(EffectError, match="changes of files cannot be watched: no space left"):
-            found.start()
+def test_who_waits_is_woken_when_watching_ends(saves: Watcher) -> None:
+    thread = threading.Thread(target=saves.stop)
+    thread.start()
+    assert not saves.get(600.0)
+    thread.join()

@@ -9,7 +9,6 @@ import pytest
 from coursebuild.effects.store import Store
 from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
-from support.edited_course import nothing_is_held as nothing_is_held
 
 pytestmark = pytest.mark.site
 

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from support.edited_course import LESSON, NORUN, QUIZ, Course
-from support.edited_course import nothing_is_held as nothing_is_held
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site

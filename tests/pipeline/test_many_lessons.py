@@ -61,8 +61,6 @@ def peak(folder: Folder) -> int:
 @pytest.fixture
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Caches of a fixed size are left out: they would be filled by the longer course only."""
-    monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
-    monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
     monkeypatch.setattr("coursebuild.pipeline.reading._COLLECT", 4)
     monkeypatch.setattr("coursebuild.render.exports.chapters._ROOM", 0)
     monkeypatch.setattr("coursebuild.render.search.counting._MOST", 0)
@@ -118,16 +116,16 @@ def test_a_course_whose_store_is_whole_or_damaged(tmp_path: Path, stores: Path) 
             }
         return {path: data for path, data in clean.items() if made.get(path) != data}
 
-    def packs() -> set[Path]:
-        return set((folder.root / ".coursebuild" / "packs").iterdir())
+    def entries() -> dict[Path, int]:
+        return {path: path.stat().st_ino for path in (folder.root / ".coursebuild").glob("*/*")}
 
     marker = {".coursebuild-site", "files.json"}  # what publishing adds
-    before = packs()
+    before = entries()
     assert again().keys() == marker
-    assert packs() == before, "nothing was made"
+    assert entries() == before, "nothing was made"
     assert folder.spoil() > 3 * 40
     assert again().keys() == marker
-    assert packs() > before
-    before = packs()
+    mended = entries()
+    assert mended != before
     assert again().keys() == marker
-    assert packs() == before, "what was made again is found"
+    assert entries() == mended, "what was made again is found"

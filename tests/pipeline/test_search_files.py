@@ -84,9 +84,10 @@ def test_every_page_is_listed_in_the_order_of_the_course(folder: Folder) -> None
 
 def test_a_store_that_cannot_be_written_is_no_matter(folder: Folder) -> None:
     before = index(folder)
-    store = folder.root / ".coursebuild" / "packs"
-    shutil.rmtree(store)
-    store.write_text("in the way")
+    store = folder.root / ".coursebuild"
+    for kind in ("search", "pages", "outlines"):
+        shutil.rmtree(store / kind)
+        (store / kind).write_text("in the way")
     lesson = "content/lessons/1.7-l7.md"
     folder.write(lesson, folder.text(lesson) + "\n")
     assert folder.main("build", "--quiet").status == 0

@@ -97,14 +97,6 @@ def drawn(folder: Folder) -> set[str]:
         return set(prepared.drawn)
 
 
-@pytest.fixture(autouse=True)
-def nothing_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Documents are fetched anew each time, as they are in a long course."""
-    monkeypatch.setattr("coursebuild.pipeline.shelf.ROOM", 0)
-    monkeypatch.setattr("coursebuild.pipeline.shelf._LAST", 0)
-    monkeypatch.setattr("coursebuild.pipeline.reading.ROOM", 0)
-
-
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Course:
     folder = Folder(tmp_path / "course")
