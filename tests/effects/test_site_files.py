@@ -33,7 +33,7 @@ def pieces(count: int) -> Iterator[bytes]:
 def many() -> list[tuple[SiteFile, str]]:
     """Of all kinds: bytes, made, and in pieces."""
     files: list[tuple[SiteFile, str]] = []
-    for n in range(60):
+    for n in range(80):
         files.append((OutputFile(f"a/{n}", b"%d" % n), f"{n}"))
         files.append(kept(f"b/{n}", lambda n=n: b"made %d" % n * n))  # type: ignore[misc]
         piece = KeptFile(

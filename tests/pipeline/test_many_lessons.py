@@ -12,7 +12,7 @@ from coursebuild.pipeline import documents
 from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.progress import Progress
 from coursebuild.render.exports import tags
-from coursebuild.results import KeptFile, OutputFile, made
+from coursebuild.results import KeptFile, OutputFile
 from support.scratch_course import Folder, block
 
 FEW, MANY = 12, 96
@@ -50,7 +50,7 @@ def peak(folder: Folder) -> int:
             for file in prepared.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
                     assert isinstance(file, KeptFile)
-                    for _ in made(file.pieces() if file.pieces is not None else (file.make(),)):
+                    for _ in file.pieces() if file.pieces is not None else (file.make(),):
                         pass  # as it is written
         return tracemalloc.get_traced_memory()[1]
     finally:
