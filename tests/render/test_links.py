@@ -113,6 +113,13 @@ TAGS = [
     "&",
     "<p id=bare>",
 ]
+SOUND = [
+    '<a href="#here"><p id="here">',
+    '<a href="#top">',
+    '<a href="../index.html">',
+    '<a href="../index.html#old">',
+    '<img src="../assets/site.css#x">',
+]
 
 
 @given(st.lists(st.sampled_from(TAGS), max_size=8))
@@ -131,7 +138,7 @@ def test_what_we_write_can_be_read_quickly() -> None:
         assert _quickly_read(f"<p>{tag}</p>") is None or tag == "&"
 
 
-@given(st.lists(st.sampled_from([*TAGS, '<a href="#here">', '<p id="here">']), max_size=6))
+@given(st.lists(st.sampled_from([*TAGS, *SOUND]), max_size=6))
 def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str]) -> None:
     page = "".join(parts)
     files = site(page)
@@ -140,6 +147,14 @@ def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str])
     led = references("lessons/a.html", pages["lessons/a.html"][1], "")
     broken = [b for b in check_links(files) if b.page == "lessons/a.html"]
     assert all_lead_somewhere(led, {f.path for f in files}, ids) == (not broken)
+
+
+def test_references_to_files_that_are_no_pages_lead_somewhere() -> None:
+    """Whatever is behind their `#`; and so do those to a page as a whole."""
+    files = {"a.html", "a.svg"}
+    sound = {("a.html", ""), ("a.html", "top"), ("a.html", "id"), ("a.svg", "x")}
+    assert all_lead_somewhere(sound, files, {"a.html": {"id"}})
+    assert not all_lead_somewhere({("a.html", "x")}, files, {"a.html": {"id"}})
 
 
 STEPS = st.sampled_from(

@@ -43,16 +43,25 @@ def test_other_numbers() -> None:
     assert percent(-0.0604) == "−6.040\u2009%"
     assert percent(2.5e-13) == "+2.5\u2009×\u200910<sup>−11</sup>\u2009%"
     assert percent(0.0) == "0\u2009%"
+    assert [percent(v) for v in (1e-5, 99.0, 100.0)] == [
+        "+0.001\u2009%",
+        "+9900.000\u2009%",
+        "+10000\u2009%",
+    ]
     assert [factor(v) for v in (None, 0.123456, 99.9, 1359.4)] == [
         "",
         "0.123",
         "99.9",
         "1\u2009359",
     ]
-    assert [size(n) for n in (0, 1396, 81_212, 98_765_432)] == [
+    assert [size(n) for n in (0, 1396, 9999, 10_000, 81_212, 9_999_000, 10**7, 98_765_432)] == [
         "0 B",
         "1\u2009396 B",
+        "9\u2009999 B",
+        "10 kB",
         "81 kB",
+        "9\u2009999 kB",
+        "10 MB",
         "99 MB",
     ]
     assert [sentence(t) for t in ("", "it is", "Is it?")] == ["", "It is.", "Is it?"]

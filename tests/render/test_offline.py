@@ -87,6 +87,11 @@ def test_what_is_large_is_for_those_who_ask_for_everything() -> None:
     assert len(large["text"]["files"]) == 1, "what scripts of every page need is kept with them"
 
 
+def test_a_page_is_large_from_a_mebibyte_on() -> None:
+    found = listed(file("a.html", 1 << 20), file("b.html", (1 << 20) + 1))
+    assert ([*found["text"]["files"]], [*found["rest"]["files"]]) == (["a.html"], ["b.html"])
+
+
 def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
     found = listed(FileFacts("assets/a.0123abcd.js", digest("a"), 1))
     assert found["text"]["files"] == {"assets/a.0123abcd.js": digest("a")[:12]}
@@ -166,6 +171,8 @@ def test_the_colours_are_those_of_the_style_sheet() -> None:
     [
         ("Simulation with MuJoCo", "Simulation"),
         ("Physics", "Physics"),
+        ("Rigid bodies", "Rigid bodies"),
+        ("Rigid bodies1", "Rigid"),
         ("A first course", "A first"),
         ("Bodies, falling", "Bodies,"[:-1]),
         ("Thermodynamik für Anfänger", "Thermodynamik"),

@@ -125,6 +125,20 @@ def test_an_output_question_is_graded_as_its_recording_is_compared(
     assert f'data-answer="two" data-compare="{rule}">' in html
 
 
+def test_an_output_question_is_graded_by_the_recording_of_its_own_script(make: Make) -> None:
+    other = SCRIPT.replace("a.py", "b.py") + "Output:\n\n```text exact\none\ntwo\n```\n\n"
+    own = "Output:\n\n```text rtol=1e-3\none\ntwo\n```\n\n```quiz"
+    html = make(other + output_question(2).replace("```quiz", own)).html()
+    assert 'data-compare="rtol=0.001 atol=0.0">' in html
+
+
+def test_an_empty_line_of_an_output_is_shown_and_not_graded(make: Make) -> None:
+    run = ScriptRun("examples/a.py", Outcome.OK, 0, "one\n\nthree\n", "", 0.0)
+    html = make(output_question(2), runs={"examples/a.py": run}).html()
+    assert "<samp></samp></pre>" in html
+    assert "data-answer" not in html
+
+
 def test_what_a_script_prints_stays_inside_its_attribute(make: Make) -> None:
     line = '"><script>alert(1)</script> &amp; \u202e'
     run = ScriptRun("examples/a.py", Outcome.OK, 0, f"one\n{line}\n", "", 0.0)

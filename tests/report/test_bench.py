@@ -141,6 +141,8 @@ def test_a_table_keeps_what_has_room() -> None:
         "a     xxxxxxxxxxxxxxxxxxxxxxxxxxxxxx   1",
         "bb    y                               22",
     ]
+    assert table(columns, 40) == table(columns, 80)
+    assert table(columns, 39)[2] == "bb    y"
     assert table(columns, 20) == ["name   n", "a      1", "bb    22"]
     assert table(columns, 1) == ["name", "a", "bb"]
 
