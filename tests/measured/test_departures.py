@@ -108,7 +108,9 @@ def test_a_status_says_all_of_its_row() -> None:
         ({"growth": 1.0}, {"growth": 2.0}, None),
     ],
 )
-def test_other_figures(old: Any, new: Any, found: tuple[str, ...] | None) -> None:
+def test_which_figures_of_a_row_depart_and_how_it_is_said(
+    old: Any, new: Any, found: tuple[str, ...] | None
+) -> None:
     assert of_rows(row(**old), row(**new)) == ([] if found is None else [found])
 
 
@@ -174,7 +176,7 @@ def test_a_change_departs_exactly_beyond_the_band(share: float) -> None:
 # --- hard cases
 
 
-def test_cases() -> None:
+def test_a_case_that_is_gone_is_a_departure() -> None:
     assert case_departures([CASE], [CASE], BANDS) == ()
     (gone,) = case_departures([CASE], [], BANDS)
     assert gone == Departure("spring", "", "case", "there", "nothing", "the same")

@@ -11,6 +11,8 @@ from coursebuild.physics.bench import measure_scene
 from coursebuild.physics.scene import SceneError
 from support.bench_runs import measured
 
+pytestmark = pytest.mark.site
+
 STIFF = """\
 <mujoco>
   <option timestep="{step}"/>
