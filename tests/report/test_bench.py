@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.measured.bench import SceneCard, WorkPrecisionRow
+from coursebuild.measured.bench import SceneCard, Verdict, WorkPrecisionRow
 from coursebuild.measured.departures import Checked, Departure
 from coursebuild.measured.points import seconds_text, setting_text
 from coursebuild.measured.records import Failure
@@ -74,6 +74,24 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
     assert re.search(r"\x1b\[32m *\* +14  RK4 .*\x1b\[0m", text)
     assert re.search(r"\x1b\[1;31m +1  Euler .*diverged\x1b\[0m", text)
     assert re.sub(r"\x1b\[[\d;]*m", "", text) == bench_text([scene()], Style(width=80))
+
+
+@pytest.mark.parametrize(
+    ("on_front", "noticeable", "colour"),
+    [(True, False, "32"), (True, True, "1;33"), (False, False, "1;33"), (True, None, "32")],
+)
+def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
+    on_front: bool, noticeable: bool | None, colour: str
+) -> None:
+    verdict = Verdict(on_front, None, None, None, noticeable, "So it is.")
+    text = bench_text([scene(scenario([row()], verdict=verdict))], Style(colour=True, width=80))
+    assert f"\x1b[{colour}m    So it is." in text
+
+
+def test_how_far_errors_are_measured_is_told_where_it_is_not_the_whole_duration() -> None:
+    for horizon, told in ((2.0, "    2 s\n"), (1.5, "    2 s, errors to 1.5 s\n")):
+        one = scenario([row()], duration=2.0, horizon=horizon, hold=0.0)
+        assert told in bench_text([scene(one)], Style(width=80))
 
 
 def test_where_nothing_was_measured() -> None:

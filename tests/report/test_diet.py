@@ -93,6 +93,27 @@ def test_what_is_told_of_savings() -> None:
     assert text in lines(replace(REPORT, findings=(more,)))
 
 
+def test_savings_of_several_findings_are_told_together() -> None:
+    """Those of what `--fix` does only where that is more than one of them, and not all."""
+    other = replace(FINDING, fixable=False)
+    for findings, all_told, fixed_told in (
+        ((FINDING,), False, False),
+        ((FINDING, other), True, False),
+        ((FINDING, FINDING), True, False),
+        ((FINDING, FINDING, other), True, True),
+    ):
+        told = "\n".join(lines(replace(REPORT, findings=findings)))
+        assert ("  without all of them: ×2.2" in told) is all_told, findings
+        assert ("  after --fix: ×2.2" in told) is fixed_told, findings
+
+
+def test_why_fix_leaves_something_is_told_of_findings_that_count() -> None:
+    left = replace(FINDING, fixable=False, unfixed="it stands in two files")
+    text = "    not for --fix: it stands in two files"
+    assert text in lines(replace(REPORT, findings=(left,)))
+    assert text not in lines(replace(REPORT, findings=(replace(left, setting=True),)))
+
+
 def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     report = replace(
         REPORT,
