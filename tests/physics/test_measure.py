@@ -101,6 +101,9 @@ def test_an_order_is_fitted_only_where_it_shows() -> None:
     spoilt = [max(e, 1e-7) if e < 0.1 else 5.0 for e in clean]
     assert order(steps, spoilt, 1e-9) == order(steps[2:8], clean[2:8], 0.0)
     assert order(steps[:2], clean[:2], 0.0) is None
+    three = order(steps[2:5], clean[2:5], 0.0)
+    assert three is not None
+    assert three.points == 3
     assert order(steps, [1e-12] * 12, 1e-12) is None
 
 
