@@ -69,7 +69,7 @@ def test_quantities_in_text_from_the_right(text: str, kept: list[str]) -> None:
 
 
 @given(st.text(alphabet="0123456789.,-+−×^ kgms²/°%بة\u00a0<&"))
-def test_no_character_is_lost(text: str) -> None:
+def test_finding_quantities_loses_no_character(text: str) -> None:
     assert "".join(piece for piece, _ in quantities(text)) == text
     assert joined(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
     assert 0 <= unit_length(text) <= len(text)
@@ -132,7 +132,7 @@ UNIT_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
 
 
 @given(st.lists(st.sampled_from(MORE), max_size=16).map("".join))
-def test_units_are_found_one_by_one_as_all_together(text: str) -> None:
+def test_units_are_found_as_by_one_expression_of_them_all(text: str) -> None:
     """By two expressions that are right and take long to compile."""
     unbroken = WITH_UNIT.sub(lambda found: found[0].replace(" ", "\u00a0"), text)
     assert joined(text) == unbroken

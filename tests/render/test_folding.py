@@ -46,7 +46,7 @@ def test_decorators_and_comments_stay_with_what_they_belong_to() -> None:
     assert code.split("\n")[parts[1].first] == "# About two."
 
 
-def test_a_short_remainder_is_not_folded() -> None:
+def test_a_remainder_of_a_few_lines_is_not_folded() -> None:
     assert fold(function("one", 44) + function("two", 6)) == (Part(1, 50, False),)
 
 

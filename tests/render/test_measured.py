@@ -30,11 +30,13 @@ from support.rendered_course import Make
         (None, ""),
     ],
 )
-def test_numbers(value: float | None, text: str) -> None:
+def test_a_number_has_three_digits_and_a_power_of_ten_where_it_needs_one(
+    value: float | None, text: str
+) -> None:
     assert power(value).replace("\u2009", " ") == text
 
 
-def test_other_numbers() -> None:
+def test_errors_percentages_factors_and_sizes_as_text() -> None:
     assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
     assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
     assert bounded(0.002, 1e-3) == "0.00200"
@@ -194,7 +196,7 @@ def test_under_every_table_is_the_command_that_makes_it_again(site: dict[str, st
         assert set(after) == {line}
 
 
-def test_a_case_alone_and_one_of_a_number_that_has_no_name(make: Make) -> None:
+def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
     found = Reports(cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=())))
     told = text(pages(make, found)["numerics/index.html"])
     assert "4 A &lt;a&gt; It swings." in told

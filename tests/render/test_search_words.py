@@ -49,7 +49,7 @@ WORDS = (
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=20).map("".join))
-def test_text_without_foreign_letters_is_read_in_no_other_way(text: str) -> None:
+def test_ascii_text_has_the_terms_of_any_text(text: str) -> None:
     terms = terms_of(text)
     assert counted(text) == {term: terms.count(term) for term in terms}
     if text.isascii():
@@ -92,7 +92,7 @@ BLANKS = st.text(alphabet="_^([|⟨)]⟩,;Δδ∂∇ a1é", max_size=12)
 
 
 @given(BLANKS.map(lambda text: " ".join(text.split())))
-def test_blanks_that_are_left_out(text: str) -> None:
+def test_blanks_beside_indices_brackets_and_operators_are_left_out(text: str) -> None:
     slow = re.sub(r"(?<=[_^]) | (?=[_^])", "", text)
     assert tex._TIGHT.sub("", text) == slow
     assert tex._INNER.sub("", text) == re.sub(r"(?<=[(\[|⟨]) | (?=[)\]⟩,;])", "", text)
@@ -100,7 +100,7 @@ def test_blanks_that_are_left_out(text: str) -> None:
 
 
 @given(st.text(alphabet=r"\{}_^&~'% abαomegfrct1-+=()", max_size=60))
-def test_no_formula_is_too_odd(formula: str) -> None:
+def test_any_formula_can_be_read(formula: str) -> None:
     text, names = plain_formula(formula)
     assert "{" not in text or r"\{" in formula
     assert all(name.isalpha() for name in names)

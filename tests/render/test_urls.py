@@ -66,7 +66,7 @@ def test_files_are_named_from_the_document(url: str, path: str) -> None:
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"], exclude_characters="/"), min_size=1))
-def test_any_name_survives(name: str) -> None:
+def test_the_address_of_any_file_name_leads_to_it(name: str) -> None:
     path = f"files/{name}"
     href = Place("lessons/1-a.html").href(path)
     if name not in (".", ".."):

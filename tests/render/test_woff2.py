@@ -23,6 +23,8 @@ from coursebuild.render.fonts import VERSION, read_faces
 from coursebuild.render.woff2 import TAGS
 from coursebuild.render.woff2 import woff2 as packed
 
+pytestmark = pytest.mark.site
+
 Point = tuple[int, int, bool]
 Contour = Sequence[Point]
 QUALITY = 5

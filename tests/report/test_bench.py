@@ -103,7 +103,7 @@ def test_where_nothing_was_measured() -> None:
     assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
 
 
-def test_everything_lost() -> None:
+def test_where_every_run_was_lost_the_reasons_are_told() -> None:
     text = bench_text([scene(scenario([lost(), lost("RK4")]))], Style(width=80))
     assert "Euler at 100 ms; RK4 at 100 ms: diverged; the state is not finite" in text
 
@@ -135,7 +135,7 @@ def test_numbers_that_people_read(seen: float, shown: str) -> None:
     assert re.search(rf" {re.escape(shown)}  1.00e-03 ", text)
 
 
-def test_words() -> None:
+def test_settings_and_seconds_in_words() -> None:
     newton = setting(solver="Newton", iterations=100, cone="elliptic")
     assert setting_text(newton) == "Euler at 2 ms, Newton, 100 iterations, elliptic cone"
     assert setting_text(replace(newton, iterations=5), newton) == "Euler at 2 ms, 5 iterations"

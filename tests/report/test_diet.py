@@ -62,7 +62,7 @@ def lines(report: DietReport, width: int = 100) -> list[str]:
     return diet_text([report], Style(width=width)).splitlines()
 
 
-def test_a_finding() -> None:
+def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
     assert lines(REPORT, 90) == [
         "arm",
         "  in go",
@@ -83,7 +83,7 @@ def test_a_finding() -> None:
     ]
 
 
-def test_what_is_told_of_savings() -> None:
+def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
     none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
     assert "    bit-identical; saves nothing that is measured" in lines(
         replace(REPORT, findings=(none,))
@@ -132,7 +132,7 @@ def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     assert good.ok and "  nothing in it is in vain" in lines(good)
 
 
-def test_what_is_no_fault() -> None:
+def test_what_was_untouched_is_a_setting_or_has_a_reason_is_no_fault() -> None:
     for finding in (
         replace(FINDING, label=UNTOUCHED),
         replace(FINDING, setting=True),
@@ -172,7 +172,7 @@ def test_json_and_record_hold_everything() -> None:
     assert encode_diet(REPORT) == encode_diet(decode_diet(encode_diet(REPORT)))
 
 
-def test_nothing_at_all() -> None:
+def test_a_report_on_no_model() -> None:
     assert diet_report([], [], [], [], Style()) == "there is no model to look at\n"
     failed = diet_report([], [], [Failure("models/a.xml was changed in the meantime")], [], Style())
     assert failed == "error: models/a.xml was changed in the meantime\n"

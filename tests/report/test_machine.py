@@ -33,7 +33,7 @@ LABS = (
 REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 4, 2, 1, 1, 1, 0, 60.25), labs=LABS)
 
 
-def test_json() -> None:
+def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
     value = json.loads(render_report(REPORT, "json", Style()))
     assert list(value) == ["diagnostics", "scripts", "labs", "summary"]
     assert value["diagnostics"][1] == {
@@ -119,7 +119,7 @@ def test_junit_has_no_character_that_xml_forbids() -> None:
     assert str(failure.get("message")).endswith(": a \ufffd b \ufffd c \U0001d465")
 
 
-def test_sarif() -> None:
+def test_sarif_names_rule_region_and_related_places() -> None:
     run = json.loads(render_report(REPORT, "sarif", Style()))["runs"][0]
     result = run["results"][1]
     assert result["ruleId"] == "math-syntax"
