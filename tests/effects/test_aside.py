@@ -80,6 +80,7 @@ def test_a_disk_that_becomes_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert [kept.part(9, 5)() for kept in put] == [part[9:14] for part in parts]
 
 
+@pytest.mark.site
 @given(st.lists(st.binary(max_size=30), max_size=30), st.data())
 def test_any_order_of_putting_and_asking(parts: list[bytes], draw: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -18,6 +18,8 @@ from coursebuild.effects.packs import Packs
 from coursebuild.effects.store import Store
 from support.store_packs import KEY, ROOT, files, heard, key
 
+pytestmark = pytest.mark.site
+
 ACTS = st.lists(
     st.one_of(
         st.tuples(st.sampled_from("abcdefgh"), st.binary(max_size=50)),
