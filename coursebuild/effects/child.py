@@ -26,17 +26,19 @@ from coursebuild.effects.runner import clean_environment
 
 _START = 120.0
 """Seconds in which the child must be ready."""
-_MARGIN = 10.0
-"""A child ends itself when it works for too long; this is for one that cannot."""
 
 
 class JsonChild:
     """The child and its folder."""
 
-    def __init__(self, script: str, seconds: float, python: str | None = None) -> None:
+    def __init__(
+        self, script: str, seconds: float, python: str | None = None, margin: float = 10.0
+    ) -> None:
+        """A child ends itself when it works for more than `seconds`; `margin`: where it cannot."""
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
+        self._margin = margin
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
@@ -64,7 +66,7 @@ class JsonChild:
         with contextlib.suppress(BrokenPipeError):  # it died; reading tells
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
-        line = self._read_line(self._seconds + _MARGIN)
+        line = self._read_line(self._seconds + self._margin)
         return None if line is None else json.loads(line)
 
     def stop(self) -> None:

@@ -30,8 +30,6 @@ from coursebuild.effects.site_swap import MARKER
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
 _SCHEMES = {"dask": "tcp", "dask+tls": "tls"}
-_CONNECT = 15.0
-"""Seconds to wait for a scheduler, and then for a first worker."""
 _TRIES = 3
 """How often a script is handed out."""
 _LARGEST = 512 << 20
@@ -56,6 +54,7 @@ def run_on_dask(
     jobs: Sequence[ScriptJob],
     *,
     on_event: Callable[[RunEvent], None] | None = None,
+    patience: float = 15.0,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts on a cluster; those marked `norun` are not, and cause no event.
 
@@ -64,6 +63,7 @@ def run_on_dask(
         root: the course folder.
         jobs: what to run, started in this order.
         on_event: is told of every start and end, in this thread.
+        patience: seconds to wait for the scheduler, and then for a first worker.
 
     Returns:
         What each did, in the order of the jobs.
@@ -74,9 +74,9 @@ def run_on_dask(
     root = root.resolve()
     work = _Work(root, jobs, on_event or (lambda event: None))
     if work.waiting:
-        with _client(url) as client:
+        with _client(url, patience) as client:
             try:
-                _Cluster(client, url, work, archive(root)).run()
+                _Cluster(client, url, work, archive(root)).run(patience)
             except (OSError, TimeoutError) as error:
                 raise _gone(url, error) from None
     return tuple(work.runs[index] for index in range(len(jobs)))
@@ -92,14 +92,13 @@ def archive(root: Path) -> bytes:
     total = 0
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as files:
         for path in _files(root, root):
-            data = path.read_bytes()
-            total += len(data)
+            total += path.stat().st_size
             if total > _LARGEST:
                 raise EffectError(
                     f"the course has more than {_LARGEST >> 20} MiB of files, too much to send",
                     help="move what no script needs out of its folder",
                 )
-            files.writestr(zipfile.ZipInfo(path.relative_to(root).as_posix()), data)
+            files.writestr(zipfile.ZipInfo(path.relative_to(root).as_posix()), path.read_bytes())
     return buffer.getvalue()
 
 
@@ -119,7 +118,7 @@ def _files(folder: Path, root: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _client(url: str) -> Iterator[Any]:
+def _client(url: str, patience: float) -> Iterator[Any]:
     """A connection to the cluster, silent about what is no news here."""
     distributed = _distributed()
     scheme, _, place = url.partition("://")
@@ -130,7 +129,7 @@ def _client(url: str) -> Iterator[Any]:
         address = f"{_SCHEMES[scheme]}://{place}"
         try:
             client = distributed.Client(
-                address, timeout=_CONNECT, set_as_default=False, name="coursebuild"
+                address, timeout=patience, set_as_default=False, name="coursebuild"
             )
         except (OSError, TimeoutError, ValueError) as error:
             raise EffectError(
@@ -214,8 +213,8 @@ class _Cluster:
         self.completed = _distributed().as_completed([], loop=client.loop)
         self.sent: Any = None
 
-    def run(self) -> None:
-        self._wait_for_workers()
+    def run(self, patience: float) -> None:
+        self._wait_for_workers(patience)
         try:
             self._hand_out()
             while self.running:
@@ -227,9 +226,9 @@ class _Cluster:
             if self.running:
                 self.client.cancel(list(self.running), force=True)
 
-    def _wait_for_workers(self) -> None:
+    def _wait_for_workers(self, patience: float) -> None:
         try:
-            self.client.wait_for_workers(1, timeout=_CONNECT)
+            self.client.wait_for_workers(1, timeout=patience)
         except TimeoutError:
             raise EffectError(f"the Dask cluster {self.url} has no workers") from None
 

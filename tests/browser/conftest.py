@@ -8,11 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext
 
-from support import quiz_page
-from support.built_sites import BuiltCourses, Site, lesson_files
+from support.built_sites import BuiltCourses, Site
 from support.folder_server import served
-from support.lab_course import LESSON, PENDULUM, TWIN, ZOO
-from support.reader_course import FILES
 from support.scratch_course import Folder
 from support.static_host import Host
 
@@ -20,9 +17,7 @@ from support.static_host import Host
 @pytest.fixture(scope="session")
 def course(built_courses: BuiltCourses) -> Folder:
     """A course of one lesson with labs, built."""
-    models = {"models/pendulum.xml": PENDULUM, "models/zoo.xml": ZOO}
-    kinds = {"content/labs/twin.js": TWIN.read_bytes()}
-    return built_courses.of_files("labs", {**lesson_files(LESSON), **models, **kinds})
+    return built_courses.of_case("labs")
 
 
 @pytest.fixture(scope="session")
@@ -55,8 +50,7 @@ def sites(built_courses: BuiltCourses) -> Iterator[Mapping[str, Site]]:
 @pytest.fixture(scope="session")
 def quiz_files(built_courses: BuiltCourses) -> Path:
     """A site with every kind of question."""
-    files = {**lesson_files(quiz_page.LESSON), "models/pendulum.xml": PENDULUM}
-    return built_courses.of_files("quizzes", files).root / "public"
+    return built_courses.of_case("quizzes").root / "public"
 
 
 @pytest.fixture(scope="session")
@@ -69,7 +63,7 @@ def quizzes(quiz_files: Path) -> Iterator[str]:
 @pytest.fixture(scope="session")
 def reader(built_courses: BuiltCourses) -> Folder:
     """A course with questions, and a reader's way through it, built."""
-    return built_courses.of_files("reader", {**FILES, "models/pendulum.xml": PENDULUM})
+    return built_courses.of_case("reader")
 
 
 @pytest.fixture(scope="session")

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from coursebuild.effects.resources import bundled_files
 from coursebuild.effects.server import PreviewServer
 from coursebuild.render.assets import page_script
 from support.lab_course import PAGE
-from support.lab_page import lab, until, watched
+from support.lab_page import comes, lab, until, watched
 from support.scratch_course import Folder
 from support.static_host import Host
 
@@ -36,6 +37,14 @@ KEPT = """async () => {
   }
   return found.sort()
 }"""
+TOLD = """
+window.toldOfVisits = 0
+const post = ServiceWorker.prototype.postMessage
+ServiceWorker.prototype.postMessage = function (...message) {
+  window.toldOfVisits += 1
+  return post.apply(this, message)
+}
+"""
 QUIET = """async () => {
   // The worker answers one after the other: when this is answered, everything before it is done.
   const { active } = await navigator.serviceWorker.ready
@@ -67,11 +76,10 @@ def host(made: Folder, tmp_path: Path) -> Iterator[Host]:
     host.stop()
 
 
-def settle(page: Page, keep: str = "auto", look: bool = False) -> dict[str, object]:
+def settle(page: Page, keep: str = "auto", look: bool = False) -> None:
     """Wait until the worker has done all it was told to, after one visit more."""
     asked = QUIET.replace("KEEP", json.dumps(keep)).replace("LOOK", json.dumps(look))
-    found: dict[str, object] = page.evaluate(asked)
-    return found
+    page.evaluate(asked)
 
 
 def opened(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
@@ -83,6 +91,18 @@ def opened(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, l
     until(page, f"navigator.serviceWorker.controller?.scriptURL === {own}.href")
     settle(page)
     return page, said
+
+
+def visited(page: Page, host: Host, path: str) -> None:
+    """Open a page and wait until it has told the worker of its visit by itself."""
+    page.add_init_script(TOLD)
+    page.goto(host.url + path)
+    until(page, "window.toldOfVisits > 0")
+    settle(page)
+
+
+def see(page: Page, text: str) -> None:
+    expect(page.get_by_text(text)).to_be_visible()
 
 
 def edited(made: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
@@ -98,48 +118,48 @@ def edited(made: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
             made.replace(path, new, old)
 
 
-def test_after_one_visit_every_page_is_there_without_a_network(
+def test_every_page_is_there_without_a_network_after_one_visit(
     context: BrowserContext, host: Host
 ) -> None:
     page, said = opened(context, host)
     assert said == []
-    host.stop()
-    for path, text in ((FIRST, "Text of one."), (SECOND, "Text of two."), ("", "Lesson one")):
-        page.goto(host.url + path)
-        assert page.locator("main").get_by_text(text).first.is_visible()
-        assert page.evaluate("getComputedStyle(document.body).display") == "flex", "its style"
-        assert page.locator("[data-tools] select").count() == 1, "its script"
-        until(page, "document.fonts.status === 'loaded'")
-    page.goto(host.url + FIRST)
-    until(page, "document.querySelector('article img').naturalWidth > 0")
-    page.goto(f"{host.url}lessons/1.2-two")  # as hosts that leave out the ending call it
-    assert page.get_by_text("Text of two.").is_visible()
-    host.start()
+    with host.away():
+        for path, text in ((FIRST, "Text of one."), (SECOND, "Text of two."), ("", "Lesson one")):
+            page.goto(host.url + path)
+            expect(page.locator("main").get_by_text(text).first).to_be_visible()
+            expect(page.locator("body")).to_have_css("display", "flex")  # its style
+            expect(page.locator("[data-tools] select")).to_have_count(1)  # its script
+            until(page, "document.fonts.status === 'loaded'")
+        page.goto(host.url + FIRST)
+        until(page, "document.querySelector('article img').naturalWidth > 0")
+        page.goto(f"{host.url}lessons/1.2-two")  # as hosts that leave out the ending call it
+        see(page, "Text of two.")
 
 
-def test_a_page_that_is_not_there_leads_back_when_there_is_a_network(
+def test_page_that_is_not_there_leads_back_when_there_is_a_network(
     context: BrowserContext, host: Host
 ) -> None:
     page, _ = opened(context, host)
     with host.away():
         page.goto(f"{host.url}lessons/9.9-none.html?x=<b>&y")
-        assert page.locator("h1").inner_text() == "Without a network"
-        assert page.url.startswith(f"{host.url}offline/?from=")
+        expect(page).to_have_url(re.compile(rf"^{re.escape(host.url)}offline/\?from="))
+        expect(page.locator("h1")).to_have_text("Without a network")
         missing = page.locator(".keep-missing")
-        assert "/course/lessons/9.9-none.html?x=%3Cb%3E&y" in missing.inner_text()
+        expect(missing).to_contain_text("/course/lessons/9.9-none.html?x=%3Cb%3E&y")
         again = missing.get_by_role("link", name="Try again")
-        assert again.get_attribute("href") == f"{host.url}lessons/9.9-none.html?x=%3Cb%3E&y"
+        wanted = f"{host.url}lessons/9.9-none.html?x=%3Cb%3E&y"
+        expect(again).to_have_attribute("href", wanted)
     again.click()
-    page.wait_for_url("**/9.9-none.html*")
-    assert page.locator("h1").inner_text() == "Page not found"
+    expect(page).to_have_url(wanted)
+    expect(page.locator("h1")).to_have_text("Page not found")
 
 
-@pytest.mark.parametrize("from_", ["https://example.com/x", "//example.com/", "/a/", "data:,"])
-def test_no_way_back_leads_elsewhere(context: BrowserContext, host: Host, from_: str) -> None:
+def test_no_way_back_leads_elsewhere(context: BrowserContext, host: Host) -> None:
     page, _ = watched(context)
-    page.goto(f"{host.url}offline/?from={from_}")
-    page.locator(".keep input").first.wait_for()
-    assert page.locator(".keep-missing").count() == 0
+    for from_ in ("https://example.com/x", "//example.com/", "/a/", "data:,"):
+        page.goto(f"{host.url}offline/?from={from_}")
+        page.locator(".keep input").first.wait_for()
+        expect(page.locator(".keep-missing")).to_have_count(0)
 
 
 def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
@@ -147,8 +167,10 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
 ) -> None:
     page, _ = watched(context)
     page.goto(host.url + FIRST)
-    assert not [path for path in host.asked if path.startswith(("service-worker", "files.json"))]
+    loaded = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
     until(page, "navigator.serviceWorker.controller !== null")
+    list_ = "performance.getEntriesByType('resource').filter(({ name }) => /files.json/.test(name))"
+    assert page.evaluate(f"{list_}.every(({{ startTime }}) => startTime > {loaded})")
     settle(page)
     host.since()
     page.goto(host.url + SECOND)
@@ -156,7 +178,7 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
     assert host.since() == [SECOND]
 
 
-def test_a_new_build_costs_what_has_changed(
+def test_new_build_costs_what_has_changed(
     context: BrowserContext, host: Host, made: Folder
 ) -> None:
     page, said = opened(context, host)
@@ -165,43 +187,40 @@ def test_a_new_build_costs_what_has_changed(
     host.since()
     settle(page, look=True)
     assert FIRST in host.since()
-    assert page.evaluate("() => document.querySelector('.notice')") is None
+    expect(page.locator(".notice")).to_have_count(0)
     page.goto(host.url + SECOND)
     settle(page, look=True)
     settle(page)
     assert page.evaluate(KEPT) == before, "what is no more in use is gone"
     with host.away():
         page.goto(host.url + FIRST)
-        assert page.get_by_text("Other text.").is_visible()
+        see(page, "Other text.")
     assert said == []
 
 
-def test_a_page_that_was_kept_says_when_there_is_a_newer_one(
+def test_page_that_was_kept_says_when_there_is_a_newer_one(
     context: BrowserContext, host: Host, made: Folder
 ) -> None:
     page, _ = opened(context, host)
     with host.away():
-        page.goto(host.url + FIRST)
+        visited(page, host, FIRST)  # which hears of no newer list
         edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
-        assert page.get_by_text("Text of one.").is_visible()
-        page.wait_for_timeout(2000)  # the page's own visit, which hears of no newer list
-        settle(page)
+        see(page, "Text of one.")
     page.evaluate("window.dispatchEvent(new Event('online'))")
-    page.locator(".notice").wait_for()
-    assert "This page has changed" in page.locator(".notice").inner_text()
+    expect(page.locator(".notice")).to_contain_text("This page has changed")
     page.get_by_role("button", name="Load it again").click()
-    page.get_by_text("Other text.").wait_for()
-    assert page.locator(".notice").count() == 0
+    see(page, "Other text.")
+    expect(page.locator(".notice")).to_have_count(0)
 
 
-def test_a_slow_network_does_not_keep_a_page_that_is_here(
+def test_slow_network_does_not_keep_back_a_page_that_is_here(
     context: BrowserContext, host: Host
 ) -> None:
     page, _ = opened(context, host)
-    host.delay = 60.0
+    host.answering.clear()
     page.goto(host.url + SECOND)
-    assert page.get_by_text("Text of two.").is_visible()
-    host.delay = 0.0
+    see(page, "Text of two.")
+    host.answering.set()
 
 
 def test_several_courses_on_one_origin(
@@ -217,7 +236,7 @@ def test_several_courses_on_one_origin(
         assert sorted(names) == [f"coursebuild 1 {host.url}", f"coursebuild 1 {host.url}inner/"]
         page.goto(f"{host.url}inner/offline/")
         page.get_by_label("nothing", exact=True).check()
-        page.get_by_text("Nothing of the course is kept here.").wait_for()
+        see(page, "Nothing of the course is kept here.")
         assert page.evaluate("caches.keys()") == [f"coursebuild 1 {host.url}"]
         scopes = "navigator.serviceWorker.getRegistrations().then(all => all.map(r => r.scope))"
         assert page.evaluate(scopes) == [host.url]
@@ -225,47 +244,48 @@ def test_several_courses_on_one_origin(
         host.stop()
 
 
-def test_the_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
+def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
     page, said = watched(context)
     page.goto(f"{host.url}offline/")
-    page.get_by_text("files of the course are here.").wait_for()
-    assert page.get_by_label("all text and pictures").is_checked()
-    assert "MB" in page.locator(".keep").inner_text()
+    see(page, "files of the course are here.")
+    expect(page.get_by_label("all text and pictures")).to_be_checked()
+    expect(page.locator(".keep")).to_contain_text("MB")
     page.get_by_label("everything, with all simulations").check()
-    status = page.locator(".keep-status")
     listed = json.loads((host.folder / "files.json").read_text())
     total = sum(len(listed[group]["files"]) for group in ("shell", "text", "rest"))
-    page.get_by_text(f"{total} of {total} files of the course are here.").wait_for()
-    assert status.get_attribute("role") == "status"
+    see(page, f"{total} of {total} files of the course are here.")
+    expect(page.locator(".keep-status")).to_have_attribute("role", "status")
     page.get_by_label("nothing", exact=True).check()
-    page.get_by_text("Nothing of the course is kept here.").wait_for()
+    see(page, "Nothing of the course is kept here.")
+    page.clock.install()
     page.goto(host.url + FIRST)
-    page.wait_for_timeout(2500)  # a page's own visit would have come by then
+    page.clock.run_for(10_000)  # a page's own visit would have come by then
     assert page.evaluate("caches.keys()") == []
     assert page.evaluate("navigator.serviceWorker.getRegistrations()") == []
     page.goto(f"{host.url}offline/")
     page.get_by_label("what was read").check()
-    page.get_by_text("files of the course are here.").wait_for()
-    assert page.get_by_label("what was read").is_checked()
+    see(page, "files of the course are here.")
+    expect(page.get_by_label("what was read")).to_be_checked()
     assert said == []
 
 
-def test_without_a_script_and_without_workers_it_says_what_is_so(
-    browsers: dict[str, Browser], host: Host
+def test_page_on_keeping_says_what_is_so_without_scripts_and_without_workers(
+    browsers: Mapping[str, Browser], host: Host
 ) -> None:
-    with browsers["webgl"].new_context(java_script_enabled=False) as context:
+    with browsers["plain"].new_context(java_script_enabled=False) as context:
         page = context.new_page()
         page.goto(f"{host.url}offline/")
-        assert page.get_by_text("Nothing is kept by this browser now.").is_visible()
-    with browsers["webgl"].new_context(service_workers="block") as context:
+        see(page, "Nothing is kept by this browser now.")
+    with browsers["plain"].new_context(service_workers="block") as context:
         page, said = watched(context)
+        page.clock.install()
         page.goto(host.url + FIRST)
-        page.wait_for_timeout(2500)
+        page.clock.run_for(10_000)
         assert page.evaluate("caches.keys()") == []
         assert [text for text in said if "blocked by Playwright" not in text] == []
 
 
-def test_the_site_can_be_installed(context: BrowserContext, host: Host) -> None:
+def test_site_can_be_installed(context: BrowserContext, host: Host) -> None:
     page, _ = opened(context, host)
     client = context.new_cdp_session(page)
     errors = client.send("Page.getInstallabilityErrors")["installabilityErrors"]
@@ -285,6 +305,9 @@ def test_the_site_can_be_installed(context: BrowserContext, host: Host) -> None:
         assert icon["sizes"] in ("any", sides)
 
 
+HAS_ENGINE = f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))"
+
+
 def test_labs_run_without_a_network_once_they_were_used(
     context: BrowserContext, tmp_path: Path, course: Folder
 ) -> None:
@@ -292,10 +315,10 @@ def test_labs_run_without_a_network_once_they_were_used(
     host = Host(tmp_path / "site")
     try:
         page, _ = opened(context, host, PAGE)
-        assert not [path for path in page.evaluate(KEPT) if path.endswith(".wasm")]
+        assert not page.evaluate(HAS_ENGINE)
         lab(page)
         settle(page)
-        until(page, f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))")
+        until(page, HAS_ENGINE)
         with host.away():
             page.goto(host.url + PAGE)
             lab(page)
@@ -303,7 +326,7 @@ def test_labs_run_without_a_network_once_they_were_used(
         host.stop()
 
 
-def test_a_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
+def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
     context: BrowserContext, tmp_path: Path, course: Folder
 ) -> None:
     shutil.copytree(course.root / "public", tmp_path / "site")
@@ -314,13 +337,12 @@ def test_a_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
         worker = (tmp_path / "site/service-worker.js").rename(tmp_path / "worker.js")
         page.goto(host.url + PAGE)
         lab(page)
-        while "service-worker.js" not in host.asked:
-            page.wait_for_timeout(25)
+        comes(page, lambda: "service-worker.js" in host.asked)
         worker.rename(tmp_path / "site/service-worker.js")
         page.reload()
         lab(page)
         until(page, "navigator.serviceWorker.controller !== null")
-        until(page, f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))")
+        until(page, HAS_ENGINE)
     finally:
         host.stop()
 
@@ -352,7 +374,7 @@ class Previewed:
 
 
 @pytest.mark.parametrize("script", ["preview.js", "worker.js"])
-def test_a_preview_is_never_shown_from_what_a_site_kept_at_its_address(
+def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     context: BrowserContext, made: Folder, tmp_path: Path, script: str
 ) -> None:
     """Either of two things sees the worker off: the page's script, and the worker in its place."""
@@ -374,8 +396,9 @@ def test_a_preview_is_never_shown_from_what_a_site_kept_at_its_address(
         until(page, left)
         if script == "worker.js":
             until(page, "caches.keys().then(names => names.length === 0)")
+        page.clock.install()
         page.goto(host.url + SECOND)
-        page.wait_for_timeout(2500)
+        page.clock.run_for(10_000)
         assert page.evaluate(left), "a page of a preview registers nothing"
         assert page.evaluate("navigator.serviceWorker.controller") is None
     finally:

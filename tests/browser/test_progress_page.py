@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from support.lab_page import comes
 from support.reader_page import (
     FALL_PAGE,
     KEY,
@@ -22,43 +22,56 @@ from support.reader_page import (
     quiet,
 )
 
+pytestmark = pytest.mark.browser
+
+OVERALL = '[data-progress="overall"]'
+TOLD = '[data-control="import"] [role=status]'
+"""What the page says of a file that was brought in."""
+
+
+def focus_on(page: Page, text: str) -> None:
+    expect(page.locator(":focus")).to_have_text(text)
+
 
 def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_path: Path) -> None:
     lesson = opened(calm, site + FALL_PAGE)
     choose(lesson, question(lesson, "way"), "Up")
     lesson.get_by_role("button", name="Mark as read").click()
     page = opened(calm, site + "progress/")
-    overall = page.locator('[data-progress="overall"]')
-    assert overall.inner_text().split("\n\n") == ["1 of 3 lessons read", "0 of 8 questions right"]
+    overall = page.locator(OVERALL)
+    expect(overall).to_contain_text("1 of 3 lessons read")
+    expect(overall).to_contain_text("0 of 8 questions right")
+    today = "() => `progress-motion-${new Date().toISOString().slice(0, 10)}.json`"
+    named = [page.evaluate(today)]
     with page.expect_download() as saving:
         page.get_by_role("button", name="Save as a file").first.click()
-    today = page.evaluate("() => new Date().toISOString().slice(0, 10)")
-    assert saving.value.suggested_filename == f"progress-motion-{today}.json"
+    named.append(page.evaluate(today))
+    assert saving.value.suggested_filename in named
     file = tmp_path / "saved.json"
     saving.value.save_as(file)
     assert json.loads(file.read_text("utf-8")) == kept(page)
 
     page.get_by_role("button", name="Forget everything").click()
     ask = page.get_by_role("dialog", name="Forget everything?")
-    assert "1 answer and 1 lesson are forgotten" in ask.inner_text()
-    assert page.locator(":focus").inner_text() == "Cancel"
+    expect(ask).to_contain_text("1 answer and 1 lesson are forgotten")
+    focus_on(page, "Cancel")
     page.keyboard.press("Escape")
-    assert not ask.is_visible()
+    expect(ask).to_be_hidden()
     page.get_by_role("button", name="Forget everything").click()
     ask.get_by_role("button", name="Forget", exact=True).click()
-    assert overall.inner_text().startswith("Nothing yet.")
-    comes(lesson, lambda: lesson.get_by_role("button", name="Mark as read").is_visible())
-    assert not lesson.get_by_text("Not this", exact=False).first.is_visible()
+    expect(overall).to_contain_text("Nothing yet.")
+    expect(lesson.get_by_role("button", name="Mark as read")).to_be_visible()
+    expect(question(lesson, "way").get_by_label("Up", exact=False)).not_to_be_checked()
 
     page.locator("input[type=file]").set_input_files(file)
-    told = page.locator('[data-control="import"] [role=status]')
-    comes(page, lambda: "2 things in the file are not here" in told.inner_text())
-    assert overall.inner_text().startswith("Nothing yet."), "what was forgotten stays so"
+    told = page.locator(TOLD)
+    expect(told).to_contain_text("2 things in the file are not here")
+    expect(overall).to_contain_text("Nothing yet.")  # what was forgotten stays so
     told.get_by_role("button", name="Bring back what was forgotten").click()
-    assert told.inner_text().startswith("Brought in: 1 answer and 1 lesson")
-    assert overall.inner_text().startswith("1 of 3 lessons read")
+    expect(told).to_contain_text("Brought in: 1 answer and 1 lesson")
+    expect(overall).to_contain_text("1 of 3 lessons read")
     page.locator("input[type=file]").set_input_files(file)
-    comes(page, lambda: told.inner_text() == "Everything in the file was here already.")
+    expect(told).to_have_text("Everything in the file was here already.")
     assert quiet(page, lesson)
 
 
@@ -68,16 +81,18 @@ def test_forgetting_can_be_undone(calm: BrowserContext, site: str) -> None:
     page.goto(site + "progress/")
     page.get_by_role("button", name="Forget everything").click()
     page.get_by_role("dialog").get_by_role("button", name="Forget", exact=True).click()
+    expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
     page.get_by_role("button", name="Undo").click()
-    assert "1 of 8 questions right" in page.locator('[data-progress="overall"]').inner_text()
-    assert page.locator(":focus").inner_text() == "Forget everything"
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
+    focus_on(page, "Forget everything")
 
 
-def test_a_file_goes_to_another_device(
-    calm: BrowserContext, browsers: dict[str, Browser], site: str, tmp_path: Path
+def test_file_goes_to_another_device(
+    calm: BrowserContext, browsers: Mapping[str, Browser], site: str, tmp_path: Path
 ) -> None:
     page = opened(calm, site + PUSH_PAGE)
     page.get_by_role("button", name="Mark as read").click()
+    expect(page.get_by_role("button", name="Mark as not read")).to_be_visible()
     file = tmp_path / "desk.json"
     file.write_text(page.evaluate("key => localStorage.getItem(key)", KEY), "utf-8")
     with browsers["plain"].new_context() as other:
@@ -85,45 +100,37 @@ def test_a_file_goes_to_another_device(
         phone.get_by_role("button", name="Mark as read").click()
         phone.goto(site + "progress/")
         phone.locator("input[type=file]").set_input_files(file)
-        told = phone.locator('[data-control="import"] [role=status]')
-        comes(phone, lambda: told.inner_text().startswith("Brought in: 0 answers and 1 lesson "))
-        overall = phone.locator('[data-progress="overall"]').inner_text()
-        assert overall.startswith("2 of 3 lessons read")
+        expect(phone.locator(TOLD)).to_contain_text("Brought in: 0 answers and 1 lesson ")
+        expect(phone.locator(OVERALL)).to_contain_text("2 of 3 lessons read")
 
 
-@pytest.mark.parametrize(
-    ("data", "message"),
-    [
-        (b"\xff\xfe\x00", "The file is no saved progress: it can’t be read as JSON"),
-        (b'{"a": 1}', "The file is no saved progress of a course. Nothing was changed."),
-        (
-            b'{"coursebuild":"progress","version":9}',
-            "The file was saved by a newer version of this site.",
-        ),
-        (
-            b'{"coursebuild":"progress","version":1,"course":"<img src=x onerror=alert(1)>"}',
-            "The file is of another course, “<img src=x onerror=alert(1)>”. Nothing was changed.",
-        ),
-        (
-            b'{"coursebuild":"progress","version":1,"course":"motion","reset":0,"lessons":{},'
-            b'"answers":{"q":{"<b>k":{"answer":{"tick":1}}}}}',
-            "The file is damaged: what it says at “answers, q, <b>k, answer” makes no sense.",
-        ),
-    ],
-    ids=["no-json", "no-progress", "newer", "other-course", "damaged"],
+START = '{"coursebuild":"progress","version":'
+WRONG_FILES = (
+    (b"\xff\xfe\x00", "The file is no saved progress: it can’t be read as JSON"),
+    (b'{"a": 1}', "The file is no saved progress of a course. Nothing was changed."),
+    (f"{START}9}}".encode(), "The file was saved by a newer version of this site."),
+    (
+        f'{START}1,"course":"<img src=x onerror=alert(1)>"}}'.encode(),
+        "The file is of another course, “<img src=x onerror=alert(1)>”. Nothing was changed.",
+    ),
+    (
+        f'{START}1,"course":"motion","reset":0,"lessons":{{}},'
+        '"answers":{"q":{"<b>k":{"answer":{"tick":1}}}}}'.encode(),
+        "The file is damaged: what it says at “answers, q, <b>k, answer” makes no sense.",
+    ),
 )
-def test_wrong_files_change_nothing(
-    calm: BrowserContext, site: str, tmp_path: Path, data: bytes, message: str
-) -> None:
+
+
+def test_wrong_files_change_nothing(calm: BrowserContext, site: str, tmp_path: Path) -> None:
     page = opened(calm, site)
     put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
     page.goto(site + "progress/")
     before = kept(page)
-    (tmp_path / "wrong.json").write_bytes(data)
-    page.locator("input[type=file]").set_input_files(tmp_path / "wrong.json")
-    told = page.locator('[data-control="import"] [role=status]')
-    comes(page, lambda: told.inner_text().startswith(message))
-    assert kept(page) == before
+    for data, message in WRONG_FILES:
+        (tmp_path / "wrong.json").write_bytes(data)
+        page.locator("input[type=file]").set_input_files(tmp_path / "wrong.json")
+        expect(page.locator(TOLD)).to_contain_text(message)
+        assert kept(page) == before
     assert quiet(page), SAID[page]
 
 
@@ -140,38 +147,38 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     page.goto(site + "progress/")
     orphans = page.locator('[data-progress="orphans"]')
     first = "Question 3 of quiz “<i>gone”, lesson 7.7 (wrong)"
-    assert [text.split(" Forget")[0] for text in orphans.locator("li").all_inner_texts()] == [
-        "Question 9 of quiz “fall”, lesson 1.2 (wrong)",
-        first,
-    ]
+    second = "Question 9 of quiz “fall”, lesson 1.2 (wrong)"
+    expect(orphans.locator("li")).to_contain_text([second, first])
     orphans.get_by_role("button", name=f"Forget: {first}").click()
-    assert orphans.locator("li").count() == 1
-    assert page.locator(":focus").inner_text() == "No longer in the course"
+    expect(orphans.locator("li")).to_have_count(1)
+    focus_on(page, "No longer in the course")
     orphans.get_by_role("button", name="Forget all of these").click()
-    assert not orphans.is_visible()
+    expect(orphans).to_be_hidden()
     page.reload()
-    assert not orphans.is_visible()
-    assert "0 of 8 questions right" in page.locator('[data-progress="overall"]').inner_text()
+    expect(page.locator(OVERALL)).to_contain_text("0 of 8 questions right")
+    expect(orphans).to_be_hidden()
 
 
-def test_without_a_script_the_pages_say_so_and_are_complete(
-    browsers: dict[str, Browser], site: str
+def test_pages_without_a_script_say_so_and_are_complete(
+    browsers: Mapping[str, Browser], site: str
 ) -> None:
     with browsers["plain"].new_context(java_script_enabled=False) as context:
         page = context.new_page()
         page.goto(site + "progress/")
-        assert "Progress is kept by a script" in page.locator("noscript").inner_text()
+        said = page.locator("noscript")
+        expect(said).to_contain_text("Progress is kept by a script", use_inner_text=True)
         page.locator("summary").first.click()
-        assert page.get_by_role("link", name="Push & <em>pull</em>").is_visible()
+        expect(page.get_by_role("link", name="Push & <em>pull</em>")).to_be_visible()
         page.goto(site + "review/")
-        assert "scripts are switched off here" in page.locator("noscript").inner_text()
-        assert page.locator(".asking li").all_inner_texts() == [
+        expect(said).to_contain_text("scripts are switched off here", use_inner_text=True)
+        lessons = [
             "1.1 Push & <em>pull</em> 3 questions",
             "1.2 Free fall, from a height that is not small 4 questions",
             "About 1 question",
         ]
+        expect(page.locator(".asking li")).to_have_text(lessons)
         page.goto(site)
-        assert page.locator(".start a").inner_text().startswith("Start with 1.1")
+        expect(page.locator(".start a")).to_contain_text("Start with 1.1")
 
 
 def test_everything_works_from_the_keyboard(calm: BrowserContext, site: str) -> None:
@@ -180,23 +187,26 @@ def test_everything_works_from_the_keyboard(calm: BrowserContext, site: str) -> 
     page.goto(site + "review/")
     tab_to(page, "Begin")
     page.keyboard.press("Enter")
-    comes(page, lambda: question(page, "way").is_visible())
+    expect(question(page, "way").locator(".quiz-check")).to_be_visible()
     tab_to(page, "Up", property="labels?.[0]?.innerText")
     page.keyboard.press("ArrowDown")
     tab_to(page, "Check")
     page.keyboard.press("Enter")
-    assert "Right" in page.locator(".verdict").inner_text()
+    expect(page.locator(".verdict")).to_contain_text("Right")
     tab_to(page, "Next question")
     page.keyboard.press("Enter")
-    assert page.locator(":focus").inner_text() == "Done: 1 of 1 right."
+    focus_on(page, "Done: 1 of 1 right.")
     page.goto(site + "progress/")
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
     tab_to(page, "Forget everything")
     page.keyboard.press("Space")
+    focus_on(page, "Cancel")
     tab_to(page, "Forget")
     page.keyboard.press("Enter")
+    expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
     tab_to(page, "Undo")
     page.keyboard.press("Enter")
-    assert "1 of 8 questions right" in page.locator('[data-progress="overall"]').inner_text()
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
 
 
 def tab_to(page: Page, text: str, property: str = "innerText") -> None:
@@ -212,8 +222,12 @@ def test_what_can_be_pressed_is_large_enough(calm: BrowserContext, site: str) ->
     page = opened(calm, site)
     put(page, {"quiz": "gone", "key": "x", "lesson": "7.7"})
     page.set_viewport_size({"width": 320, "height": 640})
-    for path, part in (("progress/", "main"), (PUSH_PAGE, ".lesson-end")):
+    for path, part, button in (
+        ("progress/", "main", "Forget all of these"),
+        (PUSH_PAGE, ".lesson-end", "Mark as read"),
+    ):
         page.goto(site + path)
+        expect(page.get_by_role("button", name=button)).to_be_visible()
         sizes = page.locator(part).evaluate(
             "(part) => [...part.querySelectorAll('button, input[type=file], summary')]"
             ".filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect())"

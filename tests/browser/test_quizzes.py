@@ -1,13 +1,17 @@
-"""Quizzes in a headless Chromium: every kind answered, by mouse, by keys and with the pointer."""
+"""Quizzes in a headless Chromium: every kind answered, by mouse, by keys and with the pointer.
+
+Tests share a page where each has a question of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 
 import pytest
-from playwright.sync_api import BrowserContext, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from support.lab_page import until
+from support.lab_page import comes
 from support.quiz_page import (
     ANGLE,
     MCQ,
@@ -17,7 +21,6 @@ from support.quiz_page import (
     OUTPUT,
     PREDICT,
     SEVERAL,
-    answer_all,
     clean_page,
     folded,
     items,
@@ -25,7 +28,6 @@ from support.quiz_page import (
     press,
     question,
     verdict,
-    visit,
 )
 
 pytestmark = pytest.mark.browser
@@ -36,55 +38,64 @@ def page(context: BrowserContext, quizzes: str) -> Iterator[Page]:
     yield from clean_page(context, quizzes)
 
 
+@pytest.fixture(scope="module")
+def lesson(browsers: Mapping[str, Browser], quizzes: str) -> Iterator[Page]:
+    """The page of the tests that each have a question of their own."""
+    size = {"width": 1000, "height": 800}
+    with browsers["webgl"].new_context(viewport=size) as context:  # type: ignore[arg-type]
+        yield from clean_page(context, quizzes)
+
+
 # ------------------------------------------------------------------------------- every kind
 
 
-def test_one_of_several_options(page: Page) -> None:
-    one = question(page, MCQ)
+def test_one_right_option_of_several(lesson: Page) -> None:
+    one = question(lesson, MCQ)
     group = one.get_by_role("group", name="Four times as long:")
     radios = group.get_by_role("radio")
     expect(radios).to_have_count(4)
-    press(page, MCQ)
-    expect(verdict(page, MCQ)).to_have_text("Choose one first.")
-    assert kept(page, MCQ) is None
+    press(lesson, MCQ)
+    expect(verdict(lesson, MCQ)).to_have_text("Choose one first.")
+    assert kept(lesson, MCQ) is None
     radios.nth(0).check()
-    expect(verdict(page, MCQ)).to_be_empty()
-    press(page, MCQ)
-    expect(verdict(page, MCQ)).to_contain_text("Not right.")
-    expect(verdict(page, MCQ)).to_contain_text("Not the same.")
-    expect(verdict(page, MCQ)).not_to_contain_text("Since")
+    expect(verdict(lesson, MCQ)).to_be_empty()
+    press(lesson, MCQ)
+    expect(verdict(lesson, MCQ)).to_contain_text("Not right.")
+    expect(verdict(lesson, MCQ)).to_contain_text("Not the same.")
+    expect(verdict(lesson, MCQ)).not_to_contain_text("Since")
     expect(one.get_by_role("radio", name="the same, T not this")).to_be_checked()
     expect(one.get_by_role("button", name="Check")).to_be_focused()
     radios.nth(1).check()
-    press(page, MCQ)
-    expect(verdict(page, MCQ)).to_contain_text("Right.")
-    expect(verdict(page, MCQ).get_by_text("The root of four.")).to_be_visible()
-    expect(verdict(page, MCQ).get_by_text("If you chose B")).to_be_hidden()
-    expect(verdict(page, MCQ)).to_contain_text("Since")
-    expect(verdict(page, MCQ)).to_have_attribute("role", "status")
+    press(lesson, MCQ)
+    expect(verdict(lesson, MCQ)).to_contain_text("Right.")
+    expect(verdict(lesson, MCQ).get_by_text("The root of four.")).to_be_visible()
+    expect(verdict(lesson, MCQ).get_by_text("If you chose B")).to_be_hidden()
+    expect(verdict(lesson, MCQ)).to_contain_text("Since")
+    expect(verdict(lesson, MCQ)).to_have_attribute("role", "status")
     expect(one.get_by_role("button", name="Check")).to_be_focused()
     expect(one.get_by_role("button", name="Check")).to_have_attribute("aria-disabled", "true")
-    answer = kept(page, MCQ)
+    answer = kept(lesson, MCQ)
     assert answer is not None
     assert (answer["right"], answer["tries"], answer["number"]) == (True, 2, 1)
     assert (answer["kind"], answer["lesson"], len(answer["given"])) == ("mcq", "1.1", 1)
 
 
-def test_all_that_are_right(page: Page) -> None:
-    boxes = question(page, SEVERAL).get_by_role("checkbox")
+def test_several_right_options(lesson: Page) -> None:
+    boxes = question(lesson, SEVERAL).get_by_role("checkbox")
     boxes.nth(0).check()
     boxes.nth(1).check()
-    press(page, SEVERAL)
-    expect(verdict(page, SEVERAL)).to_contain_text(
+    press(lesson, SEVERAL)
+    expect(verdict(lesson, SEVERAL)).to_contain_text(
         "Not right. Chosen but not right: 1. Right but not chosen: 1."
     )
-    expect(verdict(page, SEVERAL)).to_contain_text("If you chose B It cancels.")
+    expect(verdict(lesson, SEVERAL)).to_contain_text("If you chose B It cancels.")
     # Which ones they are is not told.
-    assert question(page, SEVERAL).locator("[data-mark=right], [data-mark=wrong]").count() == 0
+    marks = question(lesson, SEVERAL).locator("[data-mark=right], [data-mark=wrong]")
+    expect(marks).to_have_count(0)
     boxes.nth(1).uncheck()
     boxes.nth(2).check()
-    press(page, SEVERAL)
-    expect(verdict(page, SEVERAL)).to_contain_text("Right. Not mass.")
+    press(lesson, SEVERAL)
+    expect(verdict(lesson, SEVERAL)).to_contain_text("Right. Not mass.")
 
 
 NUMBERS = [
@@ -106,23 +117,6 @@ NUMBERS = [
 ]
 
 
-def test_numbers(page: Page) -> None:
-    tries = {NUMBER: 0, ANGLE: 0}
-    for number, entered, said in NUMBERS:
-        field = question(page, number).get_by_label("Your answer")
-        field.fill(entered)
-        field.press("Enter")
-        expect(verdict(page, number)).to_contain_text(said)
-        expect(field).to_be_focused()
-        right = "Right." in said
-        assert field.get_attribute("aria-invalid") == (None if right else "true")
-        tries[number] += 1
-        answer = kept(page, number)
-        assert answer is not None
-        found = (answer["given"], answer["right"], answer["tries"])
-        assert found == (entered, right, tries[number])
-
-
 UNREADABLE = [
     ("1,200", "“1,200” can be read as 1200 or as 1.200."),
     ("1/2π", "can be read in two ways"),
@@ -132,68 +126,74 @@ UNREADABLE = [
 ]
 
 
-def test_what_cannot_be_read_is_no_try(page: Page) -> None:
-    field = question(page, NUMBER).get_by_label("Your answer")
+def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
+    field = question(lesson, NUMBER).get_by_label("Your answer")
     for entered, said in UNREADABLE:
         field.fill(entered)
-        press(page, NUMBER)
-        expect(verdict(page, NUMBER)).to_contain_text("This cannot be read.")
-        expect(verdict(page, NUMBER)).to_contain_text(said)
-        assert kept(page, NUMBER) is None
-    field.fill("0.08")
-    press(page, NUMBER)
-    answer = kept(page, NUMBER)
-    assert answer is not None and answer["tries"] == 1
-
-
-def test_a_number_is_mended_beside_what_was_wrong_with_it(page: Page) -> None:
-    field = question(page, NUMBER).get_by_label("Your answer")
+        press(lesson, NUMBER)
+        expect(verdict(lesson, NUMBER)).to_contain_text("This cannot be read.")
+        expect(verdict(lesson, NUMBER)).to_contain_text(said)
+        assert kept(lesson, NUMBER) is None  # it is no try
+    tries = {NUMBER: 0, ANGLE: 0}
+    for number, entered, said in NUMBERS:
+        field = question(lesson, number).get_by_label("Your answer")
+        field.fill(entered)
+        field.press("Enter")
+        expect(verdict(lesson, number)).to_contain_text(said)
+        expect(field).to_be_focused()
+        right = "Right." in said
+        if right:
+            expect(field).not_to_have_attribute("aria-invalid", "true")
+        else:
+            expect(field).to_have_attribute("aria-invalid", "true")
+        tries[number] += 1
+        answer = kept(lesson, number)
+        assert answer is not None
+        found = (answer["given"], answer["right"], answer["tries"])
+        assert found == (entered, right, tries[number])
+    # It is mended beside what is wrong with it.
+    field = question(lesson, NUMBER).get_by_label("Your answer")
     field.fill("80")
-    press(page, NUMBER)
+    press(lesson, NUMBER)
     field.press("End")
     field.press_sequentially("0")
-    expect(verdict(page, NUMBER)).to_contain_text("the power of ten is not")
+    expect(verdict(lesson, NUMBER)).to_contain_text("the power of ten is not")
     field.fill("0.08")
-    press(page, NUMBER)
-    expect(verdict(page, NUMBER)).to_contain_text("So much.")
+    press(lesson, NUMBER)
+    expect(verdict(lesson, NUMBER)).to_contain_text("So much.")
     field.press_sequentially("1")
-    expect(verdict(page, NUMBER)).to_be_empty()
+    expect(verdict(lesson, NUMBER)).to_be_empty()
 
 
-def test_a_prediction_is_committed_to_before_its_simulation_opens(page: Page) -> None:
-    one = question(page, PREDICT)
+def test_prediction_is_committed_to_before_its_simulation_opens(lesson: Page) -> None:
+    one = question(lesson, PREDICT)
     expect(one.locator(".lab")).to_be_hidden()
-    press(page, PREDICT, "Commit to this")
-    expect(verdict(page, PREDICT)).to_have_text("Choose what you predict first.")
+    press(lesson, PREDICT, "Commit to this")
+    expect(verdict(lesson, PREDICT)).to_have_text("Choose what you predict first.")
     one.get_by_role("radio", name="it rests").check()
-    press(page, PREDICT, "Commit to this")
-    expect(verdict(page, PREDICT)).to_contain_text("It happens otherwise.")
+    press(lesson, PREDICT, "Commit to this")
+    expect(verdict(lesson, PREDICT)).to_contain_text("It happens otherwise.")
     columns = one.locator(".outcome > div")
     expect(columns.nth(0)).to_have_text("You predicted" + "it rests")
     expect(columns.nth(1)).to_have_text("What happens" + "it swings")
-    expect(verdict(page, PREDICT)).to_contain_text("It does not.")
-    expect(verdict(page, PREDICT)).to_contain_text("Gravity pulls.")
+    expect(verdict(lesson, PREDICT)).to_contain_text("It does not.")
+    expect(verdict(lesson, PREDICT)).to_contain_text("Gravity pulls.")
     expect(one.get_by_role("radio").first).to_be_disabled()
     expect(one.get_by_role("button", name="Try again")).to_be_hidden()
     expect(one.get_by_role("button", name="Show the answer")).to_be_hidden()
     one.locator(".lab").scroll_into_view_if_needed()
-    until(page, "() => document.querySelector('.question .lab').dataset.state === 'paused'")
+    expect(one.locator(".lab")).to_have_attribute("data-state", "paused")
     expect(one.get_by_role("button", name="Play")).to_be_visible()
-    # There is no way back by loading the page again.
-    visit(page, page.url)
-    expect(one.get_by_role("radio", name="it rests")).to_be_checked()
-    expect(one.get_by_role("radio", name="it rests")).to_be_disabled()
-    expect(one.locator(".lab")).to_be_visible()
 
 
-def test_an_open_question_is_compared_and_marked_by_the_learner(page: Page) -> None:
-    one = question(page, OPEN)
-    press(page, OPEN, "Compare")
-    expect(verdict(page, OPEN)).to_have_text("Write an answer first.")
+def test_open_question_is_compared_and_marked_by_the_learner(lesson: Page) -> None:
+    one = question(lesson, OPEN)
+    press(lesson, OPEN, "Compare")
+    expect(verdict(lesson, OPEN)).to_have_text("Write an answer first.")
     one.get_by_label("Your answer").fill("It <b>is</b>\nso.")
-    press(page, OPEN, "Compare")
-    expect(verdict(page, OPEN)).to_contain_text("Since so.")
-    answer = kept(page, OPEN)
+    press(lesson, OPEN, "Compare")
+    expect(verdict(lesson, OPEN)).to_contain_text("Since so.")
+    answer = kept(lesson, OPEN)
     assert answer is not None and answer["right"] is None
     for name, said, right in (
         ("In part", "Marked as right in part.", False),
@@ -201,18 +201,13 @@ def test_an_open_question_is_compared_and_marked_by_the_learner(page: Page) -> N
         ("Not yet", "Marked as not right yet.", False),
     ):
         one.get_by_role("radio", name=name).check()
-        expect(verdict(page, OPEN)).to_contain_text(said)
-        answer = kept(page, OPEN)
+        expect(verdict(lesson, OPEN)).to_contain_text(said)
+        answer = kept(lesson, OPEN)
         assert answer is not None and (answer["right"], answer["tries"]) == (right, 1)
-    visit(page, page.url)
-    expect(one.get_by_label("Your answer")).to_have_value("It <b>is</b>\nso.")
-    expect(one.get_by_role("radio", name="Not yet")).to_be_checked()
-    expect(verdict(page, OPEN)).to_contain_text("Marked as not right yet.")
-    expect(verdict(page, OPEN)).to_contain_text("Since so.")
 
 
-def test_a_line_that_is_printed(page: Page) -> None:
-    field = question(page, OUTPUT).get_by_label("What it prints")
+def test_line_that_is_printed(lesson: Page) -> None:
+    field = question(lesson, OUTPUT).get_by_label("What it prints")
     for entered, said in (
         ("t = 2.0061 s", "Only capitals"),
         ("T = 2.006 s", "it prints more of them"),
@@ -220,46 +215,41 @@ def test_a_line_that_is_printed(page: Page) -> None:
         ("T  =  2.00610 s ", "Right."),
     ):
         field.fill(entered)
-        press(page, OUTPUT)
-        expect(verdict(page, OUTPUT)).to_contain_text(said)
-    expect(verdict(page, OUTPUT)).to_contain_text("Four places.")
+        press(lesson, OUTPUT)
+        expect(verdict(lesson, OUTPUT)).to_contain_text(said)
+    expect(verdict(lesson, OUTPUT)).to_contain_text("Four places.")
 
 
-def test_an_order_by_buttons(page: Page) -> None:
-    before = items(page)
-    assert sorted(before) == ["1 m", "2 m", "3 m", "4 m"] != before
-    press(page, ORDER)
-    expect(verdict(page, ORDER)).to_contain_text("of 4 stand where they belong.")
-    said = question(page, ORDER).locator("p[role=status]")
-    for place, name in enumerate(("1 m", "2 m", "3 m", "4 m")):
-        while items(page).index(name) > place:
-            button = question(page, ORDER).get_by_role("button", name=f"Move up {name}")
-            button.click()
-            expect(button).to_be_focused()
-            expect(said).to_have_text(f"{name}: place {items(page).index(name) + 1} of 4")
-    expect(verdict(page, ORDER)).to_be_empty()
-    press(page, ORDER)
-    expect(verdict(page, ORDER)).to_contain_text("Right. By length.")
-    visit(page, page.url)
-    assert items(page) == ["1 m", "2 m", "3 m", "4 m"]
-
-
-def test_an_order_by_dragging(page: Page) -> None:
-    grips = question(page, ORDER).locator(".item-grip")
-    before = items(page)
+def test_order_by_dragging_and_by_buttons(lesson: Page) -> None:
+    assert sorted(items(lesson)) == ["1 m", "2 m", "3 m", "4 m"] != items(lesson)
+    grips = question(lesson, ORDER).locator(".item-grip")
+    before = items(lesson)
     grips.first.scroll_into_view_if_needed()
     start, end = grips.nth(0).bounding_box(), grips.nth(3).bounding_box()
     assert start is not None and end is not None
     x = start["x"] + start["width"] / 2
-    page.mouse.move(x, start["y"] + start["height"] / 2)
-    page.mouse.down()
+    lesson.mouse.move(x, start["y"] + start["height"] / 2)
+    lesson.mouse.down()
     for share in (0.2, 0.4, 0.6, 0.8, 1.0, 1.2):
-        page.mouse.move(x, start["y"] + share * (end["y"] + end["height"] - start["y"]))
-    page.mouse.up()
-    assert items(page) == [*before[1:], before[0]]
-    expect(question(page, ORDER).locator("p[role=status]")).to_have_text(
+        lesson.mouse.move(x, start["y"] + share * (end["y"] + end["height"] - start["y"]))
+    lesson.mouse.up()
+    comes(lesson, lambda: items(lesson) == [*before[1:], before[0]])
+    expect(question(lesson, ORDER).locator("p[role=status]")).to_have_text(
         f"{before[0]}: place 4 of 4"
     )
+    press(lesson, ORDER)
+    expect(verdict(lesson, ORDER)).to_contain_text("of 4 stand where they belong.")
+    said = question(lesson, ORDER).locator("p[role=status]")
+    for place, name in enumerate(("1 m", "2 m", "3 m", "4 m")):
+        while items(lesson).index(name) > place:
+            button = question(lesson, ORDER).get_by_role("button", name=f"Move up {name}")
+            button.click()
+            expect(button).to_be_focused()
+            expect(said).to_have_text(f"{name}: place {items(lesson).index(name) + 1} of 4")
+    expect(verdict(lesson, ORDER)).to_be_empty()
+    press(lesson, ORDER)
+    expect(verdict(lesson, ORDER)).to_contain_text("Right. By length.")
+    assert items(lesson) == ["1 m", "2 m", "3 m", "4 m"]
 
 
 # ------------------------------------------------------------------------------- keys alone
@@ -306,7 +296,7 @@ def test_every_kind_by_keys_alone(page: Page) -> None:
         keys.press("Home")
     expect(question(page, ORDER).get_by_role("button", name="Move up 1 m")).to_be_focused()
     keys.press("ArrowDown")
-    assert items(page)[:2] == ["2 m", "1 m"]
+    comes(page, lambda: items(page)[:2] == ["2 m", "1 m"])
     keys.press("ArrowUp")
     press(page, ORDER)
     expect(verdict(page, ORDER)).to_contain_text("Right.")
@@ -316,7 +306,7 @@ def test_every_kind_by_keys_alone(page: Page) -> None:
 # ------------------------------------------------------------------- hints, answers, retries
 
 
-def test_hints_come_one_by_one(page: Page) -> None:
+def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     hints = question(page, MCQ).locator(".hint")
     expect(hints.nth(0)).to_be_visible()
     expect(hints.nth(1)).to_be_hidden()
@@ -327,11 +317,6 @@ def test_hints_come_one_by_one(page: Page) -> None:
     press(page, MCQ)
     answer = kept(page, MCQ)
     assert answer is not None and answer["hints"] == 1
-    visit(page, page.url)
-    expect(hints.nth(1)).to_be_visible()
-
-
-def test_the_answer_can_be_asked_for_after_a_try_and_tried_again(page: Page) -> None:
     one = question(page, NUMBER)
     reveal = one.get_by_role("button", name="Show the answer")
     again = one.get_by_role("button", name="Try again")
@@ -351,13 +336,11 @@ def test_the_answer_can_be_asked_for_after_a_try_and_tried_again(page: Page) -> 
     expect(one.get_by_label("Your answer")).to_be_focused()
     press(page, ORDER)
     press(page, ORDER, "Show the answer")
-    assert folded(verdict(page, ORDER).locator("ol > li")) == ["1 m", "2 m", "3 m", "4 m"]
-
-
-# ------------------------------------------------------------------------ labels and markup
-
-
-def test_formulas_code_and_markup_in_options_choose_them(page: Page) -> None:
+    comes(
+        page,
+        lambda: folded(verdict(page, ORDER).locator("ol > li")) == ["1 m", "2 m", "3 m", "4 m"],
+    )
+    # Formulas, code and markup in options choose them.
     one = question(page, MCQ)
     radios = one.get_by_role("radio")
     one.locator("math", has_text="2").first.click()
@@ -367,18 +350,4 @@ def test_formulas_code_and_markup_in_options_choose_them(page: Page) -> None:
     one.locator(".options b").click()
     expect(radios.nth(3)).to_be_checked()
     one.get_by_role("link", name="factor").click()
-    assert page.evaluate("location.hash") == "#hello"
-
-
-def test_no_id_is_there_twice_and_every_reference_leads_somewhere(page: Page) -> None:
-    answer_all(page)
-    assert page.evaluate(
-        """() => {
-          const ids = [...document.querySelectorAll('[id]')].map((element) => element.id)
-          const twice = ids.filter((id, i) => ids.indexOf(id) !== i)
-          const named = ['for', 'aria-describedby', 'aria-labelledby'].flatMap((name) =>
-            [...document.querySelectorAll(`[${name}]`)].flatMap((element) =>
-              element.getAttribute(name).split(' ')))
-          return [twice, named.filter((id) => !ids.includes(id))]
-        }"""
-    ) == [[], []]  # fmt: skip
+    expect(page).to_have_url(re.compile("#hello$"))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from playwright.sync_api import BrowserContext
+import shutil
+from pathlib import Path
 
-from support.lab_page import comes, until
-from support.reader_course import PUSH
+import pytest
+from playwright.sync_api import BrowserContext, Locator, expect
+
+from support.folder_server import served
 from support.reader_page import (
     FALL_PAGE,
     PUSH_PAGE,
@@ -17,6 +20,8 @@ from support.reader_page import (
     quiet,
 )
 from support.scratch_course import Folder
+
+pytestmark = pytest.mark.browser
 
 
 def test_missed_questions_come_back(calm: BrowserContext, site: str) -> None:
@@ -31,78 +36,89 @@ def test_missed_questions_come_back(calm: BrowserContext, site: str) -> None:
     )
     page.goto(site + "review/")
     review = page.locator('[data-progress="review"]')
-    assert review.locator(".due").inner_text() == "3 questions are due."
-    assert "One more was missed, of which the course no longer" in review.inner_text()
+    due = review.locator(".due")
+    expect(due).to_have_text("3 questions are due.")
+    expect(review).to_contain_text("One more was missed, of which the course no longer")
     page.get_by_role("button", name="Begin").click()
-    comes(page, lambda: question(page, "smoke").is_visible())
-    assert page.locator(":focus").inner_text() == "Question 1 of 3"
-    assert not question(page, "smoke").get_by_label("Up").is_checked(), "nothing is shown of before"
+    expect(question(page, "smoke")).to_be_visible()
+    expect(page.locator(":focus")).to_have_text("Question 1 of 3")
+    # Nothing is shown of what was answered before.
+    expect(question(page, "smoke").get_by_label("Up")).not_to_be_checked()
     choose(page, question(page, "smoke"), "Up")
     page.get_by_role("button", name="Next question").click()
 
-    comes(page, lambda: question(page, "way").is_visible())
+    expect(question(page, "way")).to_be_visible()
     picture = question(page, "way").locator("img")
-    until(page, "() => document.querySelector('.question img').naturalWidth === 9")
-    assert picture.get_attribute("src") == site + "files/lessons/stone.svg"
+    expect(picture).to_have_js_property("naturalWidth", 9)
+    expect(picture).to_have_attribute("src", site + "files/lessons/stone.svg")
     choose(page, question(page, "way"), "Up")
     page.get_by_role("button", name="Next question").click()
 
-    comes(page, lambda: question(page, "swing").is_visible())
-    assert page.locator("[data-lab]").count() == 0
+    expect(question(page, "swing")).to_be_visible()
+    expect(page.locator("[data-lab]")).to_have_count(0)
     choose(page, question(page, "swing"), "Left")
     link = page.get_by_role("link", name="See what happens, in the lesson")
-    assert link.get_attribute("href") == f"{site}{FALL_PAGE}#fall.swing"
+    expect(link).to_have_attribute("href", f"{site}{FALL_PAGE}#fall.swing")
     page.get_by_role("button", name="Next question").click()
-    assert page.locator(":focus").inner_text() == "Done: 2 of 3 right."
-    assert review.locator(".due").inner_text() == "Nothing is due."
-    assert "One comes back in a day. 2 come back in 3 days." in review.inner_text()
+    expect(page.locator(":focus")).to_have_text("Done: 2 of 3 right.")
+    expect(due).to_have_text("Nothing is due.")
+    expect(review).to_contain_text("One comes back in a day. 2 come back in 3 days.")
     page.reload()
-    assert review.locator(".due").inner_text() == "Nothing is due."
+    expect(due).to_have_text("Nothing is due.")
     page.goto(site + FALL_PAGE)
-    assert question(page, "way").get_by_label("Up").is_checked(), "the lesson shows it too"
+    expect(live(question(page, "way")).get_by_label("Up")).to_be_checked()
     assert quiet(page), SAID[page]
 
 
-def test_a_question_that_cannot_be_fetched_is_linked(calm: BrowserContext, site: str) -> None:
+def live(found: Locator) -> Locator:
+    """A question comes alive when it comes near."""
+    found.scroll_into_view_if_needed()
+    return found
+
+
+def test_question_that_cannot_be_fetched_is_linked(calm: BrowserContext, site: str) -> None:
     page = opened(calm, site)
     put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
     page.goto(site + "review/")
     page.route("**/lessons/*", lambda route: route.fulfill(status=500, body="no"))
     page.get_by_role("button", name="Begin").click()
     link = page.get_by_role("link", name="question 1 in its lesson")
-    assert link.get_attribute("href") == f"{site}{FALL_PAGE}#fall.way"
+    expect(link).to_have_attribute("href", f"{site}{FALL_PAGE}#fall.way")
     page.get_by_role("button", name="Skip").click()
-    assert page.locator(".due").inner_text() == "One question is due."
+    expect(page.locator(".due")).to_have_text("One question is due.")
 
 
-def test_from_disk_there_are_links(calm: BrowserContext, reader: Folder) -> None:
+def test_review_opened_from_disk_links_to_questions(calm: BrowserContext, reader: Folder) -> None:
     page = opened(calm, (reader.root / "public/review/index.html").as_uri())
     put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
     page.reload()
     link = page.get_by_role("link", name="question 1 in its lesson")
-    assert "Pages opened from disk" in page.locator('[data-progress="review"]').inner_text()
+    expect(page.locator('[data-progress="review"]')).to_contain_text("Pages opened from disk")
     link.click()
-    assert page.url.endswith(f"public/{FALL_PAGE}#fall.way")
+    page.wait_for_url(f"**/public/{FALL_PAGE}#fall.way")
 
 
-def test_a_reworded_question_keeps_its_answer_and_its_turn(
-    calm: BrowserContext, site: str, reader: Folder
+def test_reworded_question_keeps_its_answer_and_its_turn(
+    calm: BrowserContext, reader: Folder, tmp_path: Path
 ) -> None:
-    page = opened(calm, site + PUSH_PAGE)
-    choose(page, page.locator(".question").first, "Up")
-    old = page.locator(".question").first.get_attribute("data-question")
-    reader.write("content/lessons/1.1-push.md", PUSH.replace("Where does a", "Whither a"))
-    try:
-        assert reader.main("build").status == 0
-        page.reload()
+    folder = Folder(tmp_path / "course")
+    shutil.copytree(reader.root, folder.root, symlinks=True)
+    with served(folder.root / "public") as site:
+        page = opened(calm, site + PUSH_PAGE)
         first = page.locator(".question").first
-        new = first.get_attribute("data-question")
-        assert new != old
-        assert first.get_by_label("Up").is_checked()
+        choose(page, first, "Up")
+        expect(first.locator(".verdict")).to_contain_text("Not right.")
+        old = first.get_attribute("data-question")
+        assert old is not None
+        folder.replace("content/lessons/1.1-push.md", "Where does a", "Whither a")
+        done = folder.main("build")
+        assert done.status == 0, done.out + done.err
+        page.reload()
+        expect(first).not_to_have_attribute("data-question", old)
+        expect(live(first).get_by_label("Up")).to_be_checked()
         page.goto(site + "progress/")
-        assert not page.locator('[data-progress="orphans"]').is_visible()
+        expect(page.locator('[data-progress="overall"]')).to_contain_text("0 of 8 questions right")
+        expect(page.locator('[data-progress="orphans"]')).to_be_hidden()
         page.goto(site + "review/")
-        assert "One comes back in a day." in page.locator('[data-progress="review"]').inner_text()
-    finally:
-        reader.write("content/lessons/1.1-push.md", PUSH)
-        assert reader.main("build").status == 0
+        review = page.locator('[data-progress="review"]')
+        expect(review).to_contain_text("One comes back in a day.")

@@ -3,7 +3,7 @@
 A case is a folder `tests/courses/<case>/` with `course/` (a course as an author has it) and
 `expected/`: `files.txt`, the list of everything that a build makes, and the texts worth reading in
 a review. A missing and an unexpected output both fail. `pytest --rewrite-fixtures` writes
-`expected/`.
+`expected/`. Folders without it are courses that other tests use.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import pytest
 from coursebuild.cli import main
 
 HERE = Path(__file__).parent
-CASES = sorted(path.parent.name for path in HERE.glob("*/course"))
+CASES = sorted(path.parent.name for path in HERE.glob("*/expected"))
 READ = (".html", ".py", ".xml", ".txt")
 """What is compared by its text, but for the assets; of a page that is the part in `<main>`."""
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from coursebuild.model.scenarios import Declarations
-from coursebuild.physics.diet import timing
 from coursebuild.physics.diet.cases import Case, begin, cases, command
 from coursebuild.physics.diet.compare import TOLERANCE, compare, watch
 from coursebuild.physics.diet.mapping import Gone, Mapping, fits, mapping_without, transfer
@@ -159,11 +158,11 @@ def test_a_ratio_of_times(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
     noise = np.random.default_rng(0)
 
-    def advance(model: Any, data: Any, steps: int = 1) -> None:
+    def step(model: Any, data: Any, nstep: int = 1) -> None:
         nonlocal now
-        now += steps * (3e-6 if model is one else 1e-6) * noise.uniform(1.0, 1.02)
+        now += nstep * (3e-6 if model is one else 1e-6) * noise.uniform(1.0, 1.02)
 
-    monkeypatch.setattr(timing, "advance", advance)
+    monkeypatch.setattr(mujoco, "mj_step", step)
     ratio = time_ratio(one, other, same(one), [CHAOS], lambda: now, quick=False)
     assert ratio is not None and ratio.certain
     assert ratio.value == pytest.approx(3.0, rel=0.02) and ratio.spread < 0.02

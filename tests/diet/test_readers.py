@@ -22,12 +22,12 @@ def of(*texts: str) -> Readers:
         "model_path('models/' + kind + '.xml')",
     ],
 )
-def test_who_may_use_a_model(text: str) -> None:
+def test_a_text_that_names_a_model_or_builds_its_path_may_use_it(text: str) -> None:
     assert readers_of("robots/arm", [Reader("a.md", text)]).files
 
 
 @pytest.mark.parametrize("text", ["model_path('army')", "alarm", "f'{name}.xml'", "charm arms"])
-def test_who_does_not(text: str) -> None:
+def test_a_text_with_other_words_only_does_not_use_the_model(text: str) -> None:
     assert not readers_of("robots/arm", [Reader("a.md", text)]).files
 
 
@@ -51,7 +51,7 @@ def test_who_does_not(text: str) -> None:
         ("body-number", "data.xpos[2]"),
     ],
 )
-def test_what_reads_all_of_a_kind(what: str, text: str) -> None:
+def test_what_counts_things_or_takes_them_all_reads_the_whole_kind(what: str, text: str) -> None:
     assert of("nothing", text).whole(what) == "1.md"
 
 
@@ -69,11 +69,11 @@ def test_what_reads_all_of_a_kind(what: str, text: str) -> None:
         ("number", 'data.joint("pivot").qpos[0] + data.body("arm").xpos'),
     ],
 )
-def test_what_does_not(what: str, text: str) -> None:
+def test_what_asks_for_one_thing_by_name_does_not_read_the_whole_kind(what: str, text: str) -> None:
     assert of(text).whole(what) == ""
 
 
-def test_names() -> None:
+def test_names_are_found_as_whole_words() -> None:
     readers = of('data.sensor("gyro-2")', "the Kügelchen; a.b")
     assert readers.named("gyro-2") == "0.md" and readers.named("Kügelchen") == "1.md"
     assert readers.named("a.b") and not readers.named("a+b") and not readers.named("")

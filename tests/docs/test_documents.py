@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +13,9 @@ import pytest
 
 from coursebuild.cli import main
 from coursebuild.pipeline.load import load
+from support.built_sites import BuiltCourses
 from support.markdown_files import DOCS, ROOT, code_spans, fences, links, write_files
+from support.scratch_course import Folder
 
 README = ROOT / "README.md"
 FENCES = fences(README)
@@ -23,66 +24,59 @@ PICTURE_LIMIT = 300_000  # bytes
 
 
 @pytest.fixture
-def course(tmp_path: Path) -> Path:
+def course(tmp_path: Path, stores: Path) -> Folder:
     """The course of one's own that the README shows."""
-    write_files(tmp_path, FENCES)
-    return tmp_path
-
-
-def coursebuild(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Runs the tool in a folder, as the README says."""
-    command = [sys.executable, "-m", "coursebuild", *arguments]
-    return subprocess.run(
-        command, cwd=folder, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-    )
+    folder = Folder(tmp_path / "course")
+    write_files(folder.root, FENCES)
+    folder.borrow(stores)
+    return folder
 
 
 # ------------------------------------------------------------------------------------- README
 
 
-def test_the_course_of_the_readme_is_two_files(course: Path) -> None:
-    files = sorted(p.relative_to(course).as_posix() for p in course.rglob("*") if p.is_file())
-    assert files == ["content/course.toml", LESSON]
+def test_the_course_of_the_readme_is_two_files(course: Folder) -> None:
+    assert sorted(course.tree()) == ["content/course.toml", LESSON]
 
 
-def test_the_course_of_the_readme_builds_by_its_commands(course: Path) -> None:
+@pytest.mark.site
+def test_the_course_of_the_readme_builds_by_its_commands(course: Folder) -> None:
     for command in ("update", "check", "build"):
-        done = coursebuild(course, command)
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert "every recorded output is up to date" in coursebuild(course, "update").stdout
-    page = (course / "public/lessons/1.1-free-fall.html").read_text(encoding="utf-8")
+        done = course.main(command)
+        assert done.status == 0, done.out + done.err
+    assert "every recorded output is up to date" in course.main("update").out
+    page = course.text("public/lessons/1.1-free-fall.html")
     assert "after 1.000 s the ball has fallen 4.9148 m" in page
 
 
-def test_update_fills_the_empty_fence(course: Path) -> None:
-    whole = (course / LESSON).read_text(encoding="utf-8")
+@pytest.mark.site
+def test_update_fills_the_empty_fence(course: Folder) -> None:
+    whole = course.text(LESSON)
     printed = re.search(r"(?<=```text digits\n).*\n(?=```)", whole)
     assert printed is not None
-    (course / LESSON).write_text(whole.replace(printed[0], ""), encoding="utf-8")
-    assert coursebuild(course, "update").returncode == 0
-    assert (course / LESSON).read_text(encoding="utf-8") == whole
+    course.write(LESSON, whole.replace(printed[0], ""))
+    assert course.main("update").status == 0
+    assert course.text(LESSON) == whole
 
 
-def test_the_mistake_of_the_readme(course: Path) -> None:
+@pytest.mark.site
+def test_the_mistake_of_the_readme(course: Folder) -> None:
     """`drift=` says which digits somebody put in the place of the printed ones."""
     (message,) = (fence for fence in FENCES if fence.value("drift"))
-    lesson = (course / LESSON).read_text(encoding="utf-8")
-    assert lesson.count("4.9148") == 1
-    changed = lesson.replace("4.9148", message.value("drift") or "")
-    (course / LESSON).write_text(changed, encoding="utf-8")
-    done = coursebuild(course, "check")
-    assert done.returncode == 1
+    lesson = course.text(LESSON)
+    course.replace(LESSON, "4.9148", message.value("drift") or "")
+    done = course.main("check")
+    assert done.status == 1
     wanted = message.text.rstrip().splitlines()
-    assert done.stdout.splitlines()[: len(wanted)] == wanted
-    assert "error[binding-mismatch]" not in done.stdout  # the number printed is the one in the text
+    assert done.out.splitlines()[: len(wanted)] == wanted
+    assert "error[binding-mismatch]" not in done.out  # the number printed is the one in the text
 
-    assert lesson.count("`4.915`") == 1  # the last sentence is checked as well
-    changed = lesson.replace("`4.915`", "`4.815`")
-    (course / LESSON).write_text(changed, encoding="utf-8")
-    done = coursebuild(course, "check")
-    assert done.returncode == 1
-    assert "error[binding-mismatch]" in done.stdout
-    assert "help: write `4.915`" in done.stdout
+    course.write(LESSON, lesson)
+    course.replace(LESSON, "`4.915`", "`4.815`")  # the last sentence is checked as well
+    done = course.main("check")
+    assert done.status == 1
+    assert "error[binding-mismatch]" in done.out
+    assert "help: write `4.915`" in done.out
 
 
 def shell_lines(path: Path) -> list[str]:
@@ -143,29 +137,24 @@ def test_the_picture_is_there_and_small() -> None:
     assert 20_000 < len(data) < PICTURE_LIMIT
 
 
-@pytest.mark.browser
 @pytest.mark.slow
-def test_the_picture_can_be_taken_again(tmp_path: Path) -> None:
-    course = tmp_path / "course"
-    for folder in ("content", "models", "docs"):
-        shutil.copytree(ROOT / folder, course / folder)
-    assert main(["-C", str(course), "build", "--quiet"]) == 0
-    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(course / "public")]
-    done = subprocess.run(
-        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=600
-    )
+def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: Path) -> None:
+    done = screenshots(built_courses.real().root / "public", tmp_path)
     assert done.returncode == 0, done.stderr
     taken = {path.name for path in tmp_path.glob("*.png")}
     assert taken == {path.name for path in (DOCS / "images").glob("*.png")}
 
 
+@pytest.mark.site
 def test_a_picture_of_a_site_that_is_not_there(tmp_path: Path) -> None:
-    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(tmp_path)]
-    done = subprocess.run(
-        [*script, "--images", str(tmp_path)], capture_output=True, text=True, timeout=600
-    )
+    done = screenshots(tmp_path, tmp_path)
     assert done.returncode == 1
     assert "run `make site` first" in done.stderr
+
+
+def screenshots(site: Path, images: Path) -> subprocess.CompletedProcess[str]:
+    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(site)]
+    return subprocess.run([*script, "--images", str(images)], capture_output=True, text=True)
 
 
 # ------------------------------------------------------------------------------- architecture

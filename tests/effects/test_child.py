@@ -8,17 +8,18 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import child
 from coursebuild.effects.child import JsonChild
 from coursebuild.effects.errors import EffectError
+from support.runners import SOURCE_TREE, alive, gone, wait_until
+
+pytestmark = pytest.mark.site
 
 SERVE = """\
-import json, os, signal, sys, time
+import json, os, signal, sys
 print("ready", flush=True)
 for line in sys.stdin:
     request = json.loads(line)
@@ -37,17 +38,12 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def make(tmp_path: Path, text: str = SERVE, seconds: float = 120.0) -> JsonChild:
+def make(
+    tmp_path: Path, text: str = SERVE, seconds: float = 120.0, margin: float = 120.0
+) -> JsonChild:
     script = tmp_path / "worker.py"
     script.write_text(text)
-    return JsonChild(str(script), seconds)
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    return JsonChild(str(script), seconds, margin=margin)
 
 
 def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
@@ -78,8 +74,8 @@ def test_a_child_that_was_never_asked(tmp_path: Path, temporary: Path) -> None:
         ("os._exit(3)", "ended with status 3"),
         ("raise SystemExit(0)", "ended with status 0"),
         ("raise ValueError", "ended with status 1"),
-        ("signal.setitimer(signal.ITIMER_REAL, 0.01); time.sleep(9)", "took longer than 120 s"),
-        ("os.close(1); time.sleep(9)", "took longer than 120 s"),
+        ("signal.setitimer(signal.ITIMER_REAL, 0.01); signal.pause()", "took longer than 120 s"),
+        ("os.close(1); signal.pause()", "took longer than 120 s"),
         ("os.write(1, b'half a line'); os._exit(4)", "ended with status 4"),
     ],
 )
@@ -96,17 +92,13 @@ def test_a_child_that_dies_is_started_again(
     assert list(temporary.iterdir()) == []
 
 
-@pytest.mark.parametrize("stopped", [False, True])
-def test_a_child_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stopped: bool) -> None:
-    monkeypatch.setattr(child, "_MARGIN", 0.2)
-    act = "os.kill(os.getpid(), signal.SIGSTOP)" if stopped else "time.sleep(600)"
-    with make(tmp_path, seconds=0.2) as one:
-        began = time.monotonic()
+@pytest.mark.parametrize("act", ["os.kill(os.getpid(), signal.SIGSTOP)", "signal.pause()"])
+def test_a_child_that_hangs(tmp_path: Path, act: str) -> None:
+    with make(tmp_path, seconds=0.2, margin=0.2) as one:
         assert one.ask({"do": act}) is None
         assert one.death() == "took longer than 0.2 s"
-        assert time.monotonic() - began < 300
-        monkeypatch.setattr(child, "_MARGIN", 120.0)  # this one shall come, however late
-        assert one.ask(1)["got"] == 1
+        answers = (one.ask(1) for _ in range(100))  # a slow machine may take a little too long
+        assert next(answer for answer in answers if answer is not None)["got"] == 1
 
 
 def test_what_it_prints_beside_its_answers_fills_no_pipe(tmp_path: Path) -> None:
@@ -148,14 +140,13 @@ def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> No
     mark = tmp_path / "asked"
 
     def interrupt() -> None:
-        while not mark.exists():
-            time.sleep(0.01)
+        wait_until(mark.exists, "the question")
         one.interrupt()
 
     with make(tmp_path) as one:
         one.ask(1)
         threading.Thread(target=interrupt, daemon=True).start()
-        assert one.ask({"do": f"open({str(mark)!r}, 'w').close(); time.sleep(600)"}) is None
+        assert one.ask({"do": f"open({str(mark)!r}, 'w').close(); signal.pause()"}) is None
         assert one.death() == "crashed (SIGKILL)", "nobody waited until its time was over"
         with pytest.raises(EffectError, match="interrupted"):
             one.ask(2)
@@ -169,18 +160,14 @@ def test_it_ends_with_its_parent(tmp_path: Path) -> None:
         "from coursebuild.effects.child import JsonChild\n"
         f"one = JsonChild({str(tmp_path / 'worker.py')!r}, 120.0)\n"
         "print(one.ask(1)['pid'], flush=True)\n"
-        "import time; time.sleep(600)\n"
+        "import signal; signal.pause()\n"
     )
     env = {**os.environ, "TMPDIR": str(tmp_path)}
-    root = Path(child.__file__).parents[2]
     with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=root, env=env
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=SOURCE_TREE, env=env
     ) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
         assert alive(pid)
         os.kill(parent.pid, signal.SIGKILL)
-    until = time.monotonic() + 120
-    while alive(pid):
-        assert time.monotonic() < until
-        time.sleep(0.02)
+    assert gone(pid)

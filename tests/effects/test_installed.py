@@ -124,6 +124,7 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     assert found.version("tool") == "Some-Tool 9"
 
 
+@pytest.mark.site
 def test_the_real_environment(tmp_path: Path) -> None:
     store = Store(tmp_path)
     found = Installed(store, Digests(store))

@@ -22,6 +22,8 @@ from coursebuild.effects.v8_library import StoppedError
 from coursebuild.effects.versions import engine_version
 from support.lab_values import BALL, Bench, make_lab, request
 
+pytestmark = pytest.mark.engine
+
 LOOP = "for (;;) ;"
 SLIDER = {"label": "a", "min": 0, "max": 1, "value": 0}
 ENDLESS = "(() => { for (;;) ; })()"

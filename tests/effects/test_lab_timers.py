@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
+
+import pytest
 
 from coursebuild.effects import lab_files
 from coursebuild.effects.v8 import Isolate
 from support.lab_values import Bench, make_lab
+from support.runners import wait_until
+
+pytestmark = pytest.mark.engine
 
 TIMERS = Path(lab_files.__file__).with_name("lab_timers.js").read_text(encoding="utf-8")
 SCRIPT = """
@@ -27,9 +31,8 @@ const seen = () => String(told)
 def test_actions_come_when_their_time_is_over_unless_they_were_taken_back() -> None:
     isolate = Isolate(TIMERS, SCRIPT)
     try:
-        end = time.monotonic() + 300
-        while "late" not in (seen := isolate.call("seen", "", 120.0)) and time.monotonic() < end:
-            time.sleep(0.01)
+        wait_until(lambda: "late" in isolate.call("seen", "", 120.0), "the late one")
+        seen = isolate.call("seen", "", 120.0)
         assert seen == "now,soon,at once,late,and more"
     finally:
         isolate.close()

@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import locks
 from coursebuild.effects.locks import is_abandoned, project_lock
+from support.runners import SOURCE_TREE, wait_until
 
-ROOT = Path(locks.__file__).parents[2]
 HOLD = """
-import sys, time
+import sys
 from pathlib import Path
 from coursebuild.effects.locks import project_lock
 with project_lock(Path(sys.argv[1]), lambda said: print(said, flush=True)):
     print("held", flush=True)
-    time.sleep(float(sys.argv[2]))
+    sys.stdin.read()
 print("done", flush=True)
 """
+"""Holds the lock of a course until its input is closed."""
 
 
-def holder(root: Path, seconds: float) -> subprocess.Popen[str]:
+def holder(root: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(root), str(seconds)],
+        [sys.executable, "-c", HOLD, str(root)],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        cwd=ROOT,
+        cwd=SOURCE_TREE,
     )
 
 
@@ -50,23 +51,24 @@ def test_free_lock_says_nothing(tmp_path: Path) -> None:
     assert (tmp_path / ".coursebuild/.gitignore").read_bytes() == b"*\n"
 
 
+@pytest.mark.site
 def test_second_run_says_so_and_waits(tmp_path: Path) -> None:
-    with holder(tmp_path, 600) as first:
+    with holder(tmp_path) as first:
         assert line(first) == "held"
-        with holder(tmp_path, 0) as second:
+        with holder(tmp_path) as second:
             who = f"another coursebuild (process {first.pid})"
             assert line(second) == f"{who} is at work on this course; waiting for it"
-            time.sleep(0.1)
             assert second.poll() is None
             first.send_signal(signal.SIGKILL)  # a lock dies with its holder
             assert line(second) == "held"
-            assert line(second) == "done"
+            assert second.communicate()[0] == "done\n"
 
 
+@pytest.mark.site
 def test_lock_file_deleted_while_waiting(tmp_path: Path) -> None:
-    with holder(tmp_path, 600) as first:
+    with holder(tmp_path) as first:
         assert line(first) == "held"
-        with holder(tmp_path, 0) as second:
+        with holder(tmp_path) as second:
             assert "waiting" in line(second)
             (tmp_path / ".coursebuild/lock").unlink()
             (tmp_path / ".coursebuild/.gitignore").unlink()
@@ -74,6 +76,7 @@ def test_lock_file_deleted_while_waiting(tmp_path: Path) -> None:
             first.kill()
             assert line(second) == "held"
             assert (tmp_path / ".coursebuild/lock").read_text() == f"{second.pid}\n"
+            second.communicate()
 
 
 def test_a_thread_does_not_wait_for_itself(tmp_path: Path) -> None:
@@ -91,10 +94,9 @@ def test_another_thread_waits(tmp_path: Path) -> None:
     with project_lock(tmp_path):
         thread = threading.Thread(target=work)
         thread.start()
-        while "waits" not in order:
-            time.sleep(0.001)
+        wait_until(lambda: "waits" in order, "the wait")
         order.append("first")
-    thread.join(120)
+    thread.join()
     assert order == ["waits", "first", "second"]
 
 
@@ -115,7 +117,7 @@ def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     def refuse(fd: int, how: int) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
-    monkeypatch.setattr(locks.fcntl, "flock", refuse)
+    monkeypatch.setattr(fcntl, "flock", refuse)
     with project_lock(tmp_path, pytest.fail), project_lock(tmp_path / ".coursebuild", pytest.fail):
         pass
     path = tmp_path / "temporary"
@@ -129,12 +131,13 @@ def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         os.close(fd)
 
 
+@pytest.mark.site
 def test_children_do_not_inherit_it(tmp_path: Path) -> None:
     with project_lock(tmp_path):
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    try:
+        child = subprocess.Popen(
+            [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE
+        )
+    with child:
         with project_lock(tmp_path, pytest.fail):
             pass
-    finally:
-        child.kill()
-        child.wait()
+        child.communicate()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
 import zlib
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from coursebuild.effects import child, mjcf, mjcf_worker
+from coursebuild.effects import mjcf, mjcf_worker
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.mjcf import (
     compile_all,
@@ -22,6 +20,8 @@ from coursebuild.effects.mjcf import (
 from coursebuild.model import MjcfModel
 from coursebuild.results import CompileResult, ModelFacts
 from coursebuild.source import Source
+
+pytestmark = pytest.mark.site
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 ARM = """<mujoco model="arm">
@@ -319,25 +319,17 @@ class TestNothingStaysBehind:
         assert names(root) == ["models"]
         assert capfd.readouterr() == ("", "")
 
-    def test_a_model_without_end(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        really = mjcf._Compiler.ask
-
-        def ask(compiler: mjcf._Compiler, request: mjcf_worker.Request) -> Any:
-            """Whatever comes to an end may take its time."""
-            limit = request["limit"] if "replicate" in request["text"] else 120.0
-            return really(compiler, request | {"limit": limit})
-
-        monkeypatch.setattr(mjcf._Compiler, "ask", ask)
-        monkeypatch.setattr(child, "_MARGIN", 600.0)
+    def test_a_model_without_end(self, root: Path) -> None:
         endless = (
             '<mujoco><worldbody><replicate count="300000000"><geom size="1"/></replicate>'
             "</worldbody></mujoco>"
         )
-        start = time.monotonic()
-        first, second = compile_texts(root, [endless, "<mujoco/>"], timeout=0.5)
-        assert time.monotonic() - start < 300.0  # it ended itself
-        assert first.facts is None
-        assert first.error == "MuJoCo's compiler took longer than 0.5 s"
+        for limit in (0.5, 8.0, 120.0):  # what comes to an end may take its time
+            first, second = compile_texts(root, [endless, "<mujoco/>"], timeout=limit)
+            assert first.facts is None
+            assert first.error == f"MuJoCo's compiler took longer than {limit:g} s"
+            if second.error == "":
+                break
         assert second.error == ""
 
     def test_a_model_of_any_size(self, root: Path) -> None:

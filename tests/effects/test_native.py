@@ -15,6 +15,8 @@ import pytest
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
 from support.lab_values import BALL, Bench, make_lab, xml_of
 
+pytestmark = pytest.mark.site
+
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 

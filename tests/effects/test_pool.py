@@ -17,6 +17,8 @@ from coursebuild.effects import pool as pool_module
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.pool import Pool, beside, can_fork
 
+pytestmark = pytest.mark.site
+
 ROOT = Path(__file__).parents[2]
 HERE = os.getpid()
 

@@ -83,6 +83,7 @@ def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
         versions.engine_version()
 
 
+@pytest.mark.site
 def test_importing_effects_loads_nothing_heavy() -> None:
     code = (
         "import sys\n"

@@ -15,6 +15,8 @@ from coursebuild.effects.published import Entry
 from coursebuild.effects.site_files import writing
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture(autouse=True)
 def forks(monkeypatch: pytest.MonkeyPatch) -> None:

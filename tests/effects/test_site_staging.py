@@ -37,6 +37,7 @@ def test_what_did_not_change_is_neither_made_nor_linked(
     assert beside(spared) == ["public"]
 
 
+@pytest.mark.site
 def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Edits, with and without a spare: the same files are made, and the same site is there."""
     chance = random.Random(7)
@@ -236,6 +237,7 @@ for i in itertools.count():
 """
 
 
+@pytest.mark.site
 def test_two_builds_at_once(root: Path, pages: Pages) -> None:
     """They hold no lock of the project, and take the spare from each other."""
     builds = [

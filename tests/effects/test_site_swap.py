@@ -225,6 +225,7 @@ class TestPublish:
             publish(root, root / "public", [OutputFile(p, b"") for p in paths])
         assert names(root) == ["content", "models"]
 
+    @pytest.mark.site
     def test_every_instant_has_a_whole_site(self, root: Path, way: bool) -> None:
         """Somebody reads the page all the time while it is published over and over."""
         out = root / "public"
@@ -398,6 +399,7 @@ for i in range(40):
 """
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("way", ["exchange", "renames"])
 def test_two_builds_at_once(root: Path, way: str) -> None:
     builds = [

@@ -207,6 +207,7 @@ def states(folder: Path) -> list[State]:
 NAMES = st.text("ab.~é -\U00010400", min_size=1, max_size=3).filter(lambda n: n not in (".", ".."))
 
 
+@pytest.mark.site
 @given(paths=st.sets(st.lists(NAMES, min_size=1, max_size=4).map("/".join), max_size=12))
 def test_what_is_known_of_a_folder_is_what_is_seen_there(paths: set[str]) -> None:
     with tempfile.TemporaryDirectory() as made:

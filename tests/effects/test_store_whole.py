@@ -109,6 +109,7 @@ def write_many(root: str, seed: int) -> None:
             assert found == found[:1] * 20_000
 
 
+@pytest.mark.site
 def test_several_processes_write_read_and_prune_at_once(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     workers = [context.Process(target=write_many, args=(str(tmp_path), i)) for i in range(3)]
@@ -257,6 +258,7 @@ def many(tmp_path: Path) -> Iterator[Path]:
     yield folder
 
 
+@pytest.mark.site
 def test_ten_thousand_entries_are_cut_to_the_limit_the_oldest_first(many: Path) -> None:
     others = ["lock", "content.toml", "kind0/notes"]
     for name in others:

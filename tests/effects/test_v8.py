@@ -19,6 +19,8 @@ from coursebuild.effects.v8 import Isolate, MathEngine, readable
 from coursebuild.effects.v8_library import LimitError
 from coursebuild.results import Formula, MathError
 
+pytestmark = pytest.mark.engine
+
 GLOBAL = {"class", "style", "mathbackground", "mathcolor"}
 ALLOWED = {
     # What the HTML checker takes, and browsers draw.

@@ -31,6 +31,8 @@ from coursebuild.effects.v8_library import (
 )
 from coursebuild.effects.v8_start import start
 
+pytestmark = pytest.mark.engine
+
 ROOT = Path(v8_library.__file__).parents[2]
 ANEW = (
     "effects/v8_library.py was written for another version of mini-racer: compare its `_FUNCTIONS`,"

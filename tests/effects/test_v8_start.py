@@ -11,6 +11,8 @@ import pytest
 
 from coursebuild.effects import v8
 
+pytestmark = pytest.mark.engine
+
 ROOT = Path(v8.__file__).parents[2]
 FORMULAS = (
     r"\frac{a}{b} \not= \not\in \nexists",

@@ -6,12 +6,18 @@ import os
 import shutil
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import watchfiles
 
 from coursebuild.effects.watch import Watcher
+from support.runners import wait_until
+
+pytestmark = pytest.mark.site
 
 LESSON = "content/lessons/1.1-one.md"
 
@@ -77,7 +83,6 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("path", [LESSON, "docs/guide.md", "own.md"])
 def test_every_change_is_told_of(root: Path, saves: Watcher, path: str, change: str) -> None:
-    assert not saves.get(0.5)
     CHANGES[change](root / path)
     found = told(saves, {path})
     moved = (
@@ -137,6 +142,36 @@ def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: Watcher
     (root / "new").rename(root / "docs")
     told(saves, {"docs/guide.md"})
     told_of_a_save(root, saves, "docs/guide.md")
+
+
+def test_a_file_elsewhere_that_is_asked_for_later(root: Path, saves: Watcher) -> None:
+    (root / "far").mkdir()
+    saves.watch_also(frozenset({"docs/guide.md", "far/later.md"}))
+    told_of_a_save(root, saves, "far/later.md")
+    told_of_a_save(root, saves, "docs/guide.md")
+
+
+def test_while_no_folder_changes_watching_is_not_begun_again(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever were saved between two beginnings would be missed."""
+    began: Counter[bool] = Counter()
+    looks: Counter[bool] = Counter()
+    really = watchfiles.watch
+
+    def watch(*paths: Path, recursive: bool, **options: Any) -> Iterator[set[Any]]:
+        began[recursive] += 1
+        for batch in really(*paths, recursive=recursive, **options):
+            looks[recursive] += 1
+            yield batch
+
+    monkeypatch.setattr(watchfiles, "watch", watch)
+    saves = Watcher(root)
+    saves.watch_also(frozenset({"docs/guide.md"}))
+    saves.start()
+    wait_until(lambda: min(looks[True], looks[False]) > 3, "four looks")
+    saves.stop()
+    assert began == {True: 1, False: 1}
 
 
 def test_files_in_a_linked_folder(root: Path, saves: Watcher) -> None:

@@ -10,6 +10,8 @@ import pytest
 
 from coursebuild.effects.watching import has_ended
 
+pytestmark = pytest.mark.site
+
 PARENT = """
 import os, sys
 from coursebuild.effects.watching import has_ended

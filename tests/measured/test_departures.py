@@ -108,8 +108,37 @@ def test_a_status_says_all_of_its_row() -> None:
         ({"growth": 1.0}, {"growth": 2.0}, None),
     ],
 )
-def test_other_figures(old: Any, new: Any, found: tuple[str, ...] | None) -> None:
+def test_which_figures_of_a_row_depart_and_how_it_is_said(
+    old: Any, new: Any, found: tuple[str, ...] | None
+) -> None:
     assert of_rows(row(**old), row(**new)) == ([] if found is None else [found])
+
+
+def test_drifts_of_a_chaotic_scenario_or_a_lost_run_say_nothing() -> None:
+    one, other = row(energy_drift=0.1), row(energy_drift=0.2)
+    whole, chaotic = scenario([one]), scenario([one], horizon=0.5)
+    assert len(between(whole, scenario([other]))) == 1
+    assert between(chaotic, scenario([other], horizon=0.5)) == []
+    for old, new in ((whole, scenario([other], horizon=0.5)), (chaotic, scenario([other]))):
+        assert [found.figure for found in between(old, new)] == ["horizon"]
+    slow = {"status": "slow-growth", "reasons": ("it grows",)}
+    assert of_rows(replace(one, **slow), replace(other, **slow)) == []
+
+
+def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
+    old, new = row(velocity=(1e-3, 1e-3)), row(velocity=(2e-3, 2e-3))
+    assert len(between(scenario([old]), scenario([new]))) == 2
+    for floors in ((1e-4, 1e-11), (1e-11, 1e-4)):
+        one, other = (
+            scenario([line], velocity_floor=floor)
+            for line, floor in zip((old, new), floors, strict=True)
+        )
+        assert between(one, other) == []
+        one, other = (
+            scenario([row(position=error)], floor=floor)
+            for error, floor in zip(((1e-3, 1e-3), (2e-3, 2e-3)), floors, strict=True)
+        )
+        assert between(one, other) == []
 
 
 def test_settings_and_scenarios_that_come_and_go() -> None:
@@ -174,7 +203,7 @@ def test_a_change_departs_exactly_beyond_the_band(share: float) -> None:
 # --- hard cases
 
 
-def test_cases() -> None:
+def test_a_case_that_is_gone_is_a_departure() -> None:
     assert case_departures([CASE], [CASE], BANDS) == ()
     (gone,) = case_departures([CASE], [], BANDS)
     assert gone == Departure("spring", "", "case", "there", "nothing", "the same")
@@ -209,3 +238,12 @@ def test_boundaries_and_runs_of_cases() -> None:
         ("Euler", "growth", "nothing", "1.5"),
         ("Euler at 100 ms", "status", "ok", "reset"),
     ]
+
+
+def test_drifts_of_a_case_are_compared_where_its_run_is_well() -> None:
+    for status, figures in (("ok", ["energy drift"]), ("diverged", [])):
+        old, new = (
+            replace(CASE, errors=(replace(CASE.errors[0], status=status, energy_drift=drift),))
+            for drift in (0.1, 0.2)
+        )
+        assert [found.figure for found in case_departures([old], [new], BANDS)] == figures

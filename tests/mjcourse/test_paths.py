@@ -141,6 +141,14 @@ def test_a_missing_model_lists_near_names(course: Path, name: str, tail: str) ->
     assert str(caught.value) == f"no model {name!r} in {course / 'models'}{tail}"
 
 
+def test_of_many_near_names_three_are_proposed(course: Path) -> None:
+    for k in range(5):
+        write(course / "models" / f"scene_{k}.xml")
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "examples" / "x.py", "scene_x")
+    assert str(caught.value).endswith("; did you mean 'scene_0', 'scene_1' or 'scene_2'?")
+
+
 def test_a_missing_model_lists_no_more_than_eight_names(course: Path) -> None:
     for k in range(10):
         write(course / "models" / f"scene_{k}.xml")

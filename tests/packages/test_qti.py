@@ -309,6 +309,7 @@ def test_mathml_is_of_version_2(make: Make) -> None:
 # --- the command
 
 
+@pytest.mark.slow
 def test_same_course_gives_the_same_bytes(qti: Package) -> None:
     once = qti.folder.read(ZIP)
     export(qti.folder)

@@ -143,8 +143,17 @@ def test_package_of_arabic_course_reads_from_the_right(make: Make) -> None:
     assert "دورة" in files["imsmanifest.xml"].decode()
 
 
-def test_same_course_gives_the_same_bytes(scorm: Package) -> None:
-    folder = scorm.folder
+def test_same_course_gives_the_same_bytes(make: Make) -> None:
+    same_bytes(make(GOOD))
+
+
+@pytest.mark.slow
+def test_course_of_every_question_gives_the_same_bytes(scorm: Package) -> None:
+    same_bytes(scorm.folder)
+
+
+def same_bytes(folder: Folder) -> None:
+    package(folder)
     once = folder.read(ZIP)
     package(folder)
     assert folder.read(ZIP) == once, "from what is kept"

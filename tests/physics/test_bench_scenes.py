@@ -10,6 +10,8 @@ import pytest
 from coursebuild.measured.bench import ScenarioReport
 from support.bench_runs import measured, orders, row
 
+pytestmark = pytest.mark.site
+
 SERVO = """\
 <mujoco>
   <option timestep="0.002"/>

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.physics.detector import NO_BOUNDS, Observation, Status, judge, observe
+from coursebuild.physics.detector import (
+    NO_BOUNDS,
+    Observation,
+    Peaks,
+    Status,
+    judge,
+    observe,
+    peaks,
+)
 from coursebuild.physics.engine import advance, simulate
 from coursebuild.physics.measure import measure
 from coursebuild.physics.problem import Integrator
@@ -80,6 +88,13 @@ def test_a_state_that_is_no_number(field: str) -> None:
     model, data = begun(0.01)
     getattr(data, field)[0] = np.nan
     assert judge(observe(model, data, 0.0)).reasons[0] == "the state is not finite"
+
+
+def test_what_was_no_number_on_the_way_stays_so() -> None:
+    _, data = begun(0.01, qpos=0.5, qvel=2.0)
+    for lost in (Peaks(position=math.nan), Peaks(velocity=math.nan)):
+        assert not peaks(data, lost).finite
+    assert peaks(data, Peaks(0.7, 1.0)) == Peaks(0.7, 2.0)
 
 
 def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:

@@ -26,16 +26,15 @@ SMOOTH = [
 ]
 
 
-@pytest.mark.parametrize("name", SMOOTH)
-def test_the_engines_accelerations_give_the_exact_motion(name: str) -> None:
-    problem = problem_named(name)
-    assert problem.reference is not None
-    times = problem.scenario.times
-    found = errors(
-        forward_motion(problem.mjcf, problem.scenario, times), problem.reference.motion(times)
-    )
-    for part in (found.position, found.attitude, found.velocity):
-        assert part is None or part.largest < 1e-10
+def test_the_engines_accelerations_give_the_exact_motion() -> None:
+    for name in SMOOTH:
+        problem = problem_named(name)
+        assert problem.reference is not None
+        times = problem.scenario.times
+        motion = forward_motion(problem.mjcf, problem.scenario, times)
+        found = errors(motion, problem.reference.motion(times))
+        for part in (found.position, found.attitude, found.velocity):
+            assert part is None or part.largest < 1e-10, name
 
 
 def test_integrators_are_set_and_reset_is_off() -> None:
@@ -91,9 +90,8 @@ def test_a_watched_run_ends_when_the_state_is_no_number() -> None:
     assert watched(model, data, 10, seen) == (seen, 0)
 
 
-@pytest.mark.parametrize(
-    ("name", "timestep", "active"),
-    [
+def test_refsafe_is_told() -> None:
+    for name, timestep, active in (
         ("stack-1", 2e-3, False),
         ("stack-1", 2.1e-3, True),
         ("elastic-impact", 1.0, False),  # a stiffness
@@ -102,10 +100,9 @@ def test_a_watched_run_ends_when_the_state_is_no_number() -> None:
         ("pendulum-connect-90", 0.01, False),
         ("tumbling-box", 1.0, False),  # contact is off
         ("damped-spring-1", 1.0, False),
-    ],
-)
-def test_refsafe_is_told(name: str, timestep: float, active: bool) -> None:
-    assert refsafe_active(compiled(problem_named(name).mjcf, Integrator.EULER, timestep)) is active
+    ):
+        model = compiled(problem_named(name).mjcf, Integrator.EULER, timestep)
+        assert refsafe_active(model) is active, (name, timestep)
 
 
 def test_limits_and_dry_friction_have_time_constants_too() -> None:

@@ -72,6 +72,12 @@ def test_a_verdict_on_a_good_choice() -> None:
     )
 
 
+def test_what_can_just_be_seen_is_noticed() -> None:
+    found = judged([Point(1, 1e-3), Point(4, 1e-7)], 1.0)
+    assert found.noticeable is True
+    assert "; a learner would notice its error, which is 1 times what can be seen" in found.text
+
+
 def test_a_verdict_on_a_bad_one() -> None:
     found = judged([Point(1, 2.5), Point(0.94, 2.5e-6)], 2.5)
     assert (found.on_front, found.better, found.noticeable) == (False, 1, True)

@@ -6,13 +6,16 @@ import json
 import signal
 from collections.abc import Callable
 
+import pytest
+
 from support.preview_process import Events, serving
 from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
+pytestmark = pytest.mark.site
 
 
-def test_an_output_is_accepted(make: Make) -> None:
+def test_output_is_accepted(make: Make) -> None:
     lesson = "## Random\r\n\r\n" + GOOD.replace("\n", "\r\n").replace(
         "3.14159\r\n```\r\n\r\n", "3\r\n```\r\n"
     )
@@ -90,7 +93,7 @@ def test_what_changed_since_is_not_written(make: Make) -> None:
         assert folder.read(folder.lesson()) == mine
 
 
-def test_an_output_that_differs_from_run_to_run_is_not_offered(make: Make) -> None:
+def test_output_that_differs_from_run_to_run_is_not_offered(make: Make) -> None:
     code = "import time\nprint('took', time.time_ns())"
     folder = make("## Clock\n\n" + block("clock.py", code, "took 12"))
     with serving(folder) as preview, preview.events() as events:
@@ -100,7 +103,7 @@ def test_an_output_that_differs_from_run_to_run_is_not_offered(make: Make) -> No
         assert output["refused"] == "two runs of the script printed different lines"
 
 
-def test_a_bound_number_is_accepted(make: Make) -> None:
+def test_bound_number_is_accepted(make: Make) -> None:
     folder = make(GOOD + "It is `3.15`{out}, nearly.\n")
     with serving(folder) as preview, preview.events() as events:
         events.until(lambda told: bool(told.news["numbers"]))
@@ -113,7 +116,7 @@ def test_a_bound_number_is_accepted(make: Make) -> None:
         events.settled()
 
 
-def test_an_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None:
+def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None:
     """And not the one that is nearest, which is another quantity."""
     code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
     prose = "The period is `2.006`{out}.\n"
@@ -148,7 +151,7 @@ def test_an_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> N
         ]
 
 
-def test_a_number_of_which_nobody_knows_where_it_was_is_not_offered(make: Make) -> None:
+def test_number_of_which_nobody_knows_where_it_was_is_not_offered(make: Make) -> None:
     code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
     folder = make(
         "## Swing\n\n" + block("x.py", code, "period 2.95 s\nhalf 1.975 s") + "`2.006`{out}\n"

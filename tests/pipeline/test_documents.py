@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
 import pytest
 
 from coursebuild.effects import pool
 from coursebuild.effects.store import Store
-from coursebuild.pipeline import build as building
-from coursebuild.pipeline import kept, reading
+from coursebuild.pipeline import kept
 from coursebuild.pipeline.kept import fonts_beside
 from coursebuild.render import fonts as cutting
 from coursebuild.render.fonts import Face, FontJob
 from support.scratch_course import Folder
-
-
-@pytest.mark.parametrize("name", [*building._FOLLOWING, *reading._HEAVY])
-def test_what_is_imported_ahead_is_there(name: str) -> None:
-    importlib.import_module(name)
 
 
 def job(characters: str) -> FontJob:

@@ -10,6 +10,8 @@ from support.live_course import Live
 from support.live_course import live as live
 from support.scratch_course import GOOD, Folder
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 NOTHING = {
     "no bytes": b"",
@@ -22,30 +24,29 @@ NOTHING = {
 }
 
 
-@pytest.mark.parametrize("text", NOTHING.values(), ids=NOTHING)
-def test_nothing_is_published(make: Make, text: bytes) -> None:
-    folder = make(GOOD, text)
+def test_complete_lesson_with_nothing_to_read_is_told_and_not_published(make: Make) -> None:
+    folder = make(GOOD, *NOTHING.values())
     done = folder.main("build")
-    path = folder.lesson(2)
     assert done.status == 1
-    assert done.out.startswith(
-        f"error[lesson-empty]: lesson 1.2 is complete, and there is nothing to read in {path}\n"
-        f"  --> {path}:1:1\n"
-    )
-    assert (
+    for number, kind in enumerate(NOTHING, 2):
+        path = folder.lesson(number)
+        assert (
+            f"error[lesson-empty]: lesson 1.{number} is complete, and there is nothing to read in "
+            f"{path}\n  --> {path}:1:1\n"
+        ) in done.out, kind
+    help = (
         '= help: write it, say `status = "draft"` in the map, '
         'or say `status = "planned"` and remove the file\n'
-    ) in done.out
-    assert done.out.endswith(": 1 error\n")
+    )
+    assert done.out.count(help) == len(NOTHING)
+    assert done.out.endswith(f": {len(NOTHING)} errors\n")
     assert not (folder.root / "public").exists()
 
 
-@pytest.mark.parametrize(
-    "text", ["Prose.\n", "<!-- x -->\n\nProse.\n", "---\n", "$$x$$\n", "    code\n", "<hr>\n", "x"]
-)
-def test_little_is_something(make: Make, text: str) -> None:
-    folder = make(GOOD, text)
-    assert folder.main("check").status == 0
+def test_complete_lesson_with_little_to_read_is_no_mistake(make: Make) -> None:
+    little = ["Prose.\n", "<!-- x -->\n\nProse.\n", "---\n", "$$x$$\n", "    code\n", "<hr>\n", "x"]
+    done = make(GOOD, *little).main("check")
+    assert done.status == 0, done.out
 
 
 def test_a_draft_says_itself_that_there_is_more_to_come(make: Make) -> None:

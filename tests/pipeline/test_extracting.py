@@ -9,6 +9,8 @@ import pytest
 
 from support.scratch_course import GOOD, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 
 TWO = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
@@ -101,7 +103,9 @@ def test_deleting_the_file_drops_the_edit(make: Make) -> None:
 
 
 @pytest.mark.parametrize("manifest", [b"", b"{", b"[]", b'{"files": {"../x": []}}', None])
-def test_a_lost_manifest_only_makes_it_careful(make: Make, manifest: bytes | None) -> None:
+def test_extract_without_manifest_overwrites_no_other_text(
+    make: Make, manifest: bytes | None
+) -> None:
     folder = make(TWO)
     folder.main("extract")
     if manifest is None:
@@ -118,34 +122,39 @@ def test_a_lost_manifest_only_makes_it_careful(make: Make, manifest: bytes | Non
 # --- adopting
 
 
-@pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-@pytest.mark.parametrize("saved", ["plain", "crlf", "bom", "no end", "long end"])
-def test_an_edit_is_brought_into_the_lesson(
-    make: Make, shape: str, newline: str, saved: str
-) -> None:
-    text = ("## One\n\n" + SHAPES[shape]).replace("\n", newline)
-    folder = make(text)
+@pytest.mark.parametrize(
+    "saved",
+    [
+        EDITED,
+        EDITED.replace("\n", "\r\n"),
+        "\ufeff" + EDITED,
+        EDITED.rstrip("\n"),
+        EDITED + "\n\n",
+    ],
+    ids=["plain", "crlf", "bom", "no end", "long end"],
+)
+def test_edit_is_adopted_into_a_block_of_every_shape(make: Make, newline: str, saved: str) -> None:
+    """One lesson for each shape."""
+    texts = [
+        ("## One\n\n" + shape.replace("/x.py", f"/x{number}.py")).replace("\n", newline)
+        for number, shape in enumerate(SHAPES.values(), 1)
+    ]
+    folder = make(*texts)
     assert folder.main("extract").status == 0
-    before, _, after = text.partition("print(1)" + newline)
-    lead = before.rpartition(newline)[2]
-    edited = EDITED
-    forms = {
-        "plain": edited,
-        "crlf": edited.replace("\n", "\r\n"),
-        "bom": "\ufeff" + edited,
-        "no end": edited.rstrip("\n"),
-        "long end": edited + "\n\n",
-    }
-    folder.write("examples/x.py", forms[saved])
+    for number in range(1, len(texts) + 1):
+        folder.write(f"examples/x{number}.py", saved)
     done = folder.main("extract", "--adopt")
     assert done.status == 0, done.out
-    assert f"updated {folder.lesson()}\n" in done.out
     assert "+" in done.out
-    body = [(lead + line if line else lead.rstrip()) + newline for line in edited.splitlines()]
-    kept = before[: len(before) - len(lead)] if lead else before
-    assert folder.text(folder.lesson()) == kept + "".join(body) + after
-    assert folder.text("examples/x.py") == edited
+    for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
+        before, _, after = text.partition("print(1)" + newline)
+        lead = before.rpartition(newline)[2]
+        body = [(lead + line if line else lead.rstrip()) + newline for line in EDITED.splitlines()]
+        kept = before[: len(before) - len(lead)] if lead else before
+        assert folder.text(folder.lesson(number)) == kept + "".join(body) + after, shape
+        assert folder.text(f"examples/x{number}.py") == EDITED, shape
+        assert f"updated {folder.lesson(number)}\n" in done.out, shape
     assert folder.main("extract").status == 0
     assert "every script is extracted already" in folder.main("extract", "--adopt").out
 
@@ -174,7 +183,7 @@ def test_several_edits_of_one_lesson_at_once(make: Make) -> None:
         (b"a\0b\n", "it holds a NUL"),
     ],
 )
-def test_what_a_block_cannot_hold_is_left_alone(make: Make, data: bytes, says: str) -> None:
+def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make, data: bytes, says: str) -> None:
     folder = make(TWO)
     folder.main("extract")
     folder.write("examples/a.py", data)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from support.lab_lessons import BALL, CART, checked, fence
 from support.scratch_course import GOOD, Folder
+
+pytestmark = pytest.mark.engine
 
 # What is wrong, its rule, and the lab; `‸` stands where the message must point.
 MISTAKES = [
@@ -95,42 +95,29 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """A course of all mistakes, after one check."""
-
-    status: int
-    found: list[dict[str, Any]]
-    labs: list[dict[str, Any]]
-    lesson: str
-
-
-@pytest.fixture(scope="module")
-def everything_wrong(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Checked:
-    folder = Folder(tmp_path_factory.mktemp("labs") / "course")
+def test_each_mistake_of_a_lab_is_found_at_its_place(tmp_path: Path, stores: Path) -> None:
+    """All in one lesson, one lab each."""
+    folder = Folder(tmp_path / "course")
     lesson = "## Labs\n\n" + "".join(fence(body) for _, _, body in MISTAKES)
     folder.fill([GOOD, lesson.replace("‸", "")], stores)
     folder.write("models/ball.xml", BALL)
     folder.write("models/cart.xml", CART)
-    report = checked(folder)
-    found = [d for d in report["diagnostics"] if d["rule"].startswith("lab-")]
-    assert len(found) == len(report["diagnostics"])
-    return Checked(report["status"], found, report["labs"], lesson)
+    report = checked(folder, status=1)
+    assert [lab["status"] for lab in report["labs"]] == ["failed"] * len(MISTAKES)
+    found = [(d["rule"], d["line"], d["column"]) for d in report["diagnostics"]]
+    places = zip(MISTAKES, expected(lesson), strict=True)
+    assert [title for (title, _, _), place in places if place not in found] == []
+    assert len(found) == len(MISTAKES)
 
 
-def test_one_mistake_each_and_all_are_found(everything_wrong: Checked) -> None:
-    assert everything_wrong.status == 1
-    assert len(everything_wrong.found) == len(MISTAKES)
-    assert [lab["status"] for lab in everything_wrong.labs] == ["failed"] * len(MISTAKES)
-
-
-@pytest.mark.parametrize("number", range(len(MISTAKES)), ids=[title for title, _, _ in MISTAKES])
-def test_it_is_found_at_its_line(everything_wrong: Checked, number: int) -> None:
-    _, rule, _ = MISTAKES[number]
-    parts = everything_wrong.lesson.split("‸")
-    before = "".join(parts[: number + 1])
-    line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-    if rule == "lab-parity":  # it is about the lab, which begins with its fence
-        line, column = line - 1, 1
-    found = everything_wrong.found[number]
-    assert (found["rule"], found["line"], found["column"]) == (rule, line, column), found["message"]
+def expected(lesson: str) -> list[tuple[str, int, int]]:
+    """Rule, line and column of each mistake."""
+    places = []
+    before = ""
+    for (_, rule, _), part in zip(MISTAKES, lesson.split("‸"), strict=False):
+        before += part
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        if rule == "lab-parity":  # it is about the lab, which begins with its fence
+            line, column = line - 1, 1
+        places.append((rule, line, column))
+    return places

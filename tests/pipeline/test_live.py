@@ -16,11 +16,14 @@ from support.live_course import builds as builds
 from support.live_course import live as live
 from support.scratch_course import GOOD, ROOT, Folder, block
 
+pytestmark = pytest.mark.site
+
 Make = Callable[..., Folder]
 FULL = ROOT / "tests/courses/full/course"
 
 
-def test_the_course_that_uses_everything(
+@pytest.mark.engine
+def test_course_of_every_construct_after_edits_is_what_a_clean_build_gives(
     tmp_path: Path, stores: Path, live: Callable[[Folder], Live], builds: Builds
 ) -> None:
     folder = Folder(tmp_path / "course")
@@ -34,12 +37,10 @@ def test_the_course_that_uses_everything(
         assert built is not None
         assert differences(running.site(), built) == []
 
-    same()
     # A lab and a model that moved, and one that changed.
     lesson = "content/lessons/A.1-models-and-questions.md"
     folder.write(lesson, "A first paragraph, with $x + ж$.\n\n" + folder.text(lesson))
     assert running.save(lesson)
-    same()
     folder.replace(lesson, '"title": "A falling box"', '"title": "A box that falls"')
     assert running.save(lesson)
     same()
@@ -105,7 +106,7 @@ def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]
     assert running.course.version == version
 
 
-def test_nothing_is_new_where_a_page_lies_outside_of_content(
+def test_rereading_finds_nothing_new_where_a_page_lies_outside_of_content(
     make: Make, live: Callable[[Folder], Live]
 ) -> None:
     folder = make(GOOD)
@@ -165,7 +166,9 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         running.save(folder.lesson())
 
 
-def test_a_page_that_was_never_good(make: Make, live: Callable[[Folder], Live]) -> None:
+def test_page_that_was_never_good_appears_when_mended(
+    make: Make, live: Callable[[Folder], Live]
+) -> None:
     folder = make(GOOD + "[gone](lesson:9.9)\n")
     running = live(folder)
     page = "lessons/1.1-one.html"

@@ -99,24 +99,51 @@ class Author:
 EDITS = [name for name in vars(Author) if not name.startswith("_") and name != "add"]
 
 
-@pytest.mark.slow
-@settings(max_examples=6)
-@given(data=st.data())
-def test_after_any_edits_it_is_what_a_clean_build_gives(
-    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory, stores: Path
-) -> None:
-    where = tmp_path_factory.mktemp("live")
+TOGETHER = ("heading", "output", "mistake", "mend", "cut")
+"""Edits that go by what others did to the same lesson."""
+
+
+def begin(where: Path, stores: Path) -> Folder:
+    """A course of three lessons and a model."""
     folder = Folder(where / "course")
     lessons = [
         GOOD.replace("hello.py", f"hello{n}.py").replace("## Hello", f"## Hello {n}")
         for n in (1, 2, 3)
     ]
     folder.fill(lessons, stores)
-    text = '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'
-    folder.write("models/ball.xml", text)
-    builds = Builds(where, stores)
-    author = Author(folder)
-    running = Live(folder)
+    folder.write("models/ball.xml", '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
+    return folder
+
+
+@pytest.mark.site
+def test_after_an_edit_of_each_kind_it_is_what_a_clean_build_gives(
+    tmp_path: Path, stores: Path
+) -> None:
+    folder = begin(tmp_path, stores)
+    builds, author, running = Builds(tmp_path, stores), Author(folder), Live(folder)
+    try:
+        for number, name in enumerate(EDITS):
+            running.save(*getattr(author, name)(2 if name in TOGETHER else number % 3 + 1))
+            if name == "mistake":
+                assert running.wrong() == ["link-lesson"]
+            elif name in ("script", "cut"):
+                assert running.wrong() == []
+                built = builds(folder)
+                assert built is not None
+                assert differences(running.site(), built) == [], f"up to {name}"
+    finally:
+        running.close()
+
+
+@pytest.mark.slow
+@settings(max_examples=8)
+@given(data=st.data())
+def test_after_any_edits_it_is_what_a_clean_build_gives(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory, stores: Path
+) -> None:
+    where = tmp_path_factory.mktemp("live")
+    folder = begin(where, stores)
+    builds, author, running = Builds(where, stores), Author(folder), Live(folder)
     try:
         for _ in range(data.draw(st.integers(1, 4), label="rounds")):
             edits = st.lists(st.tuples(st.sampled_from(EDITS), st.integers(1, 3)), max_size=4)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
+
 from support.live_course import Builds, Live
 from support.live_course import builds as builds
 from support.live_course import live as live
 from support.scratch_course import Folder
+
+pytestmark = pytest.mark.site
 
 ONE, TWO = "content/lessons/1.1-one.md", "content/lessons/1.2-two.md"
 

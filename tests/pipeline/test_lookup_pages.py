@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from html import unescape
+from pathlib import Path
 
 import pytest
 
 from support.scratch_course import Folder
+
+pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 HEAD = '[course]\ntitle = "<b>Course</b>"\n\n[[level]]\nid = "1"\ntitle = "One"\n'
@@ -48,10 +51,11 @@ See [one](lesson:1.1).
 """
 
 
-@pytest.fixture
-def site(make: Make) -> dict[str, str]:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, str]:
     """The pages of a course in which all of it occurs."""
-    folder = make(FIRST, SECOND, THIRD)
+    folder = Folder(tmp_path_factory.mktemp("lookup") / "course")
+    folder.fill([FIRST, SECOND, THIRD], stores)
     done = folder.main("build")
     assert done.status == 0, done.out + done.err
     return {

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.pipeline import documents
 from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.progress import Progress
-from coursebuild.render.exports import tags
 from coursebuild.results import KeptFile, OutputFile
 from support.scratch_course import Folder, block
+
+pytestmark = pytest.mark.site
 
 FEW, MANY = 12, 96
 TEXT = 20_000
 """Bytes of prose in a lesson."""
-SLOPE = 7_500
-"""Bytes that a further lesson may take: its entry in the map, names and keys of its files; no text,
-no tree."""
+SLOPE = 15_000
+"""Bytes that a further lesson may take: its entry in the map, names and keys of its files, and what
+waits in small caches; no text, no tree."""
 
 
 def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
@@ -58,23 +58,12 @@ def peak(folder: Folder) -> int:
         gc.unfreeze()
 
 
-@pytest.fixture
-def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Caches of a fixed size are left out: they would be filled by the longer course only."""
-    monkeypatch.setattr("coursebuild.pipeline.reading._COLLECT", 4)
-    monkeypatch.setattr("coursebuild.render.exports.chapters._ROOM", 0)
-    monkeypatch.setattr("coursebuild.render.search.counting._MOST", 0)
-    monkeypatch.setattr("coursebuild.render.exports.rewrite._MANY", 0)
-    monkeypatch.setattr("coursebuild.render.exports.tags._short", tags._read)
-    monkeypatch.setattr("coursebuild.pipeline.documents._AT_ONCE", 8)
-
-
-@pytest.mark.usefixtures("no_room")
+@pytest.mark.slow
 @pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
 def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
     peaks: dict[int, list[int]] = {FEW: [], MANY: []}
     # Several times, since what else a process does at the moment can only add to it.
-    for number, count in enumerate((FEW, FEW, FEW, MANY, MANY, MANY)):
+    for number, count in enumerate((FEW, FEW, MANY, MANY)):
         folder = Folder(tmp_path / str(number))
         write_course(folder, count)
         folder.borrow(stores)
@@ -86,14 +75,12 @@ def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, aga
     assert slope < SLOPE, f"{slope:.0f} bytes a lesson: {peaks}"
 
 
-def test_pages_are_drawn_in_copies_of_what_was_read_here(
-    tmp_path: Path, stores: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pages_are_drawn_in_copies_of_what_was_read_here(tmp_path: Path, stores: Path) -> None:
     """Texts too few to be read in copies of the process, pages enough to be drawn there."""
     sites = []
     for jobs in (1, 2):
         folder = Folder(tmp_path / f"jobs{jobs}")
-        write_course(folder, documents._MANY - 1, 300)
+        write_course(folder, 7, 300)
         folder.borrow(stores)
         assert build(folder.options(jobs), Path("public")).ok
         sites.append(folder.tree("public"))

@@ -6,14 +6,14 @@ import io
 import shutil
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from support.scratch_course import ROOT, Folder
 
-Make = Callable[..., Folder]
+pytestmark = pytest.mark.engine
+
 FULL = ROOT / "tests/courses/full/course"
 
 
@@ -39,13 +39,9 @@ def differences(a: Folder, b: Folder) -> list[str]:
     return sorted(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
 
 
-def test_twice_in_one_place(original: Folder) -> None:
-    before = original.tree()
-    assert original.run("build").status == 0
-    assert original.tree() == before
-
-
-def test_anywhere_and_anyhow(original: Folder, tmp_path: Path, stores: Path) -> None:
+def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
+    original: Folder, tmp_path: Path, stores: Path
+) -> None:
     folder = copy(tmp_path / "anderswo ünd 別" / "a course", stores)
     environment = {
         "TZ": "Pacific/Kiritimati",
@@ -62,7 +58,8 @@ def test_anywhere_and_anyhow(original: Folder, tmp_path: Path, stores: Path) -> 
     assert differences(original, folder) == []
 
 
-def test_without_any_cache_and_with_files_in_another_order(
+@pytest.mark.slow
+def test_build_without_caches_and_with_files_in_another_order_gives_the_same_bytes(
     original: Folder, tmp_path: Path
 ) -> None:
     """Fonts are cut anew; the folders' entries are made in reverse."""
@@ -80,7 +77,7 @@ def test_without_any_cache_and_with_files_in_another_order(
     assert differences(original, folder) == []
 
 
-def test_nothing_says_where_it_was_built(original: Folder) -> None:
+def test_nothing_in_a_site_says_where_it_was_built(original: Folder) -> None:
     places = [str(place).encode() for place in (original.root.parent, ROOT, sys.prefix)]
     for name, data in original.tree("public").items():
         texts = [data]
@@ -90,7 +87,10 @@ def test_nothing_says_where_it_was_built(original: Folder) -> None:
         assert not [place for place in places if any(place in text for text in texts)], name
 
 
-def test_after_any_edits_as_after_none(original: Folder, tmp_path: Path, stores: Path) -> None:
+@pytest.mark.slow
+def test_build_after_edits_gives_the_bytes_of_one_after_none(
+    original: Folder, tmp_path: Path, stores: Path
+) -> None:
     """A folder that has seen other courses gives what a fresh one gives."""
     folder = copy(tmp_path / "used", stores)
     lesson = "content/lessons/1.1-text.md"

@@ -10,12 +10,15 @@ import pytest
 
 from support.scratch_course import Folder
 
+pytestmark = pytest.mark.site
+
 WORDS = ("gyroscope", "lagrangian", "quaternion", "impulse", "friction", "damping")
 
 
-@pytest.fixture
-def folder(tmp_path: Path, stores: Path) -> Folder:
-    folder = Folder(tmp_path / "course")
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course of seventy lessons."""
+    folder = Folder(tmp_path_factory.mktemp("search") / "course")
     parts = ['[course]\ntitle = "Long"\n\n[[level]]\nid = "1"\ntitle = "Level"\n']
     for n in range(1, 71):
         parts.append(
@@ -30,6 +33,15 @@ def folder(tmp_path: Path, stores: Path) -> Folder:
     folder.write("content/course.toml", "\n".join(parts))
     folder.borrow(stores)
     assert folder.main("build", "--quiet").status == 0
+    return folder
+
+
+@pytest.fixture
+def folder(built: Folder, tmp_path: Path) -> Folder:
+    """A copy of it, to be edited."""
+    folder = Folder(tmp_path / "course")
+    shutil.copytree(built.root, folder.root, symlinks=True)
+    folder.tmp.mkdir()
     return folder
 
 

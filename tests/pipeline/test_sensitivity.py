@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,8 @@ from typing import Any
 import pytest
 
 from support.scratch_course import Folder, block
+
+pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 
@@ -124,9 +128,9 @@ print("right" if data.qpos[0] == 0.75 else "left or right")
 PLAIN = "print('nothing moves', 1.5)\n"
 
 
-def recorded(make: Make, *scripts: str, how: str = "") -> Folder:
+def recorded(make: Make, *scripts: str) -> Folder:
     """A course whose recorded outputs are as the scripts print them."""
-    blocks = [block(f"{'abcd'[i]}.py", code, "?", how) for i, code in enumerate(scripts)]
+    blocks = [block(f"{'abcd'[i]}.py", code, "?") for i, code in enumerate(scripts)]
     folder = make("## One\n\n" + "".join(blocks))
     folder.main("update", "--quiet")
     return folder
@@ -136,18 +140,52 @@ def measured(folder: Folder, *arguments: str) -> dict[str, Any]:
     report = json.loads(folder.main("check", "--sensitivity", "--format", "json", *arguments).out)
     assert report["summary"]["errors"] == 0, report["diagnostics"]
     return {one["path"]: one for one in report["sensitivity"]} | {
-        "rules": [each["rule"] for each in report["diagnostics"]]
+        "noise": sorted(re.findall(r"examples/\w+\.py", d["message"])[0] for d in noise(report))
     }
 
 
-def test_a_double_pendulum_is_chaotic_and_keeps_its_first_digits(make: Make) -> None:
-    folder = recorded(make, DOUBLE)
-    found = measured(folder)
-    script = found["examples/a.py"]
+def noise(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """What is warned of; there is nothing else."""
+    assert {each["rule"] for each in report["diagnostics"]} <= {"output-noise"}
+    found: list[dict[str, Any]] = report["diagnostics"]
+    return found
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course with all of the scripts, after one look at their digits."""
+    folder = Folder(tmp_path_factory.mktemp("sensitivity") / "course")
+    scripts = [("double", DOUBLE), ("fall", FALL), ("down", DOWN), ("rest", REST)]
+    scripts += [("limit", LIMIT), ("plain", PLAIN)]
+    blocks = [block(f"{name}.py", code, "?") for name, code in scripts]
+    blocks.append(block("loose.py", DOUBLE, "?", "rtol=10 atol=100"))
+    folder.fill(["## One\n\n" + "".join(blocks)], stores)
+    folder.main("update", "--quiet")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(course: Folder) -> dict[str, Any]:
+    return measured(course)
+
+
+@pytest.fixture
+def copied(course: Folder, found: dict[str, Any], tmp_path: Path) -> Folder:
+    """The same course, to be changed, with all that is remembered of it."""
+    folder = Folder(tmp_path / "copied")
+    shutil.copytree(course.root, folder.root, symlinks=True)
+    folder.tmp.mkdir()
+    return folder
+
+
+def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
+    course: Folder, found: dict[str, Any]
+) -> None:
+    script = found["examples/double.py"]
     assert script["chaotic"]
     assert script["amplification"] > 1e10
     assert script["numbers"] == 8
-    lines = folder.text(folder.lesson()).splitlines()
+    lines = course.text(course.lesson()).splitlines()
     first = next(i for i, line in enumerate(lines, 1) if line.startswith("t 1.0 "))
     doubted = {(one["line"] - first, one["column"]): one["trusted"] for one in script["doubts"]}
     rows = {line for line, _ in doubted}
@@ -156,23 +194,23 @@ def test_a_double_pendulum_is_chaotic_and_keeps_its_first_digits(make: Make) -> 
     assert (1, 3) not in doubted, "the time is exact"
     assert (1, 8) in doubted, "after thirty seconds nothing holds"
     assert 3 not in rows, "the number of joints is exact"
-    assert found["rules"] == ["output-noise"]
 
 
-def test_a_projectile_holds_in_all_digits(make: Make) -> None:
-    found = measured(recorded(make, FALL))
-    script = found["examples/a.py"]
+def test_projectile_holds_in_all_digits(found: dict[str, Any]) -> None:
+    script = found["examples/fall.py"]
     assert (script["status"], script["numbers"], script["doubts"]) == ("measured", 3, [])
     assert not script["chaotic"]
-    assert found["rules"] == []
 
 
-def test_what_ends_near_zero_or_rests_is_not_chaotic(make: Make) -> None:
-    found = measured(recorded(make, DOWN, REST))
-    for path in ("examples/a.py", "examples/b.py"):
+def test_what_ends_near_zero_or_rests_is_not_chaotic(found: dict[str, Any]) -> None:
+    for path in ("examples/down.py", "examples/rest.py"):
         assert (found[path]["status"], found[path]["doubts"]) == ("measured", [])
         assert not found[path]["chaotic"]
         assert found[path]["amplification"] < 1e4
+
+
+def test_warned_of_is_what_is_compared_and_does_not_hold(found: dict[str, Any]) -> None:
+    assert found["noise"] == ["examples/double.py", "examples/limit.py"]
 
 
 def test_the_double_pendulums_of_the_course_are_chaotic_after_a_while(make: Make) -> None:
@@ -186,38 +224,30 @@ def test_the_double_pendulums_of_the_course_are_chaotic_after_a_while(make: Make
     assert not found["examples/1s.py"]["chaotic"]
 
 
-def test_a_script_at_a_border_prints_other_words(make: Make) -> None:
-    found = measured(recorded(make, LIMIT))
-    [flip] = found["examples/a.py"]["flips"]
+def test_script_at_a_border_prints_other_words(found: dict[str, Any]) -> None:
+    [flip] = found["examples/limit.py"]["flips"]
     assert (flip["printed"], flip["other"]) == ("", "left or ")
-    assert found["rules"] == ["output-noise"]
 
 
-def test_a_script_without_mujoco_says_so_and_does_not_run_again(make: Make) -> None:
-    folder = recorded(make, PLAIN)
-    done = folder.main("check", "--sensitivity")
-    assert done.status == 0
-    assert "not asked examples/a.py  it does not use MuJoCo" in done.out
-    assert "moving initial states" not in done.err
-
-
-def test_what_is_allowed_for_is_told_and_not_warned_of(make: Make) -> None:
-    folder = recorded(make, DOUBLE, how="rtol=10 atol=100")
-    found = measured(folder)
-    doubts = found["examples/a.py"]["doubts"]
+def test_what_is_allowed_for_is_told_and_not_warned_of(
+    course: Folder, found: dict[str, Any]
+) -> None:
+    doubts = found["examples/loose.py"]["doubts"]
     assert doubts
     assert not any(doubt["compared"] for doubt in doubts)
-    assert found["rules"] == []
-    assert "(allowed for)" in folder.main("check", "--sensitivity").out
+    assert "(allowed for)" in course.main("check", "--sensitivity").out
 
 
-def test_the_report_as_text(make: Make) -> None:
-    done = recorded(make, FALL, PLAIN).main("check", "--sensitivity")
+def test_report_as_text(course: Folder, found: dict[str, Any]) -> None:
+    done = course.main("check", "--sensitivity")
+    assert done.status == 0
+    assert "moving initial states" not in done.err, "all is remembered"
     said = done.out[done.out.index("digits that hold") :].splitlines()
     assert said[0] == "digits that hold when initial states are moved by 1e-12 (relative):"
-    assert said[1].startswith("all       examples/a.py  3 numbers in full, states end ")
-    assert said[1].endswith(" times as far apart as they began")
-    assert said[2] == "not asked examples/b.py  it does not use MuJoCo"
+    [fall] = [line for line in said if "examples/fall.py" in line]
+    assert fall.startswith("all       examples/fall.py  3 numbers in full, states end ")
+    assert fall.endswith(" times as far apart as they began")
+    assert "not asked examples/plain.py  it does not use MuJoCo" in said
 
 
 def test_runs_with_moved_states_are_remembered(make: Make) -> None:
@@ -242,11 +272,11 @@ def test_what_is_known_of_the_run_itself_stays(make: Make) -> None:
     assert folder.main("explain", "examples/b.py").out == before
 
 
-def test_an_output_that_drifted_is_not_asked(make: Make) -> None:
-    folder = recorded(make, FALL)
-    folder.replace(folder.lesson(), "bodies 2\n```", "bodies 3\n```")
-    report = json.loads(folder.main("check", "--sensitivity", "--format", "json").out)
-    assert [one["status"] for one in report["sensitivity"]] == ["drifted"]
+def test_output_that_drifted_is_not_asked(copied: Folder) -> None:
+    copied.replace(copied.lesson(), "bodies 2\n```", "bodies 3\n```")
+    report = json.loads(copied.main("check", "--sensitivity", "--format", "json").out)
+    status = {one["path"]: one["status"] for one in report["sensitivity"]}
+    assert status["examples/fall.py"] == "drifted"
 
 
 def test_only_the_lessons_that_are_named(make: Make) -> None:
@@ -256,26 +286,23 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
     )
     folder.main("update", "-q")
     found = measured(folder, "1.1")
-    assert set(found) == {"examples/a.py", "rules"}
-    assert found["rules"] == []
+    assert set(found) == {"examples/a.py", "noise"}
+    assert found["noise"] == []
 
 
 @pytest.mark.parametrize("form", ["junit", "sarif", "github"])
-def test_other_forms_have_the_warning(make: Make, form: str) -> None:
-    folder = recorded(make, LIMIT)
-    assert "output-noise" in folder.main("check", "--sensitivity", "--format", form).out
+def test_other_forms_have_the_warning(course: Folder, found: dict[str, Any], form: str) -> None:
+    assert "output-noise" in course.main("check", "--sensitivity", "--format", form).out
 
 
-def test_a_warning_may_be_silenced(make: Make) -> None:
-    folder = recorded(make, LIMIT)
+def test_warning_may_be_silenced(copied: Folder) -> None:
     silence = '\n[[silence]]\nrule = "output-noise"\nreason = "the lesson is about borders"\n'
-    folder.write("content/course.toml", folder.text("content/course.toml") + silence)
-    assert measured(folder)["rules"] == []
+    copied.write("content/course.toml", copied.text("content/course.toml") + silence)
+    assert measured(copied)["noise"] == []
 
 
-def test_a_check_without_it_says_nothing_of_it(make: Make) -> None:
-    folder = recorded(make, LIMIT)
-    report = json.loads(folder.main("check", "--format", "json").out)
+def test_check_without_it_says_nothing_of_it(course: Folder) -> None:
+    report = json.loads(course.main("check", "--format", "json").out)
     assert "sensitivity" not in report
     assert report["diagnostics"] == []
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from support.preview_process import PATIENT, serving
+import pytest
+
+from support.preview_process import PATIENT, Preview, serving, wait_for
 from support.scratch_course import GOOD, Folder, block
 
 Make = Callable[..., Folder]
+pytestmark = pytest.mark.site
 
 
-def test_a_page_is_told_of_every_save(make: Make) -> None:
+def test_page_is_told_of_every_save(make: Make) -> None:
     folder = make(GOOD)
     page = "/lessons/1.1-one.html"
     with serving(folder) as preview, preview.events() as events:
@@ -63,25 +65,6 @@ def test_a_page_is_told_of_every_save(make: Make) -> None:
         events.settled()
 
 
-def test_pages_elsewhere_are_watched(make: Make) -> None:
-    folder = make(GOOD)
-    entries = "".join(
-        f'[[page]]\nid = "{id}"\ntitle = "Page"\nfile = "{path}"\n'
-        for id, path in (("guide", "docs/guide.md"), ("readme", "README.md"))
-    )
-    folder.write("content/course.toml", folder.text("content/course.toml") + entries)
-    folder.write("docs/guide.md", "One.\n")
-    folder.write("README.md", "One.\n")
-    with serving(folder) as preview:
-        for page, path in (("guide.html", "docs/guide.md"), ("readme.html", "README.md")):
-            with preview.events(page) as events:
-                events.settled()
-                folder.write(path, "Two.\n")
-                state = events.state
-                events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
-                assert b"Two." in preview.get(f"/{page}")[2]
-
-
 SAVES: dict[str, Callable[[Path, str], None]] = {}
 
 
@@ -127,8 +110,11 @@ def gone_for_a_moment(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-def test_saves_of_every_editor_count_once(make: Make) -> None:
-    folder = make(GOOD)
+def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make) -> None:
+    folder = make(GOOD, *("## One\n" for _ in range(5)))
+    pictures = [f"content/pics/{number}.svg" for number in range(300)]
+    for path in pictures:
+        folder.write(path, '<svg xmlns="http://www.w3.org/2000/svg"/>')
     with serving(folder, code=PATIENT) as preview, preview.events() as events:
         events.settled()
         for name, save in SAVES.items():
@@ -139,74 +125,84 @@ def test_saves_of_every_editor_count_once(make: Make) -> None:
             events.settled()
             told = [line for line in preview.said[before:] if not line.startswith("checked")]
             assert len(told) == 1 and told[0].startswith("changed: content/lessons/1.1-one.md (")
-
-
-def test_a_switched_branch_is_one_change(make: Make) -> None:
-    folder = make(*("## One\n" for _ in range(6)))
-    for number in range(300):
-        folder.write(f"content/pics/{number}.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
-    with serving(folder, code=PATIENT) as preview, preview.events() as events:
-        events.settled()
         before = len(preview.said)
-        for number in range(300):
-            (folder.root / f"content/pics/{number}.svg").unlink()
+        for path in pictures:
+            (folder.root / path).unlink()
         for number in range(1, 7):
             folder.write(folder.lesson(number), "## Two\n")
         state = events.state
         events.until(lambda told: told.state != state)
-        for name in ("one", "six"):
-            number = 1 + ("one", "two", "three", "four", "five", "six").index(name)
-            assert b"Two" in preview.get(f"/lessons/1.{number}-{name}.html")[2]
+        for page in ("1.1-one", "1.6-six"):
+            assert b"Two" in preview.get(f"/lessons/{page}.html")[2]
         events.settled()
         changed = [line for line in preview.said[before:] if line.startswith("changed: ")]
         assert len(changed) == 1, changed
 
 
-def test_two_browsers_and_one_that_was_away(make: Make) -> None:
+def test_pages_elsewhere_two_browsers_and_what_is_not_of_the_course(make: Make) -> None:
     folder = make(GOOD, "## Two\n")
-    with serving(folder) as preview:
-        with preview.events() as one, preview.events() as two:
-            one.settled()
-            two.settled()
-            assert one.state == two.state
-            old = one.state
-            folder.replace(folder.lesson(), "## Hello", "## Both")
-            assert one.until(lambda told: told.state != old).state == (
-                two.until(lambda told: told.state != old).state
-            )
-        folder.replace(folder.lesson(), "## Both", "## Later")
-        with preview.events("lessons/1.2-two.html") as other:
-            other.settled()
-            assert other.pages == 1  # nothing of its own changed
-        with preview.events() as back:
-            assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
-
-
-def test_what_is_not_of_the_course_is_no_change(make: Make) -> None:
-    folder = make(GOOD)
+    entries = "".join(
+        f'[[page]]\nid = "{id}"\ntitle = "Page"\nfile = "{path}"\n'
+        for id, path in (("guide", "docs/guide.md"), ("readme", "README.md"))
+    )
+    folder.write("content/course.toml", folder.text("content/course.toml") + entries)
+    folder.write("docs/guide.md", "One.\n")
+    folder.write("README.md", "One.\n")
     with serving(folder) as preview:
         preview.heard("checked: ")
-        before = len(preview.said)
-        folder.write("notes.txt", "elsewhere")
-        folder.write("examples/mine.txt", "derived")
-        folder.write("content/lessons/.1.1-one.md.swp", "an editor's")
-        folder.write("content/lessons/1.1-one.md~", "an editor's")
-        folder.write("content/lessons/#1.1-one.md#", "an editor's")
-        folder.write("content/lessons/4913", "an editor's")
-        folder.write("content/public/pic.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>")
-        preview.heard("changed: content/public", before)
-        assert len([line for line in preview.said[before:] if line.startswith("changed: ")]) == 1
+        pages_outside_content_are_watched(folder, preview)
+        browsers_are_told_alike(folder, preview)
+        files_of_others_are_no_change(folder, preview)
 
 
-def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
+def pages_outside_content_are_watched(folder: Folder, preview: Preview) -> None:
+    for page, path in (("guide.html", "docs/guide.md"), ("readme.html", "README.md")):
+        with preview.events(page) as events:
+            events.settled()
+            folder.write(path, "Two.\n")
+            state = events.state
+            events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
+            assert b"Two." in preview.get(f"/{page}")[2]
+
+
+def browsers_are_told_alike(folder: Folder, preview: Preview) -> None:
+    with preview.events() as one, preview.events() as two:
+        one.settled()
+        two.settled()
+        assert one.state == two.state
+        old = one.state
+        folder.replace(folder.lesson(), "## Hello", "## Both")
+        assert one.until(lambda told: told.state != old).state == (
+            two.until(lambda told: told.state != old).state
+        )
+    folder.replace(folder.lesson(), "## Both", "## Later")
+    with preview.events("lessons/1.2-two.html") as other:
+        other.settled()
+        assert other.pages == 1  # nothing of its own changed
+    with preview.events() as back:
+        assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
+        back.settled()
+
+
+def files_of_others_are_no_change(folder: Folder, preview: Preview) -> None:
+    before = len(preview.said)
+    folder.write("notes.txt", "elsewhere")
+    folder.write("examples/mine.txt", "derived")
+    folder.write("content/lessons/.1.1-one.md.swp", "an editor's")
+    folder.write("content/lessons/1.1-one.md~", "an editor's")
+    folder.write("content/lessons/#1.1-one.md#", "an editor's")
+    folder.write("content/lessons/4913", "an editor's")
+    folder.write("content/public/pic.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>")
+    preview.heard("changed: content/public", before)
+    assert len([line for line in preview.said[before:] if line.startswith("changed: ")]) == 1
+
+
+def test_save_during_the_first_runs_is_not_missed(make: Make) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\n"
     slow += "while not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
     folder = make("## First\n\n" + block("x.py", slow, "1"))
     with serving(folder) as preview, preview.events() as events:
-        until = time.monotonic() + 120
-        while not (folder.root / "begun").exists():
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        wait_for(folder.root / "begun")
         assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
             {"path": "examples/x.py", "state": "running"}
         ]
@@ -217,31 +213,29 @@ def test_a_save_during_the_first_runs_is_not_missed(make: Make) -> None:
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
 
 
-def begins(folder: Folder, times: int) -> None:
-    """Wait until the script has begun so many times."""
-    until = time.monotonic() + 120
-    while not (folder.root / "begun").exists() or len(folder.read("begun")) < times:
-        assert time.monotonic() < until
-        time.sleep(0.01)
-
-
-def test_a_script_that_was_changed_is_not_waited_for(make: Make) -> None:
-    slow = "import time\nopen('begun', 'a').write('x')\ntime.sleep(50)\nprint(1)"
-    folder = make("## First\n\n" + block("x.py", slow, "1"))
+def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
+    begun = "import pathlib, time\nopen('begun', 'a').write('x')\n"
+    waits = "while not pathlib.Path('go').exists(): time.sleep(0.01)\n"
+    folder = make("## First\n\n" + block("x.py", f"{begun}{waits}print(1)", "1"))
     with serving(folder) as preview, preview.events() as events:
-        begins(folder, 1)
+        wait_for(folder.root / "begun")
         # It goes on while something else is saved.
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
-        time.sleep(0.5)
+        folder.write("go", "")
+        events.settled()
         assert folder.read("begun") == b"x"
-        folder.replace(folder.lesson(), "time.sleep(50)", "time.sleep(0)")
+        (folder.root / "go").unlink()
+        folder.replace(folder.lesson(), "print(1)", "print(int(1))")
+        wait_for(folder.root / "begun", 2)
+        events.until(lambda told: told.news["scripts"][0]["state"] == "running")
+        folder.replace(folder.lesson(), waits, "")
         events.settled()
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
-        assert folder.read("begun") == b"xx"
+        assert folder.read("begun") == b"xxx"
 
 
-def test_a_course_that_is_wrong_from_the_beginning(make: Make) -> None:
+def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
     page = "/lessons/1.1-one.html"
     with serving(folder) as preview:
@@ -260,7 +254,7 @@ def test_a_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     assert not (folder.root / "public").exists()
 
 
-def test_a_map_that_is_wrong_from_the_beginning(make: Make) -> None:
+def test_map_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder = make(GOOD)
     good = folder.read("content/course.toml")
     folder.write("content/course.toml", "[course\n")

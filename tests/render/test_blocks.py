@@ -77,7 +77,9 @@ def test_an_output_apart_from_its_script_names_it(make: Make) -> None:
 
 
 @pytest.mark.parametrize("shape", ["> {}", "- {}"])
-def test_they_are_one_object_in_callouts_and_lists_too(make: Make, shape: str) -> None:
+def test_a_script_and_its_output_are_one_object_in_callouts_and_lists_too(
+    make: Make, shape: str
+) -> None:
     lines = (SCRIPT + OUTPUT).strip().split("\n")
     prefix = shape.format("").rstrip() if shape.startswith(">") else "  "
     text = "\n".join(
@@ -89,7 +91,7 @@ def test_they_are_one_object_in_callouts_and_lists_too(make: Make, shape: str) -
     assert html.count("<samp>") == 1
 
 
-def test_outputs_of_the_next_list_item_stay_there(make: Make) -> None:
+def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make) -> None:
     text = "- x\n\n" + "\n".join(f"  {line}" for line in SCRIPT.split("\n"))
     text += "\n- " + "\n  ".join(OUTPUT.strip().split("\n"))
     assert make(text).html().count("<figure") == 2
@@ -119,7 +121,9 @@ def test_outputs_of_the_next_list_item_stay_there(make: Make) -> None:
          "prints something else."),
     ],
 )  # fmt: skip
-def test_receipts(make: Make, keys: str, status: str, expected: str) -> None:
+def test_the_receipt_of_an_output_says_how_it_was_compared(
+    make: Make, keys: str, status: str, expected: str
+) -> None:
     made = make(SCRIPT + OUTPUT.replace("text", f"text{keys}"), status=status)
     assert receipt(made.html()) == expected
 
@@ -135,7 +139,7 @@ def test_receipts(make: Make, keys: str, status: str, expected: str) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("text", [SCRIPT, SCRIPT + OUTPUT])
-def test_scripts_that_were_not_run_say_why(
+def test_the_receipt_of_a_script_that_was_not_run_says_why(
     make: Make, outcome: Outcome, missing: tuple[str, ...], expected: str, text: str
 ) -> None:
     run = ScriptRun("examples/a.py", outcome, 0, "", "", 0.0, missing)
@@ -175,7 +179,7 @@ def test_control_characters_of_an_output_are_shown(make: Make) -> None:
     assert "␛[31mtwo␇" in html
 
 
-def test_models(make: Make) -> None:
+def test_a_fragment_of_a_model_says_where_it_belongs_and_what_the_compiler_said(make: Make) -> None:
     assert make("```mjcf fragment=worldbody\n<body/>\n```\n").html() == (
         '<figure class="script mjcf">\n'
         '<figcaption class="bar"><span class="bar-name">MJCF, inside &lt;worldbody&gt;</span>'
@@ -191,7 +195,7 @@ def test_models(make: Make) -> None:
     )
 
 
-def test_callouts(make: Make) -> None:
+def test_a_callout_has_its_kind_title_and_fold(make: Make) -> None:
     html = make('> [!established] A *title* with "quotes"\n> Text.\n').html()
     assert html == (
         '<div class="callout callout-established" role="note">\n'
@@ -207,7 +211,7 @@ def test_callouts(make: Make) -> None:
     assert "Try it</span></summary>\n<p>Text.</p>\n</details>" in folded
 
 
-def test_io_cards(make: Make) -> None:
+def test_an_io_card_is_a_list_of_three(make: Make) -> None:
     text = "```io\nINPUT: a `box`\nPROCESS: spin it\n  for long\nOUTPUT: flips\n```\n"
     assert make(text).html() == (
         '<dl class="io">\n<div><dt>Input</dt><dd>a <code>box</code></dd></div>\n'
@@ -224,7 +228,7 @@ def test_bound_numbers_name_their_script_and_have_a_real_minus(make: Make) -> No
     )
 
 
-def test_code_that_is_only_shown(make: Make) -> None:
+def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> None:
     assert make("```sh\nls *.py\n```\n").html() == (
         '<div class="code" data-copy>\n<pre tabindex="0" role="group" aria-label="Code">'
         '<code class="language-sh">ls *.py\n</code></pre>\n</div>\n'

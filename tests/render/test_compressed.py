@@ -34,7 +34,7 @@ def copies(path: str, data: bytes, keep: Kept | None = None) -> list[OutputFile]
 
 
 @pytest.mark.parametrize("suffix", ["js", "css", "wasm", "json", "mjb", "svg"])
-def test_an_asset_gets_both(suffix: str) -> None:
+def test_an_asset_gets_a_brotli_and_a_gzip_copy(suffix: str) -> None:
     first, second = copies(f"assets/labs/x.1234abcd.{suffix}", TEXT)
     assert first.path == f"assets/labs/x.1234abcd.{suffix}.br"
     assert second.path == f"assets/labs/x.1234abcd.{suffix}.gz"
@@ -52,17 +52,17 @@ def test_an_asset_gets_both(suffix: str) -> None:
         "assets/js",
     ],
 )
-def test_what_gets_none(path: str) -> None:
+def test_pages_pictures_fonts_and_archives_get_no_copy(path: str) -> None:
     assert copies(path, TEXT) == []
 
 
-def test_what_is_too_small_or_does_not_shrink() -> None:
+def test_what_is_below_1024_bytes_or_does_not_shrink_gets_no_copy() -> None:
     assert copies("assets/x.js", TEXT[:1023]) == []
     assert len(copies("assets/x.js", TEXT[:1024])) == 2
     assert copies("assets/x.wasm", random.Random(0).randbytes(5000)) == []
 
 
-def test_the_same_bytes_each_time_and_no_time_in_them() -> None:
+def test_a_copy_has_the_same_bytes_each_time_and_no_date() -> None:
     first, again = copies("assets/x.js", TEXT), copies("assets/x.js", TEXT)
     assert first == again
     assert first[1].data[4:8] == b"\0\0\0\0", "gzip's time"

@@ -46,8 +46,37 @@ def test_decorators_and_comments_stay_with_what_they_belong_to() -> None:
     assert code.split("\n")[parts[1].first] == "# About two."
 
 
-def test_a_short_remainder_is_not_folded() -> None:
+def test_a_remainder_of_a_few_lines_is_not_folded() -> None:
     assert fold(function("one", 44) + function("two", 6)) == (Part(1, 50, False),)
+
+
+def test_44_lines_of_the_rest_are_shown_and_no_more() -> None:
+    rest = function("three", 20)
+    fits = function("one", 20) + function("two", 24)
+    assert fold(fits + rest) == (Part(1, 44, False), Part(45, 64, True, names=("three",)))
+    longer = function("one", 20) + function("two", 25)
+    assert fold(longer + rest) == (Part(1, 20, False), Part(21, 65, True, names=("two", "three")))
+
+
+def test_a_remainder_is_folded_from_12_lines_on() -> None:
+    assert fold(function("one", 44) + function("two", 11)) == (Part(1, 55, False),)
+    parts = (Part(1, 44, False), Part(45, 56, True, names=("two",)))
+    assert fold(function("one", 44) + function("two", 12)) == parts
+
+
+def test_a_guard_of_up_to_12_lines_stays() -> None:
+    code = function("one", 44) + function("two", 20) + 'if __name__ == "__main__":\n'
+    guarded = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
+    assert fold(code + "    one()\n" * 11) == guarded
+    assert fold(code + "    one()\n" * 12) == (
+        Part(1, 44, False),
+        Part(45, 77, True, names=("two",)),
+    )
+
+
+def test_a_text_further_down_is_no_docstring() -> None:
+    code = function("one", 44) + '"""A remark."""\n' + function("two", 20)
+    assert fold(code)[1] == Part(45, 65, True, docstring=False, names=("two",))
 
 
 def test_one_long_statement_is_shown() -> None:

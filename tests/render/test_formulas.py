@@ -30,7 +30,7 @@ def test_a_long_formula_is_cut_between_its_outermost_rows(between: str) -> None:
         f"<math>{ROW}{END}<mo>+</mo></math>",
     ],
 )
-def test_other_formulas_stay_whole(mathml: str) -> None:
+def test_short_displayed_and_open_formulas_stay_whole(mathml: str) -> None:
     assert breakable(mathml) == mathml
 
 
@@ -55,7 +55,7 @@ Y = "<math><mi>y</mi></math>"
         ("no formula, here", "no formula, here"),
     ],
 )  # fmt: skip
-def test_punctuation_is_held(html: str, expected: str) -> None:
+def test_punctuation_stays_on_the_line_of_its_formula(html: str, expected: str) -> None:
     assert glue(html) == expected
 
 
@@ -82,7 +82,7 @@ def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: st
     assert glue(html) == expected
 
 
-def test_a_unit_of_several_is_held() -> None:
+def test_a_unit_of_several_parts_stays_on_the_line_of_its_formula() -> None:
     assert glue(f"{X}\u00a0kg\u00a0m², so") == f'<span class="held">{X}\u00a0kg\u00a0m²,</span> so'
 
 

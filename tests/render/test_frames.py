@@ -49,7 +49,9 @@ def drafts() -> list[Draft]:
 
 @pytest.mark.parametrize("base_url", ["", "https://example.org/course/"])
 @pytest.mark.parametrize("title", ["Bodies", "Icons \ue000icon\ue001 & \ue001more\ue000"])
-def test_they_are_the_same(make: Make, base_url: str, title: str) -> None:
+def test_a_frame_put_together_from_pieces_is_that_of_the_template(
+    make: Make, base_url: str, title: str
+) -> None:
     made = make("Text.")
     course = replace(made.course, base_url=base_url, title=title)
     library = Library.of(course, made.results, made.assets)

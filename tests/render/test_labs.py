@@ -33,7 +33,7 @@ def lab(**fields: Any) -> str:
     return f"```lab simlab\n{json.dumps(fields)}\n```\n"
 
 
-def test_everything_that_can_be_said_is_said(make: Make) -> None:
+def test_a_lab_with_every_field_is_described_in_full(make: Make) -> None:
     assert make(lab(**FULL)).html() == (
         '<section class="lab" data-lab="" data-kind="simlab" data-model="box" '
         'aria-label="Lab: A &lt;lab&gt;">\n'
@@ -70,5 +70,5 @@ def test_a_keyframe_without_a_name_is_numbered(make: Make) -> None:
     assert "keyframe <code>mine</code>" in make(lab(model="box", key="mine")).html()
 
 
-def test_no_control_is_dead(make: Make) -> None:
+def test_a_lab_has_no_control_before_its_script_runs(make: Make) -> None:
     assert not re.search("<(input|button|select|canvas)", make(lab(**FULL)).html())

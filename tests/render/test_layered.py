@@ -62,7 +62,7 @@ def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
 
 @settings(max_examples=50)
 @given(graphs(), st.floats(0, 30))
-def test_nothing_overlaps_or_sticks_out(graph: Graph, gap: float) -> None:
+def test_no_node_overlaps_another_or_sticks_out(graph: Graph, gap: float) -> None:
     layout = laid_out(*graph, gap=gap)
     for level in range(layout.layers):
         row = sorted(node.x for node in layout.nodes if node.layer == level)
@@ -80,7 +80,7 @@ def test_the_same_graph_gives_the_same_layout(graph: Graph) -> None:
 
 @settings(max_examples=50)
 @given(graphs())
-def test_what_is_reduced_leads_as_far_with_no_arrow_too_many(graph: Graph) -> None:
+def test_a_reduced_graph_leads_as_far_with_no_arrow_too_many(graph: Graph) -> None:
     nodes, edges = graph
     kept = reduced(nodes, edges)
     assert set(kept) <= set(edges)
@@ -120,6 +120,6 @@ def test_what_comes_from_nothing_stands_next_to_what_it_leads_to() -> None:
     assert {node.id: node.layer for node in layout.nodes} == {"a": 0, "b": 1, "c": 2, "late": 1}
 
 
-def test_no_nodes_and_one() -> None:
+def test_the_layout_of_no_node_and_of_one() -> None:
     assert laid_out([], []) == Layout((), (), 0.0, 0)
     assert laid_out(["a"], []).width == 40

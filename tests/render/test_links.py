@@ -29,7 +29,7 @@ def site(page: str, path: str = "lessons/a.html") -> tuple[OutputFile, ...]:
     )
 
 
-def test_good_links() -> None:
+def test_links_that_lead_somewhere_are_not_told() -> None:
     page = """<p id=here>
     <a href="#here">1</a> <a href="../index.html#top-level">2</a> <a href="../#old">3</a>
     <a href="../levels/1%20x.html#%C3%BCber">4</a> <a href="">5</a> <a href="#top">6</a>
@@ -77,7 +77,7 @@ def test_broken_links_are_listed_in_order() -> None:
     )
 
 
-def test_a_site_below_a_path() -> None:
+def test_links_of_a_site_below_a_path_stay_below_it() -> None:
     page = (
         '<a href="/course/index.html">1</a><a href="/index.html">2</a>'
         '<a href="https://h.org/course/levels/">3</a><a href="https://h.org/other/">4</a>'
@@ -112,10 +112,17 @@ TAGS = [
     "&",
     "<p id=bare>",
 ]
+SOUND = [
+    '<a href="#here"><p id="here">',
+    '<a href="#top">',
+    '<a href="../index.html">',
+    '<a href="../index.html#old">',
+    '<img src="../assets/site.css#x">',
+]
 
 
 @given(st.lists(st.sampled_from(TAGS), max_size=8))
-def test_what_is_read_quickly_is_what_a_parser_reads(parts: list[str]) -> None:
+def test_a_page_read_quickly_gives_what_a_parser_reads(parts: list[str]) -> None:
     """Where it can be read quickly at all."""
     html = "\n".join(parts)
     quick, slow = _quickly_read(html), _read(html)
@@ -124,13 +131,13 @@ def test_what_is_read_quickly_is_what_a_parser_reads(parts: list[str]) -> None:
         assert [a.url for a in quick.addresses] == [a.url for a in slow.addresses]
 
 
-def test_what_we_write_can_be_read_quickly() -> None:
+def test_tags_as_templates_write_them_are_read_quickly() -> None:
     assert _quickly_read("\n".join(TAGS[:11])) is not None
     for tag in TAGS[11:]:
         assert _quickly_read(f"<p>{tag}</p>") is None or tag == "&"
 
 
-@given(st.lists(st.sampled_from([*TAGS, '<a href="#here">', '<p id="here">']), max_size=6))
+@given(st.lists(st.sampled_from([*TAGS, *SOUND]), max_size=6))
 def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str]) -> None:
     page = "".join(parts)
     files = site(page)
@@ -139,6 +146,14 @@ def test_sound_references_are_those_in_which_nothing_is_broken(parts: list[str])
     led = references("lessons/a.html", pages["lessons/a.html"][1], "")
     broken = [b for b in check_links(files) if b.page == "lessons/a.html"]
     assert all_lead_somewhere(led, {f.path for f in files}, ids) == (not broken)
+
+
+def test_references_to_files_that_are_no_pages_lead_somewhere() -> None:
+    """Whatever is behind their `#`; and so do those to a page as a whole."""
+    files = {"a.html", "a.svg"}
+    sound = {("a.html", ""), ("a.html", "top"), ("a.html", "id"), ("a.svg", "x")}
+    assert all_lead_somewhere(sound, files, {"a.html": {"id"}})
+    assert not all_lead_somewhere({("a.html", "x")}, files, {"a.html": {"id"}})
 
 
 STEPS = st.sampled_from(

@@ -18,7 +18,7 @@ from coursebuild.results import OutputFile
 from support.rendered_course import Make
 
 
-def test_names() -> None:
+def test_anchors_are_named_after_the_file() -> None:
     assert listing_anchor("examples/a.py") == "a.py"
     assert line_anchor("examples/sub/a.py", 12) == "sub/a.L12"
     assert line_anchor("models/box.xml", 1) == "box.L1"
@@ -41,7 +41,7 @@ def test_names() -> None:
         ("a.L9999999999", None),
     ],
 )
-def test_what_an_anchor_names(anchor: str, lines: tuple[str, int, int] | None) -> None:
+def test_the_lines_that_an_anchor_names(anchor: str, lines: tuple[str, int, int] | None) -> None:
     assert linked_lines(anchor) == lines
 
 

@@ -84,11 +84,11 @@ def html(text: str, look: Look | None = None) -> str:
         ("- a\n  - b\n- c", "<ul>\n<li>a\n<ul>\n<li>b</li>\n</ul>\n</li>\n<li>c</li>\n</ul>\n"),
     ],
 )
-def test_html(text: str, expected: str) -> None:
+def test_the_html_of_blocks_and_inlines(text: str, expected: str) -> None:
     assert html(text) == expected
 
 
-def test_a_table() -> None:
+def test_a_table_is_framed_and_aligned() -> None:
     assert html("| a | b | c |\n| - | -: | :-: |\n| *1* | 2 |\n") == (
         '<div class="table" role="group" aria-label="Table" tabindex="0">\n'
         '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n'
@@ -104,7 +104,7 @@ def test_a_table_without_rows_and_frame() -> None:
     assert text == '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n</tr>\n</thead>\n</table>\n'
 
 
-def test_a_task_list() -> None:
+def test_a_task_list_has_labelled_boxes() -> None:
     assert html("- [ ] a\n- [x] b\n- c\n") == (
         '<ul class="task-list">\n'
         '<li><input type="checkbox" disabled aria-label="Not done"> a</li>\n'
@@ -113,12 +113,12 @@ def test_a_task_list() -> None:
     )
 
 
-def test_a_loose_task_list() -> None:
+def test_a_loose_task_list_has_paragraphs_behind_its_boxes() -> None:
     text = html("- [ ] a\n\n- [x] b\n")
     assert '<li><input type="checkbox" disabled aria-label="Not done"> \n<p>a</p>\n</li>' in text
 
 
-def test_footnotes() -> None:
+def test_footnotes_and_their_references_link_to_each_other() -> None:
     document = parsed("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
     assert str(render_blocks(document.blocks, Page())) == (
         '<p>a<sup class="footnote-ref"><a href="#fn:1" id="fnref:1" role="doc-noteref"'
@@ -159,7 +159,7 @@ def test_text_is_escaped_wherever_it_stands() -> None:
     assert '">' not in html('[a](<b"\\>c>)').removeprefix('<p><a href="/UrlTarget?a&amp;b">')
 
 
-def test_inlines_alone() -> None:
+def test_inlines_can_be_rendered_without_their_block() -> None:
     (paragraph,) = parsed("*a* b").blocks
     inlines = getattr(paragraph, "children", ())
     assert render_inlines(inlines, Page()) == "<em>a</em> b"

@@ -30,11 +30,13 @@ from support.rendered_course import Make
         (None, ""),
     ],
 )
-def test_numbers(value: float | None, text: str) -> None:
+def test_a_number_has_three_digits_and_a_power_of_ten_where_it_needs_one(
+    value: float | None, text: str
+) -> None:
     assert power(value).replace("\u2009", " ") == text
 
 
-def test_other_numbers() -> None:
+def test_errors_percentages_factors_and_sizes_as_text() -> None:
     assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
     assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
     assert bounded(0.002, 1e-3) == "0.00200"
@@ -43,16 +45,25 @@ def test_other_numbers() -> None:
     assert percent(-0.0604) == "−6.040\u2009%"
     assert percent(2.5e-13) == "+2.5\u2009×\u200910<sup>−11</sup>\u2009%"
     assert percent(0.0) == "0\u2009%"
+    assert [percent(v) for v in (1e-5, 99.0, 100.0)] == [
+        "+0.001\u2009%",
+        "+9900.000\u2009%",
+        "+10000\u2009%",
+    ]
     assert [factor(v) for v in (None, 0.123456, 99.9, 1359.4)] == [
         "",
         "0.123",
         "99.9",
         "1\u2009359",
     ]
-    assert [size(n) for n in (0, 1396, 81_212, 98_765_432)] == [
+    assert [size(n) for n in (0, 1396, 9999, 10_000, 81_212, 9_999_000, 10**7, 98_765_432)] == [
         "0 B",
         "1\u2009396 B",
+        "9\u2009999 B",
+        "10 kB",
         "81 kB",
+        "9\u2009999 kB",
+        "10 MB",
         "99 MB",
     ]
     assert [sentence(t) for t in ("", "it is", "Is it?")] == ["", "It is.", "Is it?"]
@@ -185,7 +196,7 @@ def test_under_every_table_is_the_command_that_makes_it_again(site: dict[str, st
         assert set(after) == {line}
 
 
-def test_a_case_alone_and_one_of_a_number_that_has_no_name(make: Make) -> None:
+def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
     found = Reports(cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=())))
     told = text(pages(make, found)["numerics/index.html"])
     assert "4 A &lt;a&gt; It swings." in told

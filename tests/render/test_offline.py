@@ -60,7 +60,7 @@ def file(path: str, size: int = 100) -> FileFacts:
         ("examples/a.py", "rest"),
     ],
 )
-def test_groups(path: str, group: str) -> None:
+def test_each_file_is_in_the_group_of_those_who_need_it(path: str, group: str) -> None:
     found = listed(file(path))
     groups = {name for name in ("shell", "text", "rest") if found[name]["files"]}
     assert groups == {group}
@@ -77,7 +77,7 @@ def test_groups(path: str, group: str) -> None:
         *("course.epub", "assets/site.#.css.br", "assets/site.#.css.gz"),
     ],
 )
-def test_what_is_not_kept(path: str) -> None:
+def test_copies_and_files_for_machines_are_in_no_group(path: str) -> None:
     assert not any(listed(file(path))[name]["files"] for name in ("shell", "text", "rest"))
 
 
@@ -85,6 +85,11 @@ def test_what_is_large_is_for_those_who_ask_for_everything() -> None:
     large = listed(file("all/index.html", 2_000_000), file("assets/search.#.js", 2_000_000))
     assert list(large["rest"]["files"]) == ["all/index.html"]
     assert len(large["text"]["files"]) == 1, "what scripts of every page need is kept with them"
+
+
+def test_a_page_is_large_from_a_mebibyte_on() -> None:
+    found = listed(file("a.html", 1 << 20), file("b.html", (1 << 20) + 1))
+    assert ([*found["text"]["files"]], [*found["rest"]["files"]]) == (["a.html"], ["b.html"])
 
 
 def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
@@ -129,7 +134,7 @@ def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
     assert [*json.loads(text)["text"]["files"]] == [one.path for one in files]
 
 
-def test_facts_come_sorted() -> None:
+def test_facts_of_files_are_sorted_by_path() -> None:
     facts = list(facts_of([OutputFile("b", b"1"), OutputFile("a", b"12")]))
     assert [(one.path, one.size) for one in facts] == [("a", 2), ("b", 1)]
 
@@ -146,14 +151,14 @@ def test_the_manifest_names_what_is_there(site: dict[str, bytes]) -> None:
     assert purposes == ["any", "any", "any", "maskable"]
 
 
-def test_every_page_names_it(site: dict[str, bytes]) -> None:
+def test_every_page_names_the_manifest(site: dict[str, bytes]) -> None:
     for path, data in site.items():
         if path.endswith(".html"):
             root = "/course/" if path == "404.html" else "../" * path.count("/")
             assert f'<link rel="manifest" href="{root}manifest.webmanifest">' in data.decode()
 
 
-def test_the_colours_are_those_of_the_style_sheet() -> None:
+def test_the_colours_of_the_manifest_are_those_of_the_style_sheet() -> None:
     tokens = (ROOT / "site/css/tokens.css").read_text(encoding="utf-8")
     light, dark = re.findall(r"--paper: light-dark\((#\w+), (#\w+)\)", tokens)[0]
     base = (ROOT / "templates/base.html").read_text(encoding="utf-8")
@@ -166,6 +171,8 @@ def test_the_colours_are_those_of_the_style_sheet() -> None:
     [
         ("Simulation with MuJoCo", "Simulation"),
         ("Physics", "Physics"),
+        ("Rigid bodies", "Rigid bodies"),
+        ("Rigid bodies1", "Rigid"),
         ("A first course", "A first"),
         ("Bodies, falling", "Bodies,"[:-1]),
         ("Thermodynamik für Anfänger", "Thermodynamik"),
@@ -173,7 +180,9 @@ def test_the_colours_are_those_of_the_style_sheet() -> None:
         ("— — —", "— — —"),
     ],
 )
-def test_names_below_icons(title: str, short: str) -> None:
+def test_a_name_below_an_icon_has_whole_words_and_at_most_12_characters(
+    title: str, short: str
+) -> None:
     assert short_name(title) == short
 
 

@@ -66,7 +66,7 @@ def by_pygments(code: str) -> list[str]:
 @given(
     st.lists(st.sampled_from(PIECES), max_size=40).map("".join).map(lambda t: t.replace("\f", ""))
 )
-@settings(max_examples=1000)
+@settings(max_examples=200)
 @example("import a\n\n  , if\n")
 @example("import as as b, c\nas d\n")
 @example("from a.as import as\n")
@@ -115,6 +115,7 @@ def test_python_has_the_same_colours_under_all_its_names() -> None:
         assert highlight_lines(name, "def f(): 1") == highlight_lines("python", "def f(): 1")
 
 
+@pytest.mark.site
 def test_an_ordinary_script_needs_no_pygments() -> None:
     code = (
         '"""Title."""\n\nimport math as m\nfrom a.b import (c,\n    d)\n\nΔθ = 0.1  # rad\n\n\n'

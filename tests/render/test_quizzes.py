@@ -21,7 +21,7 @@ def quiz(*questions: dict[str, Any], title: str = "Check", id: str = "0.1-check"
     return f"```quiz\n{json.dumps(data)}\n```\n"
 
 
-def test_multiple_choice(make: Make) -> None:
+def test_a_multiple_choice_question_has_options_hints_and_feedback(make: Make) -> None:
     question = {
         "kind": "mcq", "q": "Which *one*?", "options": ["A < B", "$x$"], "answer": 1,
         "explain": "<p>Because.</p>", "feedback": ["No.", "Yes."], "hints": ["Look."],
@@ -46,19 +46,19 @@ def test_multiple_choice(make: Make) -> None:
     )  # fmt: skip
 
 
-def test_a_question_goes_by_its_id(make: Make) -> None:
+def test_a_question_with_an_id_is_named_by_it(make: Make) -> None:
     question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
     html = make(quiz(question)).html()
     assert 'id="0.1-check.why" data-question="why" data-number="1" data-kind="open">' in html
 
 
-def test_a_link_to_a_question(make: Make) -> None:
+def test_a_question_can_be_linked_to(make: Make) -> None:
     question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
     html = make("See [it](#0.1-check.why).\n\n" + quiz(question)).html()
     assert '<a href="#0.1-check.why">it</a>' in html
 
 
-def test_choose_all(make: Make) -> None:
+def test_a_question_with_several_right_options_says_so(make: Make) -> None:
     options = ["a", "b", "c"]
     question = {"kind": "mcq", "q": "Which?", "options": options, "answer": [0, 2], "explain": "E."}
     html = make(quiz(question)).html()
@@ -125,6 +125,20 @@ def test_an_output_question_is_graded_as_its_recording_is_compared(
     assert f'data-answer="two" data-compare="{rule}">' in html
 
 
+def test_an_output_question_is_graded_by_the_recording_of_its_own_script(make: Make) -> None:
+    other = SCRIPT.replace("a.py", "b.py") + "Output:\n\n```text exact\none\ntwo\n```\n\n"
+    own = "Output:\n\n```text rtol=1e-3\none\ntwo\n```\n\n```quiz"
+    html = make(other + output_question(2).replace("```quiz", own)).html()
+    assert 'data-compare="rtol=0.001 atol=0.0">' in html
+
+
+def test_an_empty_line_of_an_output_is_shown_and_not_graded(make: Make) -> None:
+    run = ScriptRun("examples/a.py", Outcome.OK, 0, "one\n\nthree\n", "", 0.0)
+    html = make(output_question(2), runs={"examples/a.py": run}).html()
+    assert "<samp></samp></pre>" in html
+    assert "data-answer" not in html
+
+
 def test_what_a_script_prints_stays_inside_its_attribute(make: Make) -> None:
     line = '"><script>alert(1)</script> &amp; \u202e'
     run = ScriptRun("examples/a.py", Outcome.OK, 0, f"one\n{line}\n", "", 0.0)
@@ -173,7 +187,7 @@ def test_a_quiz_without_a_title_has_a_name_all_the_same(make: Make) -> None:
     assert 'aria-label="Questions">\n<ol class="questions">' in html
 
 
-def test_a_prediction_of_several(make: Make) -> None:
+def test_a_prediction_with_several_right_options_says_so(make: Make) -> None:
     question = {"kind": "predict", "q": "Q", "options": ["a", "b", "c"], "answer": [0, 2]}
     html = make(quiz(question)).html()
     keys = " ".join(text_key("option", option) for option in ("a", "c"))
@@ -211,5 +225,5 @@ def test_letters_go_on_after_z() -> None:
         ("", ""),
     ],
 )
-def test_units(unit: str, html: str) -> None:
+def test_exponents_of_a_unit_are_raised(unit: str, html: str) -> None:
     assert unit_html(unit) == html

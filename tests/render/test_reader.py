@@ -45,7 +45,7 @@ def parsed(text: str) -> Document:
 
 
 @pytest.mark.parametrize(("text", "number"), [("", 0), ("a:x", 1), (NAMES, 3)])
-def test_how_many_they_are(text: str, number: int) -> None:
+def test_the_number_of_questions(text: str, number: int) -> None:
     assert count(text) == number
 
 
@@ -67,7 +67,7 @@ def test_lists_of_lessons_name_their_questions(make: Make) -> None:
     ]
 
 
-def test_no_page_but_those_lists_names_questions(make: Make) -> None:
+def test_only_lists_of_lessons_name_questions(make: Make) -> None:
     """So that an edit of a quiz draws no other page."""
     found = pages(make)
     lists = {"index.html", "levels/0.html", "progress/index.html", "review/index.html"}

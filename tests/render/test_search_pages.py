@@ -9,7 +9,9 @@ import pytest
 from coursebuild.model import Document
 from coursebuild.render.lesson import lesson_sheet, stub_sheet
 from coursebuild.render.library import Library
+from coursebuild.render.offline import offline_sheet
 from coursebuild.render.pages import home_sheet, level_sheet, model_sheet, not_found_sheet
+from coursebuild.render.reader import progress_sheet
 from coursebuild.render.search.drawn import drawn_sections
 from coursebuild.render.search.page import page_text, searched, terms
 from coursebuild.render.search.sheet import search_sheet
@@ -113,8 +115,9 @@ def test_a_quiz_gives_no_answer_away(make: Make) -> None:
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     made = make("Text.")
     library = Library.of(made.course, made.results, made.assets)
-    for sheet in (home_sheet(library), not_found_sheet(library), search_sheet(library)):
-        assert page_text(sheet, None, "<p>Text</p>") is None
+    left_out = (home_sheet, not_found_sheet, search_sheet, offline_sheet, progress_sheet)
+    for sheet in left_out:
+        assert page_text(sheet(library), None, "<p>Text</p>") is None, sheet
     stub = page_text(stub_sheet(library, library.lessons["1.2"]), None, "<p>Other</p>")
     assert stub == PageText("Later", "1.2", (Section("", "", 0, (Piece("text", "Comes later."),)),))
     level = page_text(level_sheet(library, made.course.levels[0]), None, "<p>Lessons</p>")
@@ -127,7 +130,7 @@ def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
 
 def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
     piece = Piece("text", "body body body body; inertia")
-    code = Piece("code", "body mj_step " + "x1 " * 12)
+    code = Piece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
     page = PageText("Body", "4.2", (Section("a", "Inertia", 2, (piece, code), ("frac",)),))
     lines = terms(page).decode().split("\n")
     assert lines == sorted(lines, key=lambda line: line[1:])
@@ -141,6 +144,9 @@ def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
         "mj": "0",
         "step": "0",
         "x1": "3",
+        "y1": "2",
+        "z1": "2",
+        "w1": "1",
     }
 
 

@@ -72,7 +72,7 @@ def pages(site: dict[str, bytes]) -> dict[str, str]:
     return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
 
 
-def test_the_files(site: dict[str, bytes]) -> None:
+def test_the_files_of_a_site(site: dict[str, bytes]) -> None:
     assert [path for path in site if not path.startswith("assets/")] == [
         "404.html",
         "about.html",

@@ -14,7 +14,7 @@ from coursebuild.render.strings import parse_strings
 ROOT = Path(__file__).parents[2]
 
 
-def test_values_plurals_and_fallback() -> None:
+def test_texts_have_values_plural_forms_and_a_language_to_fall_back_on() -> None:
     english = parse_strings(
         '[a]\nb = "B {x}"\nc = "C"\n[a.n]\none = "{n} thing"\nother = "{n} things"\n'
     )
@@ -40,7 +40,7 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
     assert words("code.copy") == "Copy"
 
 
-def test_every_word_that_is_asked_for_is_there_and_every_one_there_is_used(assets: Assets) -> None:
+def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Assets) -> None:
     """Keys that are put together at run time are named here by their beginning."""
     made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
     made += ("lab.live.", "measured.reference_", "numerics.case_")

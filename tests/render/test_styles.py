@@ -44,7 +44,7 @@ def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
         "<b title='<i style=\"padding: 0\">'>",
     ],
 )
-def test_what_only_looks_like_one_stays(html: str) -> None:
+def test_what_only_looks_like_a_style_stays(html: str) -> None:
     assert hoist(html) == (html, frozenset())
 
 

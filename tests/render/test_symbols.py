@@ -117,7 +117,7 @@ def test_latin_comes_first_then_greek_each_letter_with_its_kin(typeset: Typeset)
 
 
 @given(st.text())
-def test_whatever_it_is_nothing_is_raised(text: str) -> None:
+def test_any_text_can_be_looked_through_for_symbols(text: str) -> None:
     assert symbols(text) == () or text.startswith("<")
     symbols(f"<math><mi>{text}</mi></math>")
     sort_key(text)

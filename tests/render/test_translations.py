@@ -46,7 +46,7 @@ def places(text: str) -> set[str]:
     return {name for _, name, _, _ in string.Formatter().parse(text) if name}
 
 
-def test_the_languages() -> None:
+def test_every_translation_has_its_plural_forms_listed_here() -> None:
     assert {*LANGUAGES, "en"} == {*FORMS}
 
 
@@ -77,7 +77,7 @@ def test_a_text_has_the_forms_of_its_language(language: str) -> None:
 
 
 @pytest.mark.parametrize("language", [*LANGUAGES, "en"])
-def test_the_forms_are_those_that_numbers_take(language: str) -> None:
+def test_the_plural_forms_of_a_language_are_those_that_numbers_take(language: str) -> None:
     taken = {category(language, n) for n in (*range(200), 10**6)}
     assert taken == {*FORMS[language].split()}
 

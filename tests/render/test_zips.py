@@ -107,6 +107,7 @@ def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
         assert archive.testzip() is None
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     "load",
     ['model_path("box")', '(lambda name: model_path(name))("box")'],

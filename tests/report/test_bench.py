@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.measured.bench import SceneCard, WorkPrecisionRow
+from coursebuild.measured.bench import SceneCard, Verdict, WorkPrecisionRow
 from coursebuild.measured.departures import Checked, Departure
 from coursebuild.measured.points import seconds_text, setting_text
 from coursebuild.measured.records import Failure
@@ -76,6 +76,24 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
     assert re.sub(r"\x1b\[[\d;]*m", "", text) == bench_text([scene()], Style(width=80))
 
 
+@pytest.mark.parametrize(
+    ("on_front", "noticeable", "colour"),
+    [(True, False, "32"), (True, True, "1;33"), (False, False, "1;33"), (True, None, "32")],
+)
+def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
+    on_front: bool, noticeable: bool | None, colour: str
+) -> None:
+    verdict = Verdict(on_front, None, None, None, noticeable, "So it is.")
+    text = bench_text([scene(scenario([row()], verdict=verdict))], Style(colour=True, width=80))
+    assert f"\x1b[{colour}m    So it is." in text
+
+
+def test_how_far_errors_are_measured_is_told_where_it_is_not_the_whole_duration() -> None:
+    for horizon, told in ((2.0, "    2 s\n"), (1.5, "    2 s, errors to 1.5 s\n")):
+        one = scenario([row()], duration=2.0, horizon=horizon, hold=0.0)
+        assert told in bench_text([scene(one)], Style(width=80))
+
+
 def test_where_nothing_was_measured() -> None:
     text = bench_text([scene(scenario([])), replace(scene(), scenarios=())], Style(width=80))
     assert "    no setting was measured\n" in text
@@ -85,7 +103,7 @@ def test_where_nothing_was_measured() -> None:
     assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
 
 
-def test_everything_lost() -> None:
+def test_where_every_run_was_lost_the_reasons_are_told() -> None:
     text = bench_text([scene(scenario([lost(), lost("RK4")]))], Style(width=80))
     assert "Euler at 100 ms; RK4 at 100 ms: diverged; the state is not finite" in text
 
@@ -117,7 +135,7 @@ def test_numbers_that_people_read(seen: float, shown: str) -> None:
     assert re.search(rf" {re.escape(shown)}  1.00e-03 ", text)
 
 
-def test_words() -> None:
+def test_settings_and_seconds_in_words() -> None:
     newton = setting(solver="Newton", iterations=100, cone="elliptic")
     assert setting_text(newton) == "Euler at 2 ms, Newton, 100 iterations, elliptic cone"
     assert setting_text(replace(newton, iterations=5), newton) == "Euler at 2 ms, 5 iterations"
@@ -141,6 +159,8 @@ def test_a_table_keeps_what_has_room() -> None:
         "a     xxxxxxxxxxxxxxxxxxxxxxxxxxxxxx   1",
         "bb    y                               22",
     ]
+    assert table(columns, 40) == table(columns, 80)
+    assert table(columns, 39)[2] == "bb    y"
     assert table(columns, 20) == ["name   n", "a      1", "bb    22"]
     assert table(columns, 1) == ["name", "a", "bb"]
 

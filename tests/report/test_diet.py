@@ -63,7 +63,7 @@ def lines(report: DietReport, width: int = 100) -> list[str]:
     return diet_text([report], Style(width=width)).splitlines()
 
 
-def test_a_finding() -> None:
+def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
     assert lines(REPORT, 90) == [
         "arm",
         "  in go",
@@ -84,7 +84,7 @@ def test_a_finding() -> None:
     ]
 
 
-def test_what_is_told_of_savings() -> None:
+def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
     none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
     assert "    bit-identical; saves nothing that is measured" in lines(
         replace(REPORT, findings=(none,))
@@ -92,6 +92,27 @@ def test_what_is_told_of_savings() -> None:
     more = replace(FINDING, label=EQUAL, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
     text = "    equal within tolerance (3.0e-12); no time that can be told, 5 bytes of memory more"
     assert text in lines(replace(REPORT, findings=(more,)))
+
+
+def test_savings_of_several_findings_are_told_together() -> None:
+    """Those of what `--fix` does only where that is more than one of them, and not all."""
+    other = replace(FINDING, fixable=False)
+    for findings, all_told, fixed_told in (
+        ((FINDING,), False, False),
+        ((FINDING, other), True, False),
+        ((FINDING, FINDING), True, False),
+        ((FINDING, FINDING, other), True, True),
+    ):
+        told = "\n".join(lines(replace(REPORT, findings=findings)))
+        assert ("  without all of them: ×2.2" in told) is all_told, findings
+        assert ("  after --fix: ×2.2" in told) is fixed_told, findings
+
+
+def test_why_fix_leaves_something_is_told_of_findings_that_count() -> None:
+    left = replace(FINDING, fixable=False, unfixed="it stands in two files")
+    text = "    not for --fix: it stands in two files"
+    assert text in lines(replace(REPORT, findings=(left,)))
+    assert text not in lines(replace(REPORT, findings=(replace(left, setting=True),)))
 
 
 def test_what_is_kept_lost_or_kept_for_nothing() -> None:
@@ -112,7 +133,7 @@ def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     assert good.ok and "  nothing in it is in vain" in lines(good)
 
 
-def test_what_is_no_fault() -> None:
+def test_what_was_untouched_is_a_setting_or_has_a_reason_is_no_fault() -> None:
     for finding in (
         replace(FINDING, label=UNTOUCHED),
         replace(FINDING, setting=True),
@@ -152,7 +173,7 @@ def test_json_and_record_hold_everything() -> None:
     assert encode_diet(REPORT) == encode_diet(decode_diet(encode_diet(REPORT)))
 
 
-def test_nothing_at_all() -> None:
+def test_a_report_on_no_model() -> None:
     assert diet_report([], [], [], [], Style()) == "there is no model to look at\n"
     failed = diet_report([], [], [Failure("models/a.xml was changed in the meantime")], [], Style())
     assert failed == "error: models/a.xml was changed in the meantime\n"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import xml.etree.ElementTree as ElementTree
 
+from msgspec.structs import replace
+
 from coursebuild.diagnostics import Note, diagnose
 from coursebuild.report import LabLine, Report, ScriptLine, Style, Summary, render_report
 from coursebuild.source import Source
@@ -23,15 +25,16 @@ SCRIPTS = (
     ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
     ScriptLine("examples/b.py", "1.1", "timeout", 60.0, False),
     ScriptLine("examples/c.py", "1.1", "skipped", 0.0, False, ("torch",)),
+    ScriptLine("examples/d.py", "1.1", "norun", 0.0, False),
 )
 LABS = (
     LabLine("1.1-lab-1", "A & B", "1.1", "ok", 1.23456, 64206, 13, "bit-identical", True),
     LabLine("1.1-lab-2", "", "1.1", "failed", 0.5, None, 0, "", False),
 )
-REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 3, 2, 1, 1, 1, 0, 60.25), labs=LABS)
+REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 4, 2, 1, 1, 1, 0, 60.25), labs=LABS)
 
 
-def test_json() -> None:
+def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
     value = json.loads(render_report(REPORT, "json", Style()))
     assert list(value) == ["diagnostics", "scripts", "labs", "summary"]
     assert value["diagnostics"][1] == {
@@ -93,10 +96,12 @@ def test_junit_is_xml_and_counts() -> None:
     )
     assert suite is not None
     assert {key: suite.get(key) for key in ("tests", "failures", "skipped")} == {
-        "tests": "6",
+        "tests": "7",
         "failures": "3",
-        "skipped": "1",
+        "skipped": "2",
     }
+    why = [found.get("message") for found in suite.iter("skipped")]
+    assert why == ["needs torch", "not run"]
     assert suite.find("./testcase[@name='1.1-lab-2']/failure") is not None
     assert suite.find("./testcase[@name='1.1-lab-1']/failure") is None
     failure = suite.find("./testcase[@name='content/lessons/1.1-a,b.md']/failure")
@@ -105,7 +110,17 @@ def test_junit_is_xml_and_counts() -> None:
     assert "<&> here" in (failure.text or "")
 
 
-def test_sarif() -> None:
+def test_junit_has_no_character_that_xml_forbids() -> None:
+    odd = diagnose("math-syntax", SOURCE.span(0, 5), "a \x01 b \uffff c \U0001d465")
+    suite = ElementTree.fromstring(
+        render_report(replace(REPORT, diagnostics=(odd,)), "junit", Style())
+    )
+    failure = suite.find(".//testcase[@classname='course']/failure")
+    assert failure is not None
+    assert str(failure.get("message")).endswith(": a \ufffd b \ufffd c \U0001d465")
+
+
+def test_sarif_names_rule_region_and_related_places() -> None:
     run = json.loads(render_report(REPORT, "sarif", Style()))["runs"][0]
     result = run["results"][1]
     assert result["ruleId"] == "math-syntax"

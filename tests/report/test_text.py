@@ -81,6 +81,14 @@ def test_a_long_line_is_cut_around_the_marked_part() -> None:
     assert lines[3].endswith("y…")
 
 
+def test_a_line_that_just_fits_is_not_cut() -> None:
+    """Beside the number of the line there are 74 of 80 cells; these letters take two each."""
+    for line, cut in (("量" * 36 + "ab", ""), ("量" * 36 + "abc", "…")):
+        source, a, b = at(line, "量")
+        shown_line = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")[3]
+        assert shown_line.endswith(cut or line), line
+
+
 def test_a_file_without_text_has_no_frame() -> None:
     diagnostic = diagnose(
         "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"

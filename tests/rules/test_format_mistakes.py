@@ -22,7 +22,7 @@ from support.rule_cases import Layout, Workshop
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "mistakes"
 MARK = "‸"
 FILES = sorted(FIXTURES.glob("*.md"))
-TIERS = {"labs": pytest.mark.engine, "scripts": pytest.mark.site}
+TIERS = {"labs": pytest.mark.engine, "mjcf": pytest.mark.site, "scripts": pytest.mark.site}
 
 
 @dataclass(frozen=True, order=True)
@@ -192,6 +192,7 @@ model-error
 """
 
 
+@pytest.mark.site
 def test_everything_wrong_is_told_in_one_run_in_order(workshop: Workshop, tmp_path: Path) -> None:
     layout = Layout.of(TOGETHER)
     places = marked(layout)

@@ -6,14 +6,13 @@ import io
 import json
 import sys
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import sync_playwright
-
-from support.chromium import launch
+from playwright.sync_api import Browser
 
 ROOT = Path(__file__).resolve().parents[2]
 ICON = (ROOT / "templates" / "icon.svg").read_text(encoding="utf-8")
@@ -50,7 +49,7 @@ def pixels(data: bytes) -> np.ndarray:
 
 
 @pytest.mark.browser
-def test_they_are_what_a_browser_draws(icons: Any) -> None:
+def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Browser]) -> None:
     draw = """async ([svg, side]) => {
       const image = new Image()
       image.src = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }))
@@ -61,9 +60,8 @@ def test_they_are_what_a_browser_draws(icons: Any) -> None:
       return [...context.getImageData(0, 0, side, side).data]
     }"""
     shapes = icons.shapes(ICON)
-    with sync_playwright() as playwright:
-        browser = launch(playwright)
-        page = browser.new_page()
+    with browsers["plain"].new_context() as context:
+        page = context.new_page()
         for side in (64, 192):
             theirs = np.array(page.evaluate(draw, [ICON, side]), float).reshape(side, side, 4)
             ours = pixels(icons.drawn(shapes, icons.Picture("x", side))).astype(float)
@@ -71,10 +69,9 @@ def test_they_are_what_a_browser_draws(icons: Any) -> None:
             off = np.abs(theirs * theirs[..., 3:] - ours * ours[..., 3:]) / 255
             assert off.mean() < 1, side
             assert (off.max(axis=2) > 48).mean() < 0.002, side
-        browser.close()
 
 
-def test_where_a_system_cuts_there_is_ground(icons: Any) -> None:
+def test_icon_has_ground_where_a_system_cuts(icons: Any) -> None:
     shapes = icons.shapes(ICON)
     found = pixels(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
     assert (found[..., 3] == 255).all()
@@ -85,7 +82,7 @@ def test_where_a_system_cuts_there_is_ground(icons: Any) -> None:
     assert not (found[~cut][:, :3] == ground).all()
 
 
-def test_they_are_drawn_once_for_the_same_icon(
+def test_icons_are_drawn_once_for_the_same_icon(
     icons: Any, tmp_path: Path, monkeypatch: Any
 ) -> None:
     for name in ("old", "new", "again"):

@@ -16,6 +16,8 @@ import pytest
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.native import NativeEngine
 
+pytestmark = pytest.mark.engine
+
 STACK = "".join(
     f'<body pos="0 {0.01 * i} {0.11 + 0.22 * i}" euler="0 0 {20 * i}"><freejoint/>'
     '<geom type="box" size=".1 .1 .1"/></body>'

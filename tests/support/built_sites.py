@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from support.course_folders import course_files
 from support.scratch_course import ROOT, Folder, course_map
 from support.static_host import Host
 
@@ -75,10 +76,7 @@ class BuiltCourses:
 
     def of_case(self, name: str) -> Folder:
         """The course of a folder in tests/courses."""
-        origin = ROOT / "tests" / "courses" / name / "course"
-        paths = [path for path in sorted(origin.rglob("*")) if path.is_file()]
-        files = {path.relative_to(origin).as_posix(): path.read_bytes() for path in paths}
-        return self.of_files(name, files)
+        return self.of_files(name, course_files(name))
 
     def real(self) -> Folder:
         """The course of this repository: where `make site` has been run, nothing is to do."""

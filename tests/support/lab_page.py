@@ -10,7 +10,7 @@ from collections.abc import Callable
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-from playwright.sync_api import BrowserContext, Locator, Page, Request, Route
+from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, expect
 
 from support.chromium import SLOW
 
@@ -61,6 +61,23 @@ def until(page: Page, true: str, argument: object = None) -> None:
             return
         page.wait_for_timeout(25)
     raise AssertionError(f"never true: {true}")
+
+
+def becomes(page: Page, value: Callable[[], object], wanted: object) -> None:
+    """Wait until a value is what is wanted; the last one is told if it never is."""
+    for _ in range(SLOW // 25):
+        found = value()
+        if found == wanted:
+            return
+        page.wait_for_timeout(25)
+    assert found == wanted
+
+
+def settled(page: Page) -> None:
+    """Wait until the page's script has run, its fonts are there, and it has nothing left to do."""
+    expect(page.locator("[data-tools] select").first).to_be_attached()
+    until(page, "document.fonts.status === 'loaded'")
+    page.evaluate("() => new Promise((done) => requestIdleCallback(done))")
 
 
 def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:

@@ -10,6 +10,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from coursebuild.effects.server import PREFIX
@@ -58,6 +59,13 @@ class Preview:
             assert self.process.poll() is None, self.said
             time.sleep(0.02)
 
+    def stopped(self, status: int = 0) -> None:
+        """It comes to its end, by itself and in good order."""
+        assert self.process.wait(600) == status
+        self._reader.join(600)
+        assert self.said[-1] == "stopped"
+        assert "Traceback" not in "\n".join(self.said)
+
     def get(
         self, path: str, method: str = "GET", body: bytes = b"", **headers: str
     ) -> tuple[int, dict[str, str], bytes]:
@@ -90,6 +98,14 @@ class Preview:
                 assert head.startswith(b"HTTP/1.1 200 ")
                 assert b"text/event-stream" in head
                 yield Events(_events(stream))
+
+
+def wait_for(path: Path, size: int = 0) -> None:
+    """Wait until a file is there, and has so many bytes."""
+    until = time.monotonic() + 300
+    while not path.exists() or path.stat().st_size < size:
+        assert time.monotonic() < until, f"{path} does not come"
+        time.sleep(0.01)
 
 
 class Events:

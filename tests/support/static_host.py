@@ -46,8 +46,9 @@ class Host:
         self.base = base
         self.asked: list[str] = []
         """Paths that were asked for, with their queries."""
-        self.delay = 0.0
-        """Seconds before an answer."""
+        self.answering = threading.Event()
+        """While it is not set, whoever asks waits."""
+        self.answering.set()
         self.fonts_delay = 0.0
         """Seconds before a font, which on this machine alone comes before anything is drawn."""
         self._packed: dict[tuple[str, bytes], bytes] = {}
@@ -66,7 +67,7 @@ class Host:
         threading.Thread(target=self._server.serve_forever, args=(0.02,), daemon=True).start()
 
     def stop(self) -> None:
-        """Be away: connections are refused, and those that are open end."""
+        """Connections are refused from now on, and those that are open end."""
         server, self._server = self._server, None
         if server is not None:
             server.shutdown()
@@ -74,11 +75,15 @@ class Host:
 
     @contextlib.contextmanager
     def away(self) -> Iterator[None]:
+        """Stopped for a while; nobody else gets the port meanwhile."""
         self.stop()
-        try:
-            yield
-        finally:
-            self.start()
+        with socket.socket() as reserved:
+            reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            reserved.bind(("127.0.0.1", self._port))
+            try:
+                yield
+            finally:
+                self.start()
 
     def since(self) -> list[str]:
         """What was asked for since this was asked the last time."""
@@ -110,6 +115,8 @@ class Host:
 class _Server(http.server.ThreadingHTTPServer):
     daemon_threads = True
     allow_reuse_address = True
+    request_queue_size = 128
+    """A page asks for many files at once; one that finds no room in the queue waits a second."""
 
     def __init__(self, *arguments: Any) -> None:
         self.open: set[socket.socket] = set()
@@ -146,7 +153,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         host = self.host
         host.asked.append(self.path.removeprefix(host.base))
         status, path = host.file(self.path)
-        time.sleep(host.delay + (host.fonts_delay if path.suffix == ".woff2" else 0.0))
+        host.answering.wait()
+        time.sleep(host.fonts_delay if path.suffix == ".woff2" else 0.0)
         data = path.read_bytes() if path.is_file() else b""
         tag = f'"{hashlib.sha256(data).hexdigest()[:16]}"'
         lasting = _LASTING.fullmatch(urlsplit(self.path).path)

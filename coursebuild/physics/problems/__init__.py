@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from coursebuild.physics.measure import errors
+from coursebuild.physics.measure import errors, known
 from coursebuild.physics.problem import Problem
 from coursebuild.physics.problems import (
     chains,
@@ -72,6 +72,7 @@ def agreement(problem: Problem) -> float | None:
     if problem.reference is None or problem.second is None:
         return None
     times = problem.scenario.times
-    found = errors(problem.reference.motion(times), problem.second.motion(times))
+    exact = known(problem.reference, tuple(times.tolist()))
+    found = errors(exact, problem.second.motion(times))
     parts = (found.position, found.attitude, found.velocity)
     return max(part.largest for part in parts if part is not None)

@@ -15,13 +15,13 @@ from __future__ import annotations
 import decimal
 import math
 from decimal import Decimal
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from coursebuild.physics.engine import advance, begun, compiled, simulate
 from coursebuild.physics.extrapolation import State, integrate
+from coursebuild.physics.measure import known
 from coursebuild.physics.problem import (
     Array,
     Figure,
@@ -74,6 +74,11 @@ def exact(times: Array) -> Motion:
         zero = Decimal(0)
         states = integrate(rate, _begin(zero, zero), times, 1e-28, columns=12)
         return _motion(times, states[:, 0], states[:, 1], states[:, 6], states[:, 7])
+
+
+REFERENCE = Reference(
+    "ode", "Lagrange's equations, Bulirsch–Stoer with 40 digits", exact, floor=1e-13
+)
 
 
 def hamiltonian(times: Array) -> Motion:
@@ -129,16 +134,12 @@ def _motion(times: Array, first: State, second: State, w1: State, w2: State) -> 
     return motion_without_attitude(times, place, speed)
 
 
-@cache
-def _known() -> Motion:
-    return exact(problem().scenario.times)
-
-
 def horizon(integrator: Integrator, timestep: float = 1e-3) -> float:
     """When the error of the angles first passes 0.1 rad, s."""
     one = problem()
     run = simulate(one, integrator, timestep)
-    error = np.linalg.norm(run.qpos - _known().position, axis=1)
+    truth = known(REFERENCE, tuple(run.times.tolist()))
+    error = np.linalg.norm(run.qpos - truth.position, axis=1)
     beyond = np.flatnonzero(~(error < _HORIZON_ERROR))
     return float(run.times[beyond[0]]) if len(beyond) else math.inf
 
@@ -176,9 +177,7 @@ def problem() -> Problem:
         scenario=Scenario(DURATION, 0.05, START),
         position_bound=1e3,
         velocity_bound=1e2,
-        reference=Reference(
-            "ode", "Lagrange's equations, Bulirsch–Stoer with 40 digits", exact, floor=1e-13
-        ),
+        reference=REFERENCE,
         second=Reference(
             "ode", "Hamilton's equations, Bulirsch–Stoer with 45 digits", hamiltonian, floor=1e-13
         ),

@@ -56,7 +56,6 @@ class SearchDialog {
     document.body.append(this.dialog)
     this.closing.addEventListener('click', () => this.close())
     this.dialog.addEventListener('click', (event) => event.target === this.dialog && this.close())
-    this.dialog.addEventListener('close', () => clearTimeout(this.timer))
     this.input.addEventListener('input', () => this.later())
     this.input.addEventListener('keydown', (event) => this.key(event))
     this.list.addEventListener('click', (event) => this.clicked(event))
@@ -65,6 +64,7 @@ class SearchDialog {
 
   async open() {
     if (this.dialog.open) return this.input.select()
+    clearTimeout(this.timer) // of a key before it was closed; the event `close` would come after the next key
     this.dialog.showModal()
     this.input.focus()
     this.input.select()

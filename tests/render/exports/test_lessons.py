@@ -163,7 +163,7 @@ def test_pages_without_a_document_as_markdown(files: dict[str, bytes]) -> None:
     assert "not written yet" in files["lessons/1.2-later.md"].decode()
 
 
-def test_llms_txt(files: dict[str, bytes]) -> None:
+def test_llms_txt_lists_what_is_written(files: dict[str, bytes]) -> None:
     text = files["llms.txt"].decode()
     assert text.startswith('# Bodies & \\<axes>\n\n> A "short" course.\n\n')
     assert (
@@ -214,7 +214,7 @@ def test_ids_of_cells_stay_where_others_are_edited(make: Make, files: dict[str, 
     assert [id for id in after if id != "text-new-1"] == before
 
 
-def test_ids_are_valid_whatever_the_headings(make: Make) -> None:
+def test_ids_of_cells_differ_whatever_the_headings(make: Make) -> None:
     text = "## 重力\n\na\n\n## " + "x" * 200 + "\n\nb\n\n## 重力\n\nc\n\n## !\n\nd\n"
     ids = [cell["id"] for cell in cells(site(make, text)["lessons/0.1-falling.ipynb"])]
     assert len(set(ids)) == len(ids) == 5
@@ -268,7 +268,7 @@ def test_a_longer_course_is_a_page_for_each_level(make: Make) -> None:
     assert check_links(sound, "https://example.org/course/") == ()
 
 
-def test_a_course_without_lessons_gives_none_away(make: Make) -> None:
+def test_a_course_without_written_lessons_has_no_book_and_no_notebook(make: Make) -> None:
     made = make("Text.")
     levels = tuple(
         replace(level, lessons=tuple(replace(x, document=None) for x in level.lessons))
@@ -295,6 +295,6 @@ HREFS = st.lists(st.sampled_from((*STEPS, ".html", "#", "#c", "#%20", "?q", "//"
 
 
 @given(st.sampled_from(("a.html", "lessons/1.1-a.html", "a b/c.html")), HREFS.map("".join))
-def test_an_address_as_most_are_is_taken_to_the_twin_as_any(path: str, href: str) -> None:
+def test_addresses_lead_to_the_markdown_of_their_page(path: str, href: str) -> None:
     place = Place(path)
     assert twin.twin_href(place, href) == twin._any_twin_href(place, href)

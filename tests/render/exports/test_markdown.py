@@ -113,7 +113,7 @@ class Elsewhere(Context):
 
 @settings(max_examples=120, deadline=None)
 @given(st.lists(PIECES, max_size=16).map("".join))
-def test_what_contexts_share_changes_nothing(text: str) -> None:
+def test_sharing_blocks_between_contexts_changes_nothing(text: str) -> None:
     blocks = read(text).blocks
     same: Same = {}
     for context in (Context(), Elsewhere(), Context()):
@@ -150,7 +150,7 @@ def plainly(markdown: str) -> str:
         ("&lt;b&gt; &amp;amp; \\*\n", "\\<b> \\&amp; \\*\n"),
     ],
 )
-def test_how_it_is_written(markdown: str, expected: str) -> None:
+def test_the_markdown_of_constructs(markdown: str, expected: str) -> None:
     assert written(markdown) == expected
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.render.exports.notebook_file import Json, written
@@ -15,6 +15,7 @@ VALUES: st.SearchStrategy[Json] = st.recursive(
 )
 
 
+@settings(max_examples=50)
 @given(VALUES)
 def test_json_is_as_the_standard_library_writes_it(value: Json) -> None:
     text = json.dumps(value, ensure_ascii=False, indent=1, sort_keys=True)

@@ -224,7 +224,7 @@ def test_what_looks_like_a_tag_is_text() -> None:
         ("<math><mi>x</mi></math>", '<math xmlns="http://www.w3.org/1998/Math/MathML"><mi>x</mi></math>'),
     ],
 )  # fmt: skip
-def test_as_xml(html: str, expected: str) -> None:
+def test_html_written_as_xml(html: str, expected: str) -> None:
     assert xml(html) == expected
 
 
@@ -244,7 +244,7 @@ def test_as_xml(html: str, expected: str) -> None:
         ("a &amp; b &nbsp;", "a &amp; b &nbsp;"),
     ],
 )  # fmt: skip
-def test_among_other_lessons(html: str, expected: str) -> None:
+def test_ids_links_and_headings_among_other_lessons(html: str, expected: str) -> None:
     assert moved(html) == expected
 
 
@@ -286,7 +286,7 @@ def test_a_link_that_leads_nowhere_is_text() -> None:
         ("http://[x", (None, "")),
     ],
 )
-def test_site_paths(url: str, expected: tuple[str | None, str]) -> None:
+def test_the_site_path_of_an_address(url: str, expected: tuple[str | None, str]) -> None:
     assert site_path(PAGE, url) == expected
 
 

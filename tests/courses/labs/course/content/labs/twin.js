@@ -1,0 +1,1 @@
+../../../../../../content/labs/twin.js
