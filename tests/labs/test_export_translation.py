@@ -267,6 +267,7 @@ LISTED = """
 """
 
 
+@pytest.mark.engine
 def test_every_array_that_both_bindings_give_has_a_name(tmp_path: Path) -> None:
     bench, xml = Bench(tmp_path), RICH.read_text()
     lab = make_lab(xml=xml, setup=LISTED, readouts=[{"label": "all", "expr": "ctx.found"}])

@@ -193,7 +193,7 @@ def test_the_real_course() -> None:
     assert told(text) == []
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.data())
 def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))

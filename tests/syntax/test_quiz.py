@@ -215,7 +215,7 @@ def test_in_a_lesson() -> None:
 # ------------------------------------------------------------------------------------- properties
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(st.data())
 def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
@@ -245,7 +245,7 @@ FIELDS = st.sampled_from(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(
     st.sampled_from(["mcq", "predict", "numeric", "open", "output", "order"]),
     st.dictionaries(FIELDS, VALUES, max_size=8),

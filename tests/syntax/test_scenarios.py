@@ -201,7 +201,7 @@ def test_line_ends_of_windows() -> None:
     assert parsed.value.scenarios[0].place("hold").text == "0.5"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.text(alphabet='[]{}"=.,#\nabcdefghijklmnopqrstuvwxyz0123456789- é', max_size=80))
 def test_no_text_makes_it_raise(text: str) -> None:
     parse(text)
