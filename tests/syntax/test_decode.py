@@ -265,7 +265,7 @@ def accepted(text: str) -> Body | None:
 
 @settings(max_examples=200)
 @given(DOCUMENTS)
-def test_it_agrees_with_msgspec(value: object) -> None:
+def test_decoding_agrees_with_msgspec(value: object) -> None:
     text = json.dumps(value)
     decoding = read(text)
     expected = accepted(text)

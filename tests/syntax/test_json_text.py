@@ -150,7 +150,7 @@ def test_any_text_is_json_or_told_why_not(text: str) -> None:
 
 @settings(max_examples=100)
 @given(VALUES, st.data())
-def test_a_mutation_is_never_too_much(value: object, data: st.DataObject) -> None:
+def test_any_edit_of_a_good_text_is_read_or_told(value: object, data: st.DataObject) -> None:
     text = json.dumps(value, indent=1)
     at = data.draw(st.integers(0, len(text)))
     cut = data.draw(st.integers(0, 3))

@@ -217,7 +217,7 @@ def test_in_a_lesson() -> None:
 
 @settings(max_examples=150)
 @given(st.data())
-def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
     piece = data.draw(
         st.sampled_from([*'{}[],:"\\\n 0-1e', "null", "true", "kind", '"x":', "BAD", "“", "\x00"])
