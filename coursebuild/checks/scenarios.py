@@ -78,7 +78,7 @@ def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[D
     for name, length in given:
         if length is not None:
             count = round(length / step)
-            if count < 1 or abs(count * step - length) > 1e-9 * length:
+            if abs(count * step - length) > 1e-9 * length:
                 message = f"the model's timestep, {step:g} s, does not divide `{name}`"
                 message += f" ({length:g} s)"
                 help = f"a multiple near it is {max(count, 1) * step:.12g}"

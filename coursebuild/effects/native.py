@@ -14,20 +14,23 @@ from typing import Any
 from coursebuild.effects import native_worker
 from coursebuild.effects.child import JsonChild
 
-_TIMEOUT = 120.0
-"""Seconds for one model, or one run."""
-
 
 class NativeError(Exception):
     """Native MuJoCo did not do what it was asked; the text says why."""
 
 
 class NativeEngine(JsonChild):
-    """The child that runs MuJoCo."""
+    """The child that runs MuJoCo.
 
-    def __init__(self, root: Path) -> None:
-        super().__init__(native_worker.__file__, _TIMEOUT)
+    Args:
+        root: the course's folder.
+        seconds: what one model, or one run, may take.
+    """
+
+    def __init__(self, root: Path, seconds: float = 120.0) -> None:
+        super().__init__(native_worker.__file__, seconds)
         self._root = root.resolve()
+        self._limit = seconds
 
     def save(self, path: str, text: str) -> bytes:
         """A model as an MJB file, of a text that stands, or would stand, at a path of the course.
@@ -68,7 +71,7 @@ class NativeEngine(JsonChild):
         return self._told({"task": "script", "library": library, **request})
 
     def _told(self, request: dict[str, Any]) -> dict[str, Any]:
-        reply: dict[str, Any] | None = self.ask({**request, "limit": _TIMEOUT})
+        reply: dict[str, Any] | None = self.ask({**request, "limit": self._limit})
         if reply is None:
             raise NativeError(self.death())
         if reply["error"]:

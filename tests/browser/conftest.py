@@ -73,6 +73,18 @@ def site(reader: Folder) -> Iterator[str]:
         yield address
 
 
+@pytest.fixture(scope="session")
+def hosts(built_courses: BuiltCourses) -> Iterator[Mapping[str, Host]]:
+    """A course of what is hard to fit, and one in text from the right."""
+    found = {
+        name: Host(built_courses.of_case(name).root / "public", "/c/")
+        for name in ("nasty", "arabic")
+    }
+    yield found
+    for host in found.values():
+        host.stop()
+
+
 @pytest.fixture
 def calm(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
     """A window without a service worker, which would keep pages that a test changes."""

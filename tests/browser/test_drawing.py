@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
+from support.built_sites import BuiltCourses, lesson_files
 from support.folder_server import served
 from support.lab_page import lab, watched
-from support.scratch_course import Folder
 
 pytestmark = pytest.mark.browser
 
@@ -73,6 +73,8 @@ MODELS = {
 VIEWS = [(name, -22.0) for name in MODELS] + [("lit", 20.0), ("endless", 15.0)]
 """Models, and how steeply the camera looks at them; the last two from below."""
 MIRROR, DULL, ENDLESS = 2, 3, 4
+WINDOW: Any = {"width": 600, "height": 500}
+"""A small one, since pictures with shadows take long without a graphics processor."""
 
 
 def fence(model: str, elevation: float) -> str:
@@ -82,15 +84,12 @@ def fence(model: str, elevation: float) -> str:
     return f"```lab simlab\n{json.dumps(given)}\n```\n\n"
 
 
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[str]:
+@pytest.fixture(scope="session")
+def drawn(built_courses: BuiltCourses) -> Iterator[str]:
     """The address of a page with one lab for each view."""
-    folder = Folder(tmp_path_factory.mktemp("drawing") / "course")
-    folder.fill(["## First\n\n" + "".join(fence(*view) for view in VIEWS) + "Text.\n"], stores)
-    for name, text in MODELS.items():
-        folder.write(f"models/{name}.xml", text)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
+    lesson = "## First\n\n" + "".join(fence(*view) for view in VIEWS) + "Text.\n"
+    models = {f"models/{name}.xml": text for name, text in MODELS.items()}
+    folder = built_courses.of_files("drawing", {**lesson_files(lesson), **models})
     with served(folder.root / "public") as address:
         yield f"{address}lessons/1.1-one.html"
 
@@ -148,21 +147,24 @@ def ready(page: Page, number: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def shown(browsers: dict[str, Browser], drawn: str) -> Iterator[tuple[Page, list[str]]]:
+def shown(browsers: Mapping[str, Browser], drawn: str) -> Iterator[tuple[Page, list[str]]]:
     """The page, and what it says to the console."""
-    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+    with browsers["webgl"].new_context(viewport=WINDOW) as context:
         page, said = watched(context)
         page.goto(drawn)
         yield page, said
 
 
-@pytest.mark.parametrize("number", range(len(VIEWS)), ids=lambda i: f"{VIEWS[i][0]} {VIEWS[i][1]}")
-def test_the_recorded_picture_is_the_live_one(shown: tuple[Page, list[str]], number: int) -> None:
+def test_the_recorded_picture_is_the_live_one(shown: tuple[Page, list[str]]) -> None:
     """Up to the edges, which fall between other pixels."""
     page, said = shown
-    ready(page, number)
-    found = page.evaluate(COMPARE, number)
-    assert found["middle"] <= 2 and found["most"] <= 16, found
+    wrong = []
+    for number, view in enumerate(VIEWS):
+        ready(page, number)
+        found = page.evaluate(COMPARE, number)
+        if found["middle"] > 2 or found["most"] > 16:
+            wrong.append((view, found))
+    assert wrong == []
     assert said == []
 
 
@@ -175,12 +177,12 @@ def test_a_mirror_shows_what_stands_on_it(shown: tuple[Page, list[str]]) -> None
 
 
 def test_with_a_graphics_processor_there_are_shadows_too(
-    browsers: dict[str, Browser], drawn: str, shown: tuple[Page, list[str]]
+    browsers: Mapping[str, Browser], drawn: str, shown: tuple[Page, list[str]]
 ) -> None:
     """By way of a browser that says it had one: mirrors, and maps for all kinds of lights."""
     ready(shown[0], ENDLESS)
     without = np.array(shown[0].evaluate(GREENS, ENDLESS))
-    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+    with browsers["webgl"].new_context(viewport=WINDOW) as context:
         context.add_init_script(
             "const { prototype } = WebGL2RenderingContext, { getParameter } = prototype\n"
             "prototype.getParameter = function (name) {\n"

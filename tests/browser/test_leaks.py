@@ -11,7 +11,7 @@ from playwright.sync_api import BrowserContext, CDPSession, Page, Route
 from support.lab_course import PAGE
 from support.lab_page import SWING, served, watched
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 # Put before the worker's script: whoever asks the worker is shown the engine's memory. A large
 # block is put behind all that is in use, so that its address rises with what was not given back.
@@ -58,6 +58,12 @@ COME_AND_GO = """async (times) => {
 }"""
 
 
+DRAW = """(n) => new Promise((done) => {
+  const next = () => (n-- > 0 ? requestAnimationFrame(next) : done())
+  next()
+})"""
+
+
 @dataclass(frozen=True, slots=True)
 class Kept:
     """What there is; least values, for a browser frees some things late."""
@@ -75,7 +81,7 @@ def kept(page: Page, session: CDPSession) -> Kept:
     found = []
     for _ in range(8):
         session.send("HeapProfiler.collectGarbage")
-        page.wait_for_timeout(150)
+        page.evaluate(DRAW, 10)
         metrics = session.send("Performance.getMetrics")["metrics"]
         values = {metric["name"]: int(metric["value"]) for metric in metrics}
         memory, end = worker.evaluate("() => self.engineMemory()")

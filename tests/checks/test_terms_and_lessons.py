@@ -14,6 +14,11 @@ def document_of(course: Course, number: int) -> Document:
     return course.documents[number]
 
 
+def test_a_term_that_two_lessons_define_at_the_same_place_is_told() -> None:
+    text = "The [mass]{term}.\n"
+    assert told(check_course(make_course(text, text))) == ["term-repeated: [mass]{term}"]
+
+
 def test_a_term_that_two_lessons_define_is_told_at_the_second() -> None:
     (found,) = check_course(make_course("The [mass]{term}.\n", "Text: [mass]{term}.\n"))
     assert (found.rule, found.span.path, found.span.column) == (

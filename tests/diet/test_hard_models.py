@@ -15,6 +15,8 @@ from coursebuild.physics.diet.model_text import ModelTextError
 from coursebuild.physics.diet.survey import Survey
 from support.surveys import PATH, fixed, found, names, opened, tried
 
+pytestmark = pytest.mark.site
+
 
 def motion(model: mujoco.MjModel, joints: list[str], steps: int = 150) -> bytes:
     """Positions and velocities of joints that have names, from every keyframe, bit for bit."""

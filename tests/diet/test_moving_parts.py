@@ -150,6 +150,7 @@ def rubble(count: int, *, extra: str = "") -> str:
     return scene(f"{floor}\n    {arm}\n    {pieces}\n    {extra}", rest=rest)
 
 
+@pytest.mark.site
 def test_a_scene_with_far_bodies_and_unread_sensors_becomes_a_tenth() -> None:
     """What a step costs goes with degrees of freedom, contacts and sensors: each by ten or more."""
     model, survey = tried(rubble(40), quick=False)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from coursebuild.effects.lab_files import engine_digest
 from coursebuild.effects.v8_library import StoppedError
 from coursebuild.effects.versions import engine_version
 from support.lab_values import BALL, Bench, make_lab, request
+from support.runners import wait_until
 
 pytestmark = pytest.mark.engine
 
@@ -36,10 +36,18 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         yield bench
 
 
-@pytest.fixture
-def hasty(tmp_path: Path) -> Iterator[Bench]:
-    """Both engines, of which the browser's soon ends what never returns."""
-    bench = Bench(tmp_path, LabEngine(margin=0.3))
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """Both engines, for tests whose last trial is a good one."""
+    bench = Bench(tmp_path_factory.mktemp("shared"))
+    with bench.browser, bench.native:
+        yield bench
+
+
+@pytest.fixture(scope="module")
+def hasty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """The same, of which the browser's soon ends what never returns."""
+    bench = Bench(tmp_path_factory.mktemp("hasty"), LabEngine(margin=0.3))
     with bench.browser, bench.native:
         yield bench
 
@@ -87,18 +95,16 @@ def test_it_is_started_when_it_is_needed_and_kept(bench: Bench) -> None:
 def test_an_endless_loop_is_told_at_its_entry_and_the_next_lab_is_tried(
     hasty: Bench, fields: dict[str, Any], entry: tuple[Any, ...]
 ) -> None:
-    began = time.monotonic()
     reply = hasty.trial(make_lab(**fields), wall=2.7)
     assert told(reply) == [(entry, "timeout", "ran for more than 3 s")]
     assert (reply["main"], reply["version"]) == (None, engine_version())
-    assert time.monotonic() - began < 300
     assert told(hasty.trial(make_lab())) == []
 
 
-def test_a_model_that_is_too_slow_ends_by_itself(bench: Bench) -> None:
-    reply = bench.trial(make_lab(verify={"seconds": 100_000}), wall=0.3)
+def test_a_model_that_is_too_slow_ends_by_itself(shared: Bench) -> None:
+    reply = shared.trial(make_lab(verify={"seconds": 100_000}), wall=0.3)
     assert told(reply) == [((), "timeout", "did not finish in time")]
-    assert bench.browser._isolate is not None, "which needs no new engine"
+    assert shared.browser._isolate is not None, "which needs no new engine"
 
 
 def test_memory_that_runs_out_takes_no_other_lab_along(
@@ -125,11 +131,11 @@ def test_memory_that_runs_out_takes_no_other_lab_along(
         "model.delete()",
     ],
 )
-def test_what_lab_code_may_do_to_the_engine(bench: Bench, code: str) -> None:
-    reply = bench.trial(make_lab(setup=code), wall=300.0)
+def test_what_lab_code_may_do_to_the_engine(shared: Bench, code: str) -> None:
+    reply = shared.trial(make_lab(setup=code), wall=300.0)
     assert reply["main"] is None
     assert {kind for _, kind, _ in told_kinds(reply)} <= {"throws", "engine"}
-    assert told(bench.trial(make_lab())) == []
+    assert told(shared.trial(make_lab())) == []
 
 
 def told_kinds(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
@@ -151,8 +157,8 @@ def told_kinds(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
         ("globalThis.trial = null", "`trial`"),
     ],
 )
-def test_code_that_changes_what_all_share(bench: Bench, code: str, names: str | None) -> None:
-    first = bench.trial(make_lab(setup=code))
+def test_code_that_changes_what_all_share(shared: Bench, code: str, names: str | None) -> None:
+    first = shared.trial(make_lab(setup=code))
     ((entry, kind, message),) = told(first)
     assert (entry, kind) == (("setup",), "shared")
     assert names is None or message == names
@@ -160,28 +166,28 @@ def test_code_that_changes_what_all_share(bench: Bench, code: str, names: str | 
         setup="data.qvel.set([1], 0)",
         readouts=[{"label": "r", "expr": "`${typeof count} ${data.qvel[0]}`"}],
     )
-    reply = bench.trial(ordinary)
+    reply = shared.trial(ordinary)
     assert told(reply) == []
     assert reply["main"]["pictures"][0]["readouts"] == ["undefined 1"]
 
 
-def test_a_lab_that_keeps_to_itself_keeps_the_engine(bench: Bench) -> None:
+def test_a_lab_that_keeps_to_itself_keeps_the_engine(shared: Bench) -> None:
     lab = make_lab(
         setup="ctx.list = [3, 1].sort(); ctx.big = new mj.DoubleBuffer(1 << 22); ctx.big.delete()",
         readouts=[{"label": "r", "expr": "`${/a(b)/.test('ab')} ${new Map([[1, 2]]).get(1)}`"}],
         overlays=["frames", "contacts"],
     )
-    assert told(bench.trial(lab)) == []
-    isolate = bench.browser._isolate
-    assert told(bench.trial(lab)) == []
+    assert told(shared.trial(lab)) == []
+    isolate = shared.browser._isolate
+    assert told(shared.trial(lab)) == []
     assert isolate is not None
-    assert bench.browser._isolate is isolate
+    assert shared.browser._isolate is isolate
 
 
-def test_a_model_that_the_engine_does_not_take(bench: Bench) -> None:
-    reply = bench.browser.trial(request(make_lab()), b"no model at all" * 100, 120.0)
+def test_a_model_that_the_engine_does_not_take(shared: Bench) -> None:
+    reply = shared.browser.trial(request(make_lab()), b"no model at all" * 100, 120.0)
     assert [kind for _, kind, _ in told(reply)] == ["engine"]
-    assert told(bench.trial(make_lab())) == []
+    assert told(shared.trial(make_lab())) == []
 
 
 def test_it_can_be_closed_and_used_again(bench: Bench) -> None:
@@ -196,10 +202,8 @@ def test_stopped_from_another_thread(bench: Bench) -> None:
     mjb = bench.native.save("models/x.xml", BALL)
     bench.browser.mistakes([])
     timer.start()
-    began = time.monotonic()
     with pytest.raises(StoppedError):
         bench.browser.trial(request(make_lab(setup=LOOP)), mjb, 600.0)
-    assert time.monotonic() - began < 300
     with pytest.raises(StoppedError):
         bench.browser.trial(request(make_lab()), mjb, 60.0)
     bench.browser.close()
@@ -209,6 +213,12 @@ def test_stopped_before_it_began(bench: Bench) -> None:
     bench.browser.stop()
     with pytest.raises(StoppedError):
         bench.browser.mistakes([])
+
+
+def computed(process: int) -> int:
+    """Hundredths of a second of processor time."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
 
 
 def test_an_interrupt_ends_a_trial_and_the_process() -> None:
@@ -236,18 +246,19 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
     with process:
         assert process.stdout is not None
         process.stdout.readline()
-        time.sleep(0.7)
+        before = computed(process.pid)
+        wait_until(lambda: computed(process.pid) > before + 30, "the trial's loop")
         os.kill(process.pid, signal.SIGINT)
-        said, errors = process.communicate(timeout=120)
+        said, errors = process.communicate()
     assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
 
 
-def test_nothing_of_one_trial_is_left_for_the_next(bench: Bench) -> None:
-    bench.trial(make_lab(setup="ctx.left = 1; model.opt.timestep = 0.01; data.qpos[0] = 9"))
+def test_nothing_of_one_trial_is_left_for_the_next(shared: Bench) -> None:
+    shared.trial(make_lab(setup="ctx.left = 1; model.opt.timestep = 0.01; data.qpos[0] = 9"))
     lab = make_lab(
         readouts=[{"label": "r", "expr": "`${ctx.left} ${model.opt.timestep} ${data.qpos[0]}`"}]
     )
-    reply = bench.trial(lab)
+    reply = shared.trial(lab)
     assert reply["main"]["pictures"][0]["readouts"] == ["undefined 0.002 0"]
 
 

@@ -13,6 +13,7 @@ import threading
 import time
 import tomllib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -278,7 +279,8 @@ class TestEnding:
         async def work() -> str | None:
             return context.evaluate("'here'", 20.0)
 
-        assert asyncio.run(work()) == "here"
+        with ThreadPoolExecutor(1) as apart:  # in this thread there may be a loop of Playwright's
+            assert apart.submit(asyncio.run, work()).result() == "here"
 
 
 class TestStoppedAtTheSeams:

@@ -16,6 +16,8 @@ from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
 from support.lab_values import make_lab
 
+pytestmark = pytest.mark.engine
+
 SPAN = make_lab().span
 
 

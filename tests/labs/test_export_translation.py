@@ -99,7 +99,7 @@ def translated(code: str, *, button: bool = False) -> str:
         ("data.xfrc_applied[6 * lib.bodyId('b')] = 1", None),
     ],
 )
-def test_statements(code: str, python: str | None) -> None:
+def test_statements_become_those_of_python(code: str, python: str | None) -> None:
     if python is None:
         python = 'data.xfrc_applied.flat[6 * model.body("b").id] = 1'
     assert translated(code) == python
@@ -186,7 +186,7 @@ ctx.n = typeof ctx.n
 async () => 1
 label: ctx.n = 1""".splitlines(),
 )
-def test_refusals(code: str) -> None:
+def test_code_without_a_counterpart_in_python_is_refused(code: str) -> None:
     with pytest.raises(UntranslatableError):
         statements(code, NAMES, Used())
 
@@ -222,7 +222,7 @@ def test_a_template_with_a_line_that_goes_on_is_refused() -> None:
         ),
     ],
 )
-def test_expressions(code: str, python: str) -> None:
+def test_expressions_become_those_of_python(code: str, python: str) -> None:
     assert expression(code, NAMES, Used()).text == python
 
 
@@ -267,6 +267,7 @@ LISTED = """
 """
 
 
+@pytest.mark.engine
 def test_every_array_that_both_bindings_give_has_a_name(tmp_path: Path) -> None:
     bench, xml = Bench(tmp_path), RICH.read_text()
     lab = make_lab(xml=xml, setup=LISTED, readouts=[{"label": "all", "expr": "ctx.found"}])

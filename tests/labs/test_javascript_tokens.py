@@ -26,6 +26,7 @@ def tokens(code: str) -> list[str]:
         ("'a\\'b' \"\\u0041\\x42\\u{43}\\n\"", ["string a'b", "string ABC"]),
         ("a\nb // c\n\n/* d */ e", ["name a", "↵name b", "↵name e"]),
         ("a /*\n*/ b\u2028c", ["name a", "↵name b", "↵name c"]),
+        ("a\nb c", ["name a", "↵name b", "name c"]),
         ("a\n`b` c", ["name a", "↵template `b`", "name c"]),
         ("", []),
     ],
@@ -41,6 +42,15 @@ def test_a_template_holds_its_texts_and_the_tokens_of_its_expressions() -> None:
     assert isinstance(inner, tuple) and isinstance(deeper, tuple)
     assert [one.text for one in inner] == ["b", "+", "{", "c", ":", "1", "}", ".", "c", ""]
     assert deeper[0].parts == ((Token("name", "e", False), Token("end", "", False)),)
+
+
+def test_templates_nest_21_deep() -> None:
+    def nested(count: int) -> str:
+        return "`${" * count + "1" + "}`" * count
+
+    assert tokens(nested(21)) == [f"template {nested(21)}"]
+    with pytest.raises(UntranslatableError, match="nested too deeply"):
+        tokenize(nested(22))
 
 
 def test_line_ends_in_a_template_are_line_feeds() -> None:
@@ -69,7 +79,6 @@ def test_line_ends_in_a_template_are_line_feeds() -> None:
         ("`a\\\nb`", "a template with a line that goes on"),
         ("`a", "a template with a line that goes on"),
         ("`${a", "code that ends too early"),
-        ("`${" * 22, "code that is nested too deeply"),
     ],
 )
 def test_what_is_not_known_is_refused(code: str, message: str) -> None:

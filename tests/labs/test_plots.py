@@ -138,7 +138,7 @@ def test_any_values(values: list[float | None], narrow: bool) -> None:
     st.one_of(st.none(), st.floats(0.1, 20)),
     st.text(max_size=20),
 )
-def test_anything(
+def test_any_samples_become_a_plot(
     values: list[float | None],
     ymin: float | None,
     ymax: float | None,

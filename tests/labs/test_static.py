@@ -19,6 +19,8 @@ from coursebuild.labs.scenery import scene_solids
 from coursebuild.labs.static import _shown, draw_picture, static_form
 from support.lab_values import Bench, make_lab
 
+pytestmark = pytest.mark.engine
+
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 EVERYTHING = """
 <mujoco>

@@ -46,6 +46,7 @@ def test_quaternion_to_four_ulp() -> None:
     assert hp.beyond(4, errors) == []
 
 
+@pytest.mark.site
 def test_angles_give_the_rotation_back_to_six_ulp() -> None:
     errors = {}
     turns = [*TURNS, *np.random.default_rng(11).uniform(-3.2, 3.2, size=(10, 3)).tolist()]

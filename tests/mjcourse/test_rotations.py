@@ -17,6 +17,7 @@ def orthonormality(mat: np.ndarray) -> float:
     return max(float(abs(p - i) / hp.ULP) for p, i in zip(product, IDENTITY, strict=True))
 
 
+@pytest.mark.site
 def test_matrix_of_a_quaternion() -> None:
     quats = [
         spatial.axis_angle_to_quat(axis, angle) * size
@@ -41,6 +42,7 @@ def test_matrices_that_doubles_hold_are_exact() -> None:
     assert spatial.quat_to_mat([1, 0, 0, 1])[2].tolist() == [0, 0, 1]
 
 
+@pytest.mark.site
 def test_quaternion_of_a_matrix_at_any_angle() -> None:
     errors = {}
     angles = (*hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 4.0, 1e-8, 1e-12)

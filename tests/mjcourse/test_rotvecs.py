@@ -57,6 +57,7 @@ def test_exp_of_nothing_and_of_turns() -> None:
     assert spatial.rotvec_to_quat([10, 0, 0])[0] > 0
 
 
+@pytest.mark.site
 def test_log_to_four_ulp_of_each_component() -> None:
     errors = {}
     angles = (1e-12, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0)

@@ -26,6 +26,7 @@ SMOOTH = [
 ]
 
 
+@pytest.mark.site
 def test_the_engines_accelerations_give_the_exact_motion() -> None:
     for name in SMOOTH:
         problem = problem_named(name)

@@ -21,6 +21,8 @@ from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
 from coursebuild.vocabulary import CLOSED_FORMS
 
+pytestmark = pytest.mark.site
+
 PENDULUM = """\
 <mujoco>
   <option timestep="0.002">{option}</option>

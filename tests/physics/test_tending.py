@@ -13,6 +13,8 @@ from coursebuild.physics.pilot import Bounded
 from coursebuild.physics.problem import Scenario
 from coursebuild.physics.tending import tends_to
 
+pytestmark = pytest.mark.site
+
 
 def arm(damping: float, more: str = "") -> Any:
     return mujoco.MjModel.from_xml_string(

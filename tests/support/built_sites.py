@@ -45,6 +45,12 @@ class Site:
             found[self.kind(path)] = path
         return found
 
+    def unlike_pages(self) -> list[str]:
+        """All pages; of those made of a template and a few words each, the largest."""
+        largest = self.kinds().values()
+        alike = ("stub", "level")
+        return [path for path in self.pages() if self.kind(path) not in alike or path in largest]
+
     def kind(self, path: str) -> str:
         match = _KIND.search((self.public / path).read_bytes())
         assert match is not None, path

@@ -10,6 +10,7 @@ from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.native import NativeEngine
 from coursebuild.labs.compile import compile_lab
 from coursebuild.model import Lab
+from coursebuild.pipeline.labs import Engines
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 
@@ -61,3 +62,22 @@ class Bench:
         run = reply["main"]["parity"]
         horizon = max(1, round(1.0 / reply["main"]["timestep"]))
         return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}
+
+
+class OpenEngines(Engines):
+    """Both engines of labs, which stay for the next course."""
+
+    def __exit__(self, *_: object) -> None:
+        """Leave them open."""
+
+    def close(self) -> None:
+        """End them."""
+        super().__exit__()
+
+    def but(
+        self, *, native: NativeEngine | None = None, browser: LabEngine | None = None
+    ) -> OpenEngines:
+        """The same engines, but for one."""
+        engines = OpenEngines.__new__(OpenEngines)
+        engines.native, engines.browser = native or self.native, browser or self.browser
+        return engines

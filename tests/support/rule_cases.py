@@ -32,12 +32,13 @@ from coursebuild.effects.runner import ScriptServer
 from coursebuild.effects.shared import shared_cache
 from coursebuild.effects.store import Store
 from coursebuild.pipeline.judge import judge
-from coursebuild.pipeline.labs import Engines, try_labs
+from coursebuild.pipeline.labs import try_labs
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import compile_models
 from support.fixture_cases import text_lines
+from support.lab_values import OpenEngines
 
 FIRST = "content/lessons/1.1-first.md"
 SECOND = "content/lessons/1.2-second.md"
@@ -197,26 +198,9 @@ class Workshop:
         assert loaded.course is not None
         options = self.options(root)
         models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
-        engines = self._engines if browser is None else self._engines.with_browser(browser)
+        engines = self._engines.but(browser=browser)
         # What labs did is not shared: it would not be tried by another engine.
         own = replace(options, cache=Store(root))
         _, found = try_labs(loaded.course, dict(models), own, engines, wrong=wrong)
         diagnostics = [*loaded.diagnostics, *wrong, *found]
         return judge(loaded.course, diagnostics, (), 0.0, lessons=2).diagnostics
-
-
-class OpenEngines(Engines):
-    """Both engines of labs, which stay for the next course."""
-
-    def __exit__(self, *_: object) -> None:
-        """Leave them open."""
-
-    def close(self) -> None:
-        """End them."""
-        super().__exit__()
-
-    def with_browser(self, browser: LabEngine) -> Engines:
-        """The same native engine, beside another one."""
-        engines = OpenEngines.__new__(OpenEngines)
-        engines.native, engines.browser = self.native, browser
-        return engines

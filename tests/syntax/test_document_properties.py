@@ -115,7 +115,7 @@ def parsed(text: str, lesson: bool = True) -> Parsed[Document]:
     return parse_document(Source("x.md", text), KINDS, lesson=lesson)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150)
 @given(markdown(), st.booleans())
 def test_parsing_and_rendering_never_raise(text: str, lesson: bool) -> None:
     result = parsed(text, lesson)
@@ -126,14 +126,14 @@ def test_parsing_and_rendering_never_raise(text: str, lesson: bool) -> None:
         assert diagnostic.span.line >= 1 and diagnostic.severity is not None
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.binary(max_size=200))
 def test_decoded_bytes_never_raise(data: bytes) -> None:
     parsed(data.decode("utf-8", "replace"))
     parsed(data.decode("latin-1"))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150)
 @given(markdown())
 def test_spans_nest_and_follow_each_other(text: str) -> None:
     document = parsed(text).value
@@ -149,7 +149,7 @@ def test_spans_nest_and_follow_each_other(text: str) -> None:
     siblings(document.blocks)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150)
 @given(markdown())
 def test_spans_slice_back_to_their_text(text: str) -> None:
     document = parsed(text).value
@@ -163,7 +163,7 @@ def test_spans_slice_back_to_their_text(text: str) -> None:
                 slices_back(inline)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100)
 @given(markdown())
 def test_recorded_bodies_are_whole_lines(text: str) -> None:
     for block in own_blocks(parsed(text).value):

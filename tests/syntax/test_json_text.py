@@ -134,7 +134,7 @@ def is_json(text: str) -> bool:
     return True
 
 
-@settings(max_examples=500)
+@settings(max_examples=200)
 @given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20))
 @example('{"a":1}{')
 @example("[1]]")
@@ -148,9 +148,9 @@ def test_any_text_is_json_or_told_why_not(text: str) -> None:
     assert syntax or parsed.value is not None
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(VALUES, st.data())
-def test_a_mutation_is_never_too_much(value: object, data: st.DataObject) -> None:
+def test_any_edit_of_a_good_text_is_read_or_told(value: object, data: st.DataObject) -> None:
     text = json.dumps(value, indent=1)
     at = data.draw(st.integers(0, len(text)))
     cut = data.draw(st.integers(0, 3))

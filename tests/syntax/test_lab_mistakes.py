@@ -200,3 +200,8 @@ def test_a_wrong_control_hides_nothing_else() -> None:
         "8:22-23 field-value: `traces` is empty",
         "8:36-37 field-value: `window` must be greater than 0, not 0",
     ]
+
+
+def test_a_step_as_long_as_its_range_and_a_claim_of_one_value_are_good() -> None:
+    assert told(SLIDER % '"step": 2, "set": "x"') == []
+    assert told(CLAIM % '"t": 1, "expr": "1", "min": 1, "max": 1') == []

@@ -215,9 +215,9 @@ def test_in_a_lesson() -> None:
 # ------------------------------------------------------------------------------------- properties
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(st.data())
-def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
     piece = data.draw(
         st.sampled_from([*'{}[],:"\\\n 0-1e', "null", "true", "kind", '"x":', "BAD", "“", "\x00"])
@@ -245,7 +245,7 @@ FIELDS = st.sampled_from(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(
     st.sampled_from(["mcq", "predict", "numeric", "open", "output", "order"]),
     st.dictionaries(FIELDS, VALUES, max_size=8),

@@ -181,7 +181,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("text", "expected"), MISTAKES, ids=[text for text, _ in MISTAKES])
-def test_mistakes(text: str, expected: list[str]) -> None:
+def test_each_mistake_in_scenarios_is_told_at_its_place(text: str, expected: list[str]) -> None:
     found = told(text)
     assert [one[: len(start)] for one, start in zip(found, expected, strict=True)] == expected
     assert parse(text).value is None
@@ -201,8 +201,8 @@ def test_line_ends_of_windows() -> None:
     assert parsed.value.scenarios[0].place("hold").text == "0.5"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.text(alphabet='[]{}"=.,#\nabcdefghijklmnopqrstuvwxyz0123456789- é', max_size=80))
-def test_no_text_makes_it_raise(text: str) -> None:
+def test_no_text_makes_reading_scenarios_raise(text: str) -> None:
     parse(text)
     parse(COMPLETE + text)

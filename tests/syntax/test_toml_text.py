@@ -297,7 +297,7 @@ PIECES = st.sampled_from(
 )
 
 
-@settings(max_examples=600)
+@settings(max_examples=200)
 @given(st.lists(PIECES, max_size=14).map("".join) | st.text(max_size=20))
 @example("a=[]\na.b=1\n")
 @example("[a.b.c]\n[a]\nb.x=1\n")
@@ -318,9 +318,9 @@ def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
         assert diagnostic.message == diagnostic.message.strip(" .")
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.data())
-def test_a_mutation_is_never_too_much(data: st.DataObject) -> None:
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(ALL)))
     mutated = ALL[:at] + data.draw(PIECES) + ALL[at + data.draw(st.integers(0, 3)) :]
     parsed = parse_toml(Source("x.toml", mutated))

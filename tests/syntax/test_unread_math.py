@@ -24,7 +24,7 @@ from coursebuild.syntax.unread_math import unread_formula
         ("", None),
     ],
 )
-def test_one_text(text: str, at: int | None) -> None:
+def test_formulas_that_were_meant_are_found_and_money_is_not(text: str, at: int | None) -> None:
     assert unread_formula([(0, text)]) == at
 
 

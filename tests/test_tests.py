@@ -1,0 +1,194 @@
+"""Rules for tests: they wait for what happens, not for time, and patch no private name.
+
+A page moves on by itself after whatever is done to it. So what a test looks at after that is an
+expectation that is tried until it holds (`expect(...)`, `until`, `becomes`), never an assertion
+that looks once.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+ACTIONS = frozenset(
+    "blur check clear click dblclick dispatch_event drag_to emulate_media fill focus go_back "
+    "go_forward goto hover press reload select_option set_checked set_input_files "
+    "set_viewport_size tap type uncheck".split()
+)
+READINGS = frozenset(
+    "all all_inner_texts all_text_contents bounding_box count evaluate evaluate_all get_attribute "
+    "inner_html inner_text input_value is_checked is_disabled is_enabled is_hidden is_visible "
+    "text_content".split()
+)
+WAITS = frozenset(
+    "becomes comes expect until wait_for wait_for_event wait_for_load_state wait_for_url".split()
+)
+Rule = Callable[[], Iterator[tuple[str, int]]]
+
+
+@cache
+def trees(containing: str) -> dict[str, ast.Module]:
+    """The tests' modules in which a pattern is found, by path."""
+    found = {}
+    for path in sorted(HERE.rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        if re.search(containing, text) and path != Path(__file__):
+            found[path.relative_to(HERE).as_posix()] = ast.parse(text)
+    return found
+
+
+def called_name(node: ast.Call) -> str:
+    named = node.func
+    return named.attr if isinstance(named, ast.Attribute) else getattr(named, "id", "")
+
+
+def calls(node: ast.AST) -> Iterator[str]:
+    """The names of what is called, but not in a function that is only handed on."""
+    if isinstance(node, ast.Call):
+        yield called_name(node)
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.Lambda | ast.FunctionDef):
+            yield from calls(child)
+
+
+def functions(tree: ast.Module) -> list[ast.FunctionDef]:
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+
+
+def assertions_that_look_once() -> Iterator[tuple[str, int]]:
+    pages = trees("playwright.sync_api")
+    called = {path: helper_calls(tree) for path, tree in pages.items()}
+    shared = {}
+    for path, helpers in called.items():
+        shared |= helpers if path.startswith("support/") else {}
+    for path, tree in pages.items():
+        helpers = shared | called[path]
+        waits = with_helpers(WAITS, helpers)
+        acts = with_helpers(ACTIONS, helpers) - waits
+        for function in functions(tree):
+            yield from ((path, line) for line in looks_once(function, waits, acts))
+
+
+def helper_calls(tree: ast.Module) -> dict[str, set[str]]:
+    """What the functions of a module call that are no tests."""
+    return {
+        function.name: {name for line in function.body for name in calls(line)}
+        for function in functions(tree)
+        if not function.name.startswith("test_")
+    }
+
+
+def with_helpers(names: frozenset[str], helpers: dict[str, set[str]]) -> frozenset[str]:
+    """Names, and those of the functions that call one of them, or call such a function."""
+    while more := {name for name, called in helpers.items() if called & names} - names:
+        names |= more
+    return names
+
+
+def looks_once(
+    function: ast.FunctionDef, waits: frozenset[str], acts: frozenset[str]
+) -> Iterator[int]:
+    """The lines of assertions that look at a page once after something was done to it."""
+    moved = False
+    for node in statements(function.body):
+        called = set(calls(node))
+        if called & waits:
+            moved = False
+        elif isinstance(node, ast.Assert) and moved and called & READINGS:
+            yield node.lineno
+        elif called & acts:
+            moved = True
+
+
+def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Simple statements in their order; those of inner functions are theirs."""
+    for node in body:
+        blocks = [getattr(node, name, []) for name in ("body", "orelse", "finalbody")]
+        if not any(blocks):
+            yield node
+        elif not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            for block in blocks:
+                yield from statements(block)
+
+
+def waits_for_time() -> Iterator[tuple[str, int]]:
+    """Calls of `sleep` and `wait_for_timeout`, but in a loop, which looks for something.
+
+    A sleep of a minute and more stands for something that hangs, and is never waited for; the host
+    of the tests is slow when it is asked to be.
+    """
+    for path, tree in trees(r"sleep\(|wait_for_timeout\(").items():
+        if path == "support/static_host.py":
+            continue
+        loops = [node for node in ast.walk(tree) if isinstance(node, ast.While | ast.For)]
+        polling = {id(inner) for loop in loops for inner in ast.walk(loop)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and id(node) not in polling:
+                time = [a.value for a in node.args if isinstance(a, ast.Constant)]
+                if called_name(node) in ("sleep", "wait_for_timeout") and max(time, default=0) < 60:
+                    yield path, node.lineno
+
+
+def patches_of_private_names() -> Iterator[tuple[str, int]]:
+    for path, tree in trees(r"setattr\(|patch\(|patch\.object\(").items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and called_name(node) in ("setattr", "patch", "object"):
+                texts = [a.value for a in node.args[:2] if isinstance(a, ast.Constant)]
+                names = [text.rpartition(".")[2] for text in texts if isinstance(text, str)]
+                if any(name.startswith("_") and not name.startswith("__") for name in names):
+                    yield path, node.lineno
+
+
+ADVICE: dict[Rule, str] = {
+    assertions_that_look_once: "use `expect`, `until` or `becomes`: the page may not be there yet",
+    waits_for_time: "wait for an event, or in a loop for a condition",
+    patches_of_private_names: "test what can be seen, or give the product a parameter",
+}
+TO_MEND: dict[Rule, str] = {
+    assertions_that_look_once: (
+        "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py "
+        "render/test_browser.py"
+    ),
+    waits_for_time: "effects/test_pool.py effects/test_v8.py effects/test_v8_library.py",
+    patches_of_private_names: (
+        "effects/test_aside.py effects/test_code.py effects/test_examples.py "
+        "effects/test_installed.py effects/test_lab_engine.py effects/test_packs.py "
+        "effects/test_resources.py effects/test_stamp.py effects/test_v8.py "
+        "effects/test_v8_library.py effects/test_write.py pipeline/test_behind.py "
+        "pipeline/test_cards.py pipeline/test_memory_files.py pipeline/test_noted.py "
+        "pipeline/test_together.py render/test_templates.py support/edited_course.py "
+        "syntax/test_toml_text.py test_python_text.py"
+    ),
+}
+"""Files that do not keep a rule yet; the lists only become shorter."""
+
+
+@pytest.mark.parametrize("rule", ADVICE, ids=lambda rule: rule.__name__)
+def test_tests_are_free_of(rule: Rule) -> None:
+    found = list(rule())
+    left = set(TO_MEND.get(rule, "").split())
+    new = [f"tests/{path}:{line}: {ADVICE[rule]}" for path, line in found if path not in left]
+    assert new == [], "\n".join(new)
+    mended = left - {path for path, _ in found}
+    assert mended == set(), "take these out of TO_MEND"
+
+
+def test_assertion_that_looks_at_page_once_is_found() -> None:
+    (function,) = functions(
+        ast.parse(
+            "def test(page):\n"
+            "    page.click('a')\n"
+            "    expect(page.locator('b')).to_be_visible()\n"
+            "    assert page.locator('b').count() == 1\n"
+            "    page.click('a')\n"
+            "    assert page.locator('b').count() == 1\n"
+            "    becomes(page, lambda: page.locator('b').count(), 1)\n"
+        )
+    )
+    assert list(looks_once(function, WAITS, ACTIONS)) == [6]
