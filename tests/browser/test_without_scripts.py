@@ -212,4 +212,6 @@ def test_no_page_waits_for_a_script(sites: Mapping[str, Site], page: Page) -> No
             dead = page.locator("main :is(button, select, textarea, input:not([disabled])):visible")
             expect(dead).to_have_count(0)
             expect(page.locator("h1")).to_have_count(1)
-            expect(page.locator("main")).to_have_text(re.compile(r"[\s\S]{40}"), use_inner_text=True)
+            expect(page.locator("main")).to_have_text(
+                re.compile(r"[\s\S]{40}"), use_inner_text=True
+            )
