@@ -124,7 +124,7 @@ PIECES = st.lists(
 
 
 @given(st.one_of(PROGRAMS, PIECES))
-@settings(max_examples=1500)
+@settings(max_examples=400)
 @example('def f():\n    """\ndef g():\n    """\n    import a\n')
 @example("def f():\n    x = [\n1]\ndef g():\n    y\n")
 @example("def f(x=[lambda:\n 1\n]):\n    y\n")
@@ -166,7 +166,7 @@ def test_bodies_are_left_out_of_an_ordinary_script() -> None:
 
 
 @given(st.one_of(PROGRAMS, PIECES))
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_a_last_line_end_makes_no_other_text(code: str) -> None:
     if not code.endswith(("\n", "\\")):
         assert text_key(code) == text_key(f"{code}\n")

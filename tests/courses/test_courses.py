@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.cli import main
+from support.built_sites import BuiltCourses
 
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/expected"))
@@ -30,20 +30,12 @@ def test_there_are_cases() -> None:
     assert CASES == ["full", "minimal", "unicode"]
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("case", CASES)
-def test_course(
-    case: str,
-    tmp_path: Path,
-    stores: Path,
-    request: pytest.FixtureRequest,
-    capsys: pytest.CaptureFixture[str],
+def test_course_becomes_what_is_expected(
+    case: str, built_courses: BuiltCourses, request: pytest.FixtureRequest
 ) -> None:
-    root = tmp_path / "a course"
-    shutil.copytree(HERE / case / "course", root)
-    (root / ".coursebuild").mkdir()
-    for store in stores.iterdir():
-        (root / ".coursebuild" / store.name).symlink_to(store)
-    assert main(["-C", str(root), "build"]) == 0, capsys.readouterr().out
+    root = built_courses.of_case(case).root
     made = outputs(root)
     assert authored(root) == authored(HERE / case / "course")
     expected = HERE / case / "expected"

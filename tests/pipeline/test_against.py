@@ -268,7 +268,7 @@ time.sleep(60)
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_interrupted_installation_leaves_nothing(
     make: Callable[..., Folder], wheels: Path, tmp_path: Path, number: signal.Signals
 ) -> None:

@@ -13,6 +13,8 @@ from coursebuild.cli import main
 from coursebuild.measured.records import RecordError, decode_diet
 from coursebuild.pipeline import diet_model
 
+pytestmark = pytest.mark.site
+
 ROOT = Path(__file__).parents[2]
 MODEL = """<mujoco>
   <worldbody>
@@ -49,7 +51,9 @@ def values(course: Path, capsys: pytest.CaptureFixture[str], *arguments: str) ->
     return status, json.loads(out)
 
 
-def test_a_finding_as_text_and_as_json(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diet_tells_a_finding_as_text_and_as_json(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(course) == 1
     out, err = capsys.readouterr()
     assert "  sensor-unread: nobody reads the sensor time\n    bit-identical; " in out
@@ -77,7 +81,9 @@ def test_a_finding_as_text_and_as_json(course: Path, capsys: pytest.CaptureFixtu
     assert MODEL[edit["start"] : edit["end"]] == edit["old"] and edit["new"] == ""
 
 
-def test_what_was_found_is_kept(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diet_looks_again_only_where_the_model_changed(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(course) == run(course) == 1
     assert capsys.readouterr().err.count("looked at after") == 1
     assert run(course, "--no-cache") == 1
@@ -87,8 +93,7 @@ def test_what_was_found_is_kept(course: Path, capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().err.count("looked at after") == 1
 
 
-@pytest.mark.parametrize("mark", ["", "\ufeff"])
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize(("newline", "mark"), [("\n", ""), ("\r\n", "\ufeff")])
 def test_fix_changes_only_what_is_in_vain_and_then_nothing(
     course: Path, capsys: pytest.CaptureFixture[str], newline: str, mark: str
 ) -> None:
@@ -148,7 +153,7 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFix
     ]
 
 
-def test_what_a_lesson_reads_is_no_finding(
+def test_sensor_that_a_lesson_reads_is_no_finding(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lessons = course / "content" / "lessons"
@@ -168,7 +173,7 @@ def test_what_a_lesson_reads_is_no_finding(
     assert run(course) == 0
 
 
-def test_what_is_measured_is_read_and_what_nobody_begins_with_is_not(
+def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     keys = '  <keyframe><key name="go" qpos="1"/><key name="rest"/></keyframe>\n</mujoco>'
@@ -272,7 +277,9 @@ def test_quiet_tells_only_what_is_wrong(course: Path, capsys: pytest.CaptureFixt
     assert capsys.readouterr().out == ""
 
 
-def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diet_with_wrong_arguments_gives_2(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(course, "--record") == 2
     said = "--record takes no --quick: what is recorded is measured in full"
     assert said in capsys.readouterr().err
@@ -282,7 +289,7 @@ def test_wrong_usage(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run(course, "--record", "--fix")
 
 
-def test_a_course_without_models(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diet_without_models_says_so(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.rmtree(course / "models")
     assert run(course) == 0
     assert capsys.readouterr().out == "there is no model to look at\n"
@@ -320,6 +327,7 @@ def test_a_scenario_that_diverges_is_told(course: Path, capsys: pytest.CaptureFi
     assert "nothing is claimed from it" in out and "sensor-unread" not in out
 
 
+@pytest.mark.slow
 def test_the_models_of_this_course_pass_their_own_diet(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -120,7 +120,7 @@ WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b
         max_size=7,
     )
 )
-@settings(max_examples=12)
+@settings(max_examples=8)
 def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
     stores: Path, edits: list[tuple[Callable[[Course, str, str], None], str, str, bool]]
 ) -> None:

@@ -161,6 +161,7 @@ def calls(text: str) -> int:
 NESTED = [("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")]
 
 
+@pytest.mark.site
 def test_work_grows_in_proportion_to_repeated_pieces() -> None:
     faster = []
     for piece in REPEATED:
