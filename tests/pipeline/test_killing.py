@@ -21,9 +21,8 @@ Make = Callable[..., Folder]
 
 ROOT = Path(__file__).parents[2]
 DIED = 137
-MAKING = ("open", "mkdir", "link")
-CHANGING = ("rename", "replace", "unlink", "rmdir", "exchange")
-"""Calls by which a folder holds something more, and something else."""
+STRUCTURAL = ("open", "mkdir", "link", "rename", "replace", "unlink", "rmdir", "exchange")
+"""Calls that change what a folder holds."""
 
 OLD = "## One\n\n" + block("kept.py", "print(1)", "1") + block("gone.py", "print(2)", "2")
 NEW = OLD.replace("gone.py", "new.py").replace("print(1)", "print(1)  # edited") + "Edited.\n"
@@ -71,19 +70,20 @@ def mortals(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mortals]:
 
 
 def points(calls: list[str]) -> list[int]:
-    """Which calls to die at, counted from 1: all that change a folder, and the first half write.
+    """Which calls to die at, counted from 1: the structural ones, and the first write by half.
 
-    Of a row of calls that make something, the first and the last: in between there is just less.
+    Of those that follow the same kind of call the first and the last: there are rows of them.
     """
-    found = {calls.index("write") + 1}
-    row: list[int] = []
-    for number, name in enumerate([*calls, ""], 1):
-        if name in MAKING:
-            row.append(number)
-        elif name in (*CHANGING, ""):
-            found |= {*row[:1], *row[-1:], number}
-            row.clear()
-    return sorted(found - {len(calls) + 1})
+    structural = [number for number, name in enumerate(calls, 1) if name in STRUCTURAL]
+    first: dict[tuple[str, str], int] = {}
+    last: dict[tuple[str, str], int] = {}
+    before = ""
+    for number in structural:
+        name = calls[number - 1]
+        first.setdefault((before, name), number)
+        last[before, name] = number
+        before = name
+    return sorted({*first.values(), *last.values(), calls.index("write") + 1})
 
 
 def again(template: Folder, folder: Folder) -> None:
@@ -122,7 +122,7 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
     assert changed == {
         f"{place}examples/{name}.py" for place in ("", "public/") for name in ("gone", "new")
     }
-    assert {"exchange", "replace", "link", "write", "unlink"} <= {*calls}
+    assert {"exchange", "replace", "link", "write", "unlink", "rmdir"} <= {*calls}
     for fatal in points(calls):
         again(template, folder)
         mortals.die(folder, "build", "-q", fatal=fatal)
