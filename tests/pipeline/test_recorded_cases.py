@@ -11,6 +11,8 @@ from coursebuild.cli import main
 from coursebuild.measured.records import STABILITY_PATH, decode_stability, encode_stability
 from coursebuild.values import replace
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
