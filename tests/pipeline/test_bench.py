@@ -20,6 +20,8 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, TOML, Fake, asked, bench_course, options, swing, write
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:

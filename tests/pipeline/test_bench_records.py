@@ -15,6 +15,8 @@ from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:

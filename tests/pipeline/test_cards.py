@@ -11,6 +11,8 @@ from coursebuild.measured.bench import SceneReport
 from coursebuild.pipeline.cards import with_card
 from coursebuild.pipeline.scenes import find_scenes
 
+pytestmark = pytest.mark.site
+
 BALL = """\
 <mujoco>
   <include file="parts/floor.xml"/>

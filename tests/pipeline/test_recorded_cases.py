@@ -11,6 +11,8 @@ from msgspec.structs import replace
 from coursebuild.cli import main
 from coursebuild.measured.records import STABILITY_PATH, decode_stability, encode_stability
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:

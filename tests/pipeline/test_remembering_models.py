@@ -15,6 +15,8 @@ from coursebuild.pipeline.remember_models import compile_all
 from coursebuild.results import CompileResult
 from coursebuild.source import Source
 
+pytestmark = pytest.mark.site
+
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 MAIN = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
 <asset><mesh name="m" file="m.obj"/></asset>
