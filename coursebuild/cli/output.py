@@ -71,7 +71,7 @@ def print_report(report: Report, form: str, options: Options) -> int:
 
 def report_text(report: Report, options: Options) -> str:
     """The report as it is printed: only what is wrong, where the user wants no more."""
-    from dataclasses import replace
+    from msgspec.structs import replace
 
     from coursebuild.report import render_report
 

