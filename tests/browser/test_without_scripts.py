@@ -166,8 +166,10 @@ PICTURES = """Promise.all([...document.querySelectorAll('main img')].map(async (
   await one.decode()
   return [one.alt, one.naturalWidth > 0 && one.getBoundingClientRect().width > 0]
 }))"""
-LABS_WITHOUT = """[...document.querySelectorAll('[data-lab][data-config]')]
-  .filter(lab => !lab.querySelector('img, svg')?.checkVisibility()).length"""
+LABS_WITHOUT = """[...document.querySelectorAll('[data-lab][data-config]')].filter(lab => {
+  const first = lab.querySelector('img, svg')
+  return !first || (lab.querySelector('img') && !first.checkVisibility())
+}).length"""
 
 
 def signs_wanted(engine: MathEngine, document: Document) -> list[str]:
