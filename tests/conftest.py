@@ -25,6 +25,7 @@ settings.load_profile("fixed")
 # A shell starts what runs in the background with these ignored; so all that tests start would be.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGQUIT, signal.SIG_DFL)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

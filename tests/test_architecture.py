@@ -17,7 +17,7 @@ PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"values", "patterns"}),
+    frozenset({"patterns"}),
     frozenset({"source", "drawing", "python_text"}),
     frozenset({"rules"}),
     frozenset({"diagnostics"}),

@@ -71,7 +71,7 @@ def test_a_course_in_which_nothing_was_wrong_is_checked_again_when_it_looks_diff
     def found() -> list[str]:
         with Documents(Store(tmp_path), 1) as documents:
             given = documents.parse, documents.ahead, documents.course_map, documents.declarations
-            loaded = load(tmp_path, *given, None, documents.check)
+            loaded = load(tmp_path, *given, documents.check)
         return [diagnostic.rule for diagnostic in loaded.diagnostics]
 
     monkeypatch.setattr("coursebuild.checks.course.check_course", noted)

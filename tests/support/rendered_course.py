@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.model import (
@@ -110,8 +110,7 @@ def read_assets() -> Assets:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Made:
+class Made(Struct, frozen=True):
     """A course, what running it is said to have found, and the tool's own files."""
 
     course: Course
@@ -142,8 +141,7 @@ def whole_font(job: FontJob) -> bytes:
     return job.data
 
 
-@dataclass(frozen=True, slots=True)
-class Make:
+class Make(Struct, frozen=True):
     """Makes courses of texts."""
 
     assets: Assets
