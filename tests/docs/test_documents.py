@@ -137,7 +137,7 @@ def test_the_picture_is_there_and_small() -> None:
     assert 20_000 < len(data) < PICTURE_LIMIT
 
 
-@pytest.mark.slow
+@pytest.mark.browser
 def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: Path) -> None:
     done = screenshots(built_courses.real().root / "public", tmp_path)
     assert done.returncode == 0, done.stderr
