@@ -62,6 +62,9 @@ if TYPE_CHECKING:
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. All stay on this machine: reading them runs code."""
+_ROOM = 700_000
+"""Characters of documents that wait to be drawn, some 25 bytes each. Further ones are parsed
+again, so that memory does not grow with the course."""
 _FORMULAS = 1024
 """Formulas that are remembered."""
 _COLLECT = 512
@@ -116,6 +119,7 @@ class Reader:
         self._engine: MathEngine | None = None
         self._waiting: dict[str, _Whole] = {}
         """Documents that were read and not drawn yet, by the key of their text."""
+        self._room = _ROOM
         self._read_texts = 0
         self._formulas: dict[Formula, str | MathError] = {}
         self._tools: dict[str, Tools] = {}
@@ -180,7 +184,10 @@ class Reader:
         data = packed(outline)
         if outline.lasting:  # that a formula took too long may not happen again
             self._store.keep(OUTLINES, task.key, data, local=True)
-        self._waiting[task.key] = whole
+        size = len(task.source.text)
+        if size <= self._room:
+            self._waiting[task.key] = whole
+            self._room -= size
         self._read_texts += 1
         if self._read_texts % _RENEW == 0:
             self._rest()
@@ -192,6 +199,7 @@ class Reader:
         """A document with its formulas."""
         known = self._waiting.pop(task.key, None)
         if known is not None:
+            self._room += len(task.source.text)
             return known
         from coursebuild.syntax.document import parse_document
 
