@@ -1,4 +1,4 @@
-"""A course of any length takes about the same memory, and is built as a short one is."""
+"""A further lesson takes little more memory than its text; long courses are built as short ones."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.site
 
-FEW, MANY = 12, 96
+FEW, MANY = 40, 110
 TEXT = 20_000
 """Bytes of prose in a lesson."""
-SLOPE = 15_000
-"""Bytes that a further lesson may take: its entry in the map, names and keys of its files, and what
-waits in small caches; no text, no tree."""
+SLOPE = 45_000
+"""Bytes that a further lesson may take: its text, what others look at in it, names and keys of its
+files; no tree of its prose, of which both courses hold as much as there is room for."""
 
 
 def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
