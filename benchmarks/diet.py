@@ -13,7 +13,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from coursebuild.measured.diet import DietReport
+from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.pipeline.diet import diet
 from coursebuild.pipeline.options import Options
 

@@ -22,8 +22,8 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"rules"}),
     frozenset({"diagnostics"}),
     frozenset({"model"}),
-    frozenset({"results", "vocabulary", "measured"}),
-    frozenset({"syntax", "checks", "scripts", "labs", "render", "physics", "report", "effects"}),
+    frozenset({"results", "vocabulary", "numerics"}),
+    frozenset({"syntax", "checks", "scripts", "labs", "render", "report", "effects"}),
     frozenset({"pipeline"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
@@ -32,9 +32,11 @@ LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 PURE = (
-    *("syntax", "checks", "scripts", "labs", "physics", "render", "report", "model"),
-    *("drawing", "measured"),
+    *("syntax", "checks", "scripts", "labs", "render", "report", "model"),
+    *("drawing", "numerics"),
 )
+NUMERICS_NEEDS = ("numerics", "model", "source", "drawing")
+"""Measuring can be read alone."""
 IO_MODULES = {
     "os",
     "shutil",
@@ -83,11 +85,13 @@ def part_of(path: Path) -> str:
 
 
 def is_allowed(own: str, name: str) -> bool:
-    """Whether a part may import a module; `mjcourse` is for lesson scripts."""
+    """Whether a part may import a module; `mjcourse` is for lesson scripts and for numerics."""
     package, _, rest = name.partition(".")
     if package != "coursebuild":
-        return package not in ("", "mjcourse")
+        return package != "" and (package != "mjcourse" or own == "numerics")
     other = rest.split(".")[0]
+    if own == "numerics":
+        return other in NUMERICS_NEEDS
     return other in ("", own, "__version__") or LEVEL[other] < LEVEL[own]
 
 

@@ -23,7 +23,7 @@ def bench_findings(blocks: Iterable[Block], course: Course) -> tuple[Diagnostic,
 
 
 def _findings(bench: Bench, course: Course) -> Iterator[Diagnostic]:
-    from coursebuild.measured.records import bench_path  # which most courses do not need
+    from coursebuild.numerics.reports.records import bench_path  # which most courses do not need
 
     models = [model.name for model in course.models]
     if bench.model not in models:

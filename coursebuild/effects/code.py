@@ -15,7 +15,7 @@ _PACKAGE = Path(__file__).parent.parent
 
 
 def code_digest(*parts: str) -> str:
-    """A hash over packages and modules of the tool, such as `physics` and `report/text.py`.
+    """A hash over packages and modules of the tool, such as `numerics` and `report/text.py`.
 
     Raises:
         FileNotFoundError: the tool has no such part.

@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.measured.bench import Machine
+from coursebuild.numerics.reports.bench import Machine
 
 _INFO = Path("/proc/cpuinfo")
 _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")

@@ -16,16 +16,16 @@ from __future__ import annotations
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.departures import Checked, scene_departures
-from coursebuild.measured.records import (
+from coursebuild.model.scenarios import Bands
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.departures import Checked, scene_departures
+from coursebuild.numerics.reports.records import (
     BENCH,
     Failure,
     bench_path,
     decode_bench,
     encode_bench,
 )
-from coursebuild.model.scenarios import Bands
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.reports import command, read_record, recorded_models, write_record
 from coursebuild.pipeline.scene_run import Measuring, SceneRun

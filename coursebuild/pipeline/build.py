@@ -33,8 +33,8 @@ from coursebuild.results import FileList, Results, SiteFile
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
     from coursebuild.effects.published import Entry
-    from coursebuild.measured.shown import Reports
     from coursebuild.model import Course
+    from coursebuild.numerics.reports.shown import Reports
     from coursebuild.pipeline.site import Site
 
 

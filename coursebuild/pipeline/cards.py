@@ -14,7 +14,7 @@ from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.mjcf import parts
 from coursebuild.effects.native import NativeEngine, NativeError
 from coursebuild.effects.v8_library import StoppedError
-from coursebuild.measured.bench import SceneCard, SceneReport
+from coursebuild.numerics.reports.bench import SceneCard, SceneReport
 from coursebuild.pipeline.scenes import Scene
 
 _STEPS = 5000
@@ -34,9 +34,9 @@ def with_card(root: Path, scene: Scene, report: SceneReport) -> SceneReport:
     """
     import mujoco
 
-    from coursebuild.physics.engine import silent
-    from coursebuild.physics.scene import scenes
-    from coursebuild.physics.touching import possible_pairs, touched_pairs
+    from coursebuild.numerics.engine import silent
+    from coursebuild.numerics.scene import scenes
+    from coursebuild.numerics.touching import possible_pairs, touched_pairs
 
     source = scene.model.source
     with silent():  # what it warns of, it would write into the working directory

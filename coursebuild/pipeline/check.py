@@ -29,7 +29,7 @@ from coursebuild.report.values import plural
 from coursebuild.scripts.extract import extract
 
 if TYPE_CHECKING:
-    from coursebuild.measured.sensitivity import Sensitivity
+    from coursebuild.model.sensitivity import Sensitivity
     from coursebuild.pipeline.shards import Shard
 
 

@@ -29,8 +29,8 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.machine import machine
 from coursebuild.effects.read import read_course
-from coursebuild.measured.diet import DietReport
-from coursebuild.measured.records import Failure, diet_path, encode_diet
+from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.numerics.reports.records import Failure, diet_path, encode_diet
 from coursebuild.pipeline.diet_model import CannotError, DietModel
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
@@ -38,11 +38,11 @@ from coursebuild.pipeline.reports import write_record
 from coursebuild.pipeline.scenes import Scene, find_scenes
 
 if TYPE_CHECKING:
-    from coursebuild.physics.diet.model_text import ModelText
-    from coursebuild.physics.diet.survey import Survey
+    from coursebuild.numerics.pruning.model_text import ModelText
+    from coursebuild.numerics.pruning.survey import Survey
 
 _KIND = "diet"
-_CODE = ("physics", "pipeline/diet.py", "pipeline/diet_model.py", "measured/diet.py")
+_CODE = ("numerics", "pipeline/diet.py", "pipeline/diet_model.py")
 _LOCK = "bench-lock"
 """The lock of `bench`: each would disturb the other's times."""
 _ROUNDS = 20
@@ -181,7 +181,7 @@ class _Run:
 
     def _looked(self, look: DietModel, fix: bool) -> DietReport | None:
         """What is found, and changed; `None` where it could not be written, which is told."""
-        from coursebuild.physics.engine import silent
+        from coursebuild.numerics.engine import silent
 
         with silent():  # what MuJoCo warns of, it would write into the working directory
             return self._fixed(look) if fix else self._surveyed(look)[0]

@@ -21,16 +21,16 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.mjcf import model_files
 from coursebuild.effects.read import CourseFiles, read_bytes
 from coursebuild.effects.write import write_atomic
-from coursebuild.measured.bench import Machine
-from coursebuild.measured.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.model import Declarations, MjcfModel
+from coursebuild.numerics.reports.bench import Machine
+from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.pipeline.scenes import Scene, scene_digest
 from coursebuild.source import Source, Span
 
 if TYPE_CHECKING:
-    from coursebuild.physics.diet.model_text import ModelText
-    from coursebuild.physics.diet.readers import Readers
-    from coursebuild.physics.diet.survey import Survey
+    from coursebuild.numerics.pruning.model_text import ModelText
+    from coursebuild.numerics.pruning.readers import Readers
+    from coursebuild.numerics.pruning.survey import Survey
 
 _TEXT = ".coursebuild-text.xml"
 """No file has this name: MuJoCo takes the text in its place."""
@@ -91,11 +91,11 @@ class DietModel:
         """
         import mujoco
 
-        from coursebuild.physics.diet.cases import cases
-        from coursebuild.physics.diet.markup import MarkupError
-        from coursebuild.physics.diet.model_text import ModelTextError, open_model
-        from coursebuild.physics.diet.survey import Order, survey
-        from coursebuild.physics.scene import SceneError
+        from coursebuild.numerics.pruning.cases import cases
+        from coursebuild.numerics.pruning.markup import MarkupError
+        from coursebuild.numerics.pruning.model_text import ModelTextError, open_model
+        from coursebuild.numerics.pruning.survey import Order, survey
+        from coursebuild.numerics.scene import SceneError
 
         source = self.scene.model.source
         try:
@@ -159,8 +159,8 @@ class DietModel:
 
     def change(self, survey: Survey, text: ModelText) -> None:
         """Take over what is to be changed, if it still compiles to the model that was run."""
-        from coursebuild.physics.diet.markup import MarkupError
-        from coursebuild.physics.diet.model_text import ModelTextError, open_model, saved
+        from coursebuild.numerics.pruning.markup import MarkupError
+        from coursebuild.numerics.pruning.model_text import ModelTextError, open_model, saved
 
         before = dict(self.changed)
         self.changed |= text.files(survey.edits)
@@ -190,7 +190,7 @@ class DietModel:
         """
         if not self.changed:
             return
-        from coursebuild.physics.diet.model_text import open_model, saved
+        from coursebuild.numerics.pruning.model_text import open_model, saved
 
         wanted = saved(open_model(self.path, self.read, self.compile, check=False).model)
         written: list[str] = []
@@ -206,7 +206,7 @@ class DietModel:
             raise
 
     def _verify(self, wanted: bytes) -> None:
-        from coursebuild.physics.diet.model_text import saved
+        from coursebuild.numerics.pruning.model_text import saved
 
         try:
             if (
@@ -265,7 +265,7 @@ def _is_model(path: str) -> bool:
 
 def _readers(root: Path, files: CourseFiles, scene: Scene) -> Readers:
     """The files of the course that use a model, and what is to be measured on it."""
-    from coursebuild.physics.diet.readers import Reader, Readers, readers_of
+    from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
 
     texts = [Reader(s.path, s.text) for s in (*files.lessons, *files.pages)]
     found = list(readers_of(scene.name, texts).files)

@@ -13,7 +13,6 @@ from typing import Literal
 
 from coursebuild.diagnostics import nearest
 from coursebuild.effects.mjcf import parts
-from coursebuild.measured.records import bench_path
 from coursebuild.model import (
     Bench,
     Course,
@@ -32,6 +31,7 @@ from coursebuild.model import (
     local_file,
     walk_inlines,
 )
+from coursebuild.numerics.reports.records import bench_path
 from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError

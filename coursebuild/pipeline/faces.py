@@ -19,7 +19,6 @@ from typing import Any
 
 from coursebuild import model, results, source
 from coursebuild.effects.tool import tool_digest
-from coursebuild.measured.shown import Reports
 from coursebuild.model import (
     Course,
     Document,
@@ -29,6 +28,7 @@ from coursebuild.model import (
     document_blocks,
     walk_inlines,
 )
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.results import Results
 from coursebuild.source import Excerpt, Source, Span
 

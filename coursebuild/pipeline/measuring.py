@@ -20,11 +20,11 @@ import mujoco
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.measured.bench import ScenarioReport
-from coursebuild.physics.bench import measure_scenario
-from coursebuild.physics.engine import silent
-from coursebuild.physics.scene import Scene as PhysicsScene
-from coursebuild.physics.scene import SceneError, scenes
+from coursebuild.numerics.bench import measure_scenario
+from coursebuild.numerics.engine import silent
+from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.scene import Scene as PhysicsScene
+from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.pipeline.scenes import Scene
 
 

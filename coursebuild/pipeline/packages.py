@@ -26,8 +26,8 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.measured.shown import Reports
 from coursebuild.model import Block, Course, Quiz, document_blocks
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.write import write_atomic
-from coursebuild.measured.bench import ScenarioReport, SceneReport
-from coursebuild.measured.plot import plot_svg
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
+from coursebuild.numerics.reports.plot import plot_svg
 from coursebuild.pipeline.options import UsageError
 
 _SUFFIX = ".svg"

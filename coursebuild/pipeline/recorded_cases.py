@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from coursebuild.measured.cases import CaseReport
-from coursebuild.measured.departures import Checked, case_departures
-from coursebuild.measured.records import (
+from coursebuild.model.scenarios import Bands
+from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.departures import Checked, case_departures
+from coursebuild.numerics.reports.records import (
     STABILITY_PATH,
     Failure,
     decode_stability,
     encode_stability,
 )
-from coursebuild.model.scenarios import Bands
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reports import command, read_record, write_record
 from coursebuild.pipeline.stability import stability
@@ -46,7 +46,7 @@ def record_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
     Raises:
         UsageError: no case is called so.
     """
-    from coursebuild.physics.problems import problem_names
+    from coursebuild.numerics.problems import problem_names
 
     measured = stability(options, names)
     known = frozenset(problem_names())

@@ -13,7 +13,7 @@ from typing import TypeVar
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.write import resolve_inside, write_atomic
-from coursebuild.measured.records import FOLDER, Failure, RecordError
+from coursebuild.numerics.reports.records import FOLDER, Failure, RecordError
 
 _T = TypeVar("_T")
 _SUFFIX = ".bench.json"

@@ -17,7 +17,7 @@ from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.machine import machine
-from coursebuild.measured.bench import Machine, ScenarioReport, SceneReport
+from coursebuild.numerics.reports.bench import Machine, ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import Scene
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _SCENE, _SCENARIO = "bench", "bench-scenarios"
 """Kinds of what is kept."""
 _T = TypeVar("_T")
-_CODE = ("physics", "measured/bench.py", "pipeline/measuring.py", "pipeline/cards.py")
+_CODE = ("numerics", "pipeline/measuring.py", "pipeline/cards.py")
 """What measures and says what was measured."""
 _LOCK = "bench-lock"
 

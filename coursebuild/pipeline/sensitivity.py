@@ -13,8 +13,8 @@ import contextlib
 from collections.abc import Collection, Sequence
 
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.measured.sensitivity import RUNS, Sensitivity
 from coursebuild.model import Course, Recording, document_blocks
+from coursebuild.model.sensitivity import RUNS, Sensitivity
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory

@@ -17,14 +17,14 @@ from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.versions import engine_version
-from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.source import Source
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.measured.bench import SceneReport
-    from coursebuild.measured.cases import CaseReport
-    from coursebuild.measured.diet import DietReport
+    from coursebuild.numerics.reports.bench import SceneReport
+    from coursebuild.numerics.reports.cases import CaseReport
+    from coursebuild.numerics.reports.diet import DietReport
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport)
 
@@ -50,7 +50,7 @@ class _Reader:
         self._found: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
-        from coursebuild.measured.records import decode_bench, decode_diet, decode_stability
+        from coursebuild.numerics.reports.records import decode_bench, decode_diet, decode_stability
 
         scenes: dict[str, SceneReport] = {}
         diets: dict[str, DietReport] = {}
@@ -107,7 +107,7 @@ class _Reader:
         return None
 
     def _decoded(self, path: str, decode: Callable[[bytes], _T], make: str) -> _T | None:
-        from coursebuild.measured.records import RecordError
+        from coursebuild.numerics.reports.records import RecordError
 
         try:
             found: _T = _decoded(decode, read_bytes(self._root, path))

@@ -29,8 +29,8 @@ from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
-from coursebuild.measured.shown import Reports
 from coursebuild.model import Course
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.kept import CompiledTemplates, fonts_beside, kept_font, words_for
 from coursebuild.pipeline.options import Options

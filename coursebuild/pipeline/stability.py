@@ -19,7 +19,7 @@ import msgspec
 from coursebuild.diagnostics import nearest
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.measured.cases import (
+from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
@@ -31,7 +31,7 @@ from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 
 _KIND = "stability"
-_CODE = ("physics", "pipeline/stability.py", "measured/cases.py")
+_CODE = ("numerics", "pipeline/stability.py")
 """What measures and says what was measured."""
 
 
@@ -45,7 +45,7 @@ def stability(
     Raises:
         UsageError: no problem is called so.
     """
-    from coursebuild.physics.problems import problem_names
+    from coursebuild.numerics.problems import problem_names
 
     chosen = _chosen(names, problem_names())
     progress = Progress(quiet=options.quiet)
@@ -99,9 +99,9 @@ def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
 
 def _measured(name: str) -> CaseReport:
     """Everything that there is to measure on a problem."""
-    from coursebuild.physics import stability as limits
-    from coursebuild.physics.measure import Error, Errors, ladder, orders
-    from coursebuild.physics.problems import agreement, problem_named
+    from coursebuild.numerics import stability as limits
+    from coursebuild.numerics.measure import Error, Errors, ladder, orders
+    from coursebuild.numerics.problems import agreement, problem_named
 
     problem = problem_named(name)
     reference = None
@@ -169,7 +169,7 @@ def _measured(name: str) -> CaseReport:
 
 
 def _boundary(one: object) -> BoundaryLine:
-    from coursebuild.physics.stability import Boundary
+    from coursebuild.numerics.stability import Boundary
 
     assert isinstance(one, Boundary)
     theory = one.theory

@@ -20,7 +20,7 @@ from coursebuild.render.scenarios import scenario_view
 from coursebuild.render.sheet import ShownBench
 
 if TYPE_CHECKING:
-    from coursebuild.measured.bench import ScenarioReport
+    from coursebuild.numerics.reports.bench import ScenarioReport
     from coursebuild.render.context import PageContext
 
 
@@ -49,8 +49,8 @@ def bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_text(page: PageContext, block: Bench) -> tuple[Markup, str]:
     """The block without its plot, and what is to be seen in the plot."""
-    from coursebuild.measured.points import chart, telling
-    from coursebuild.measured.words import described
+    from coursebuild.numerics.reports.points import chart, telling
+    from coursebuild.numerics.reports.words import described
 
     report = _shown(page, block).report
     quantity = None if report is None or "plot" not in block.shows else telling(report)

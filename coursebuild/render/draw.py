@@ -20,7 +20,7 @@ from coursebuild.render.sheet import Graphed, Highlighted, Plotted, Sheet
 from coursebuild.render.tools import Tools
 
 if TYPE_CHECKING:
-    from coursebuild.measured.bench import ScenarioReport
+    from coursebuild.numerics.reports.bench import ScenarioReport
 
 
 def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
@@ -69,7 +69,7 @@ def _drawn(value: object, tools: Tools) -> object:
 
 def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
     """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
-    from coursebuild.measured.plot import plot_svg  # which few pages need
+    from coursebuild.numerics.reports.plot import plot_svg  # which few pages need
 
     drawn = (
         plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.measured.bench import Machine, ScenarioReport
-from coursebuild.measured.cases import ReferenceLine
+from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+from coursebuild.numerics.reports.cases import ReferenceLine
 from coursebuild.render.strings import Strings
 
 _MINUS = "\u2212"

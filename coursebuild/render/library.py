@@ -12,7 +12,6 @@ from typing import TypeAlias
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.measured.shown import Reports
 from coursebuild.model import (
     Bench,
     CalloutKind,
@@ -31,6 +30,7 @@ from coursebuild.model import (
     document_inlines,
 )
 from coursebuild.model import document_scripts as document_scripts
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.patterns import pattern
 from coursebuild.render.asked import AskedBy
 from coursebuild.render.asked import asked as asked_in

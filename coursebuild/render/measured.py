@@ -9,10 +9,10 @@ from __future__ import annotations
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.diet import DietReport, Finding, Saving
-from coursebuild.measured.records import bench_path, diet_path
 from coursebuild.model import MjcfModel, scenario_anchor
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
+from coursebuild.numerics.reports.records import bench_path, diet_path
 from coursebuild.render import urls
 from coursebuild.render.figures import again, factor, power, sentence, size, where, whole
 from coursebuild.render.library import Library

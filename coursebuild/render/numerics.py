@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.measured.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
-from coursebuild.measured.points import FLOORS, KNOWN, seconds_text, status_text
-from coursebuild.measured.records import STABILITY_PATH
+from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
+from coursebuild.numerics.reports.points import FLOORS, KNOWN, seconds_text, status_text
+from coursebuild.numerics.reports.records import STABILITY_PATH
 from coursebuild.render import urls
 from coursebuild.render.figures import (
     Grid,

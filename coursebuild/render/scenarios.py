@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from coursebuild.measured.bench import (
+from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.measured.points import (
+from coursebuild.numerics.reports.points import (
     FEWEST_STEPS,
     Quantity,
     is_cut_short,

@@ -24,7 +24,7 @@ from coursebuild.model import Comparison, Target
 from coursebuild.results import Outcome
 
 if TYPE_CHECKING:
-    from coursebuild.measured.bench import Machine, ScenarioReport
+    from coursebuild.numerics.reports.bench import Machine, ScenarioReport
 
 
 class ShownRun(Struct, frozen=True):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from coursebuild.measured.bench import (
+from coursebuild.numerics.reports.bench import (
     Machine,
     OrderRow,
     ScenarioReport,
@@ -22,7 +22,7 @@ from coursebuild.measured.bench import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.measured.points import (
+from coursebuild.numerics.reports.points import (
     FEWEST_STEPS,
     is_cut_short,
     seconds_text,

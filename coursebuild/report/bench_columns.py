@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from coursebuild.measured.bench import ScenarioReport, Setting, WorkPrecisionRow
-from coursebuild.measured.points import (
+from coursebuild.numerics.reports.bench import ScenarioReport, Setting, WorkPrecisionRow
+from coursebuild.numerics.reports.points import (
     FLOORS,
     quantities,
     seconds_text,

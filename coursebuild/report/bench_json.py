@@ -18,10 +18,10 @@ from typing import Any
 import msgspec
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.measured.bench import ScenarioReport, SceneReport, WorkPrecisionRow
-from coursebuild.measured.departures import Checked
-from coursebuild.measured.points import quantities
-from coursebuild.measured.records import Failure
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports.departures import Checked
+from coursebuild.numerics.reports.points import quantities
+from coursebuild.numerics.reports.records import Failure
 
 COLUMNS = (
     *("scene", "scenario", "row", "engine_version", "python_version", "numpy_version"),

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coursebuild.measured.departures import Checked, Departure
-from coursebuild.measured.records import Failure
+from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.records import Failure
 from coursebuild.report.table import Column, table
 from coursebuild.report.text import Style, visible
 from coursebuild.report.values import plural

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import msgspec
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.measured.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
-from coursebuild.measured.records import Failure
+from coursebuild.numerics.reports.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
+from coursebuild.numerics.reports.records import Failure
 from coursebuild.report.checked import failure_text
 from coursebuild.report.text import Style, diagnostic_text, visible
 from coursebuild.report.values import plural

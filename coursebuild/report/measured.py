@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import msgspec
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.cases import CaseReport
-from coursebuild.measured.departures import Checked
-from coursebuild.measured.records import Failure
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.departures import Checked
+from coursebuild.numerics.reports.records import Failure
 from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import bench_json
 from coursebuild.report.checked import checked_text, failure_text

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, assert_never
 
-from coursebuild.measured.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
+from coursebuild.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.report.values import plural
 
 _WHY = {

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from coursebuild.measured.cases import BoundaryLine, CaseReport, FigureLine, ReferenceLine
+from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, FigureLine, ReferenceLine
 from coursebuild.report.text import Style
 
 _BOLD, _RED, _YELLOW = "1", "1;31", "1;33"

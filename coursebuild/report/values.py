@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from coursebuild.diagnostics import Diagnostic, Severity
 
 if TYPE_CHECKING:
-    from coursebuild.measured.sensitivity import Sensitivity
+    from coursebuild.model.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):

@@ -27,14 +27,14 @@ from decimal import Decimal
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.measured.sensitivity import (
+from coursebuild.model import Comparison, Course, Filter, Mode, Recording
+from coursebuild.model.sensitivity import (
     PERTURBATION,
     Doubt,
     Flip,
     Sensitivity,
     Standing,
 )
-from coursebuild.model import Comparison, Course, Filter, Mode, Recording
 from coursebuild.results import Change, Outcome, ScriptRun
 from coursebuild.scripts.compare import compare
 from coursebuild.scripts.difftext import shortened

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.checks.benches import bench_findings, check_keyframes
-from coursebuild.measured.records import bench_path
 from coursebuild.model import Bench, document_blocks
+from coursebuild.numerics.reports.records import bench_path
 from support.made_courses import BOX, facts, make_course, said, told
 
 

@@ -13,7 +13,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.measured.bench import ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.bench import bench
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.progress import Progress

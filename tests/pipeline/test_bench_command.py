@@ -14,7 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.measured.records import decode_bench, encode_bench
+from coursebuild.numerics.reports.records import decode_bench, encode_bench
 from support.measured_course import BOX, PATH, TOML, bench_course, write
 from support.scratch_course import ROOT
 

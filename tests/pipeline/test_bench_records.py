@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.measured.bench import ScenarioReport
-from coursebuild.measured.records import decode_bench, encode_bench
+from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.records import decode_bench, encode_bench
 from coursebuild.pipeline.bench import Benched, check, record
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.effects.machine import machine
-from coursebuild.measured.bench import SceneReport
+from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.pipeline.cards import with_card
 from coursebuild.pipeline.scenes import find_scenes
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.measured.records import RecordError, decode_diet
+from coursebuild.numerics.reports.records import RecordError, decode_diet
 from coursebuild.pipeline import diet_model
 
 pytestmark = pytest.mark.site

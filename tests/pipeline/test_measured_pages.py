@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.effects.versions import engine_version
-from coursebuild.measured.records import (
+from coursebuild.numerics.reports.records import (
     STABILITY_PATH,
     bench_path,
     encode_bench,

@@ -59,8 +59,8 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
         "rare = {'mujoco', 'numpy', 'jinja2', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
-        " 'subprocess', 'coursebuild.effects.v8_library', 'coursebuild.measured.bench',"
-        " 'coursebuild.measured.points', 'coursebuild.render.cutting',"
+        " 'subprocess', 'coursebuild.effects.v8_library', 'coursebuild.numerics.reports.bench',"
+        " 'coursebuild.numerics.reports.points', 'coursebuild.render.cutting',"
         " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"
         " 'coursebuild.report.machine'};"
         "print(sorted(rare & set(sys.modules)), file=sys.stderr); sys.exit(status)"

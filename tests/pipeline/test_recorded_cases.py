@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.measured.records import STABILITY_PATH, decode_stability, encode_stability
+from coursebuild.numerics.reports.records import STABILITY_PATH, decode_stability, encode_stability
 
 pytestmark = pytest.mark.site
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.measured.records import bench_path, encode_bench
+from coursebuild.numerics.reports.records import bench_path, encode_bench
 from support.preview_process import serving
 from support.recorded_course import PAGE, Course
 from support.scratch_course import GOOD, Folder

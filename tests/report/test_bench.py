@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.measured.bench import SceneCard, Verdict, WorkPrecisionRow
-from coursebuild.measured.departures import Checked, Departure
-from coursebuild.measured.points import seconds_text, setting_text
-from coursebuild.measured.records import Failure
+from coursebuild.numerics.reports.bench import SceneCard, Verdict, WorkPrecisionRow
+from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.points import seconds_text, setting_text
+from coursebuild.numerics.reports.records import Failure
 from coursebuild.report import Style
 from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import COLUMNS, bench_json

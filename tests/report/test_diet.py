@@ -6,8 +6,8 @@ import json
 
 from msgspec.structs import replace
 
-from coursebuild.measured.bench import Machine
-from coursebuild.measured.diet import (
+from coursebuild.numerics.reports.bench import Machine
+from coursebuild.numerics.reports.diet import (
     EQUAL,
     IDENTICAL,
     UNTOUCHED,
@@ -20,7 +20,7 @@ from coursebuild.measured.diet import (
     TextEdit,
     Tried,
 )
-from coursebuild.measured.records import Failure, decode_diet, encode_diet
+from coursebuild.numerics.reports.records import Failure, decode_diet, encode_diet
 from coursebuild.report.diet import diet_report, diet_text, diet_values
 from coursebuild.report.text import Style
 

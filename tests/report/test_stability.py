@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from coursebuild.measured.cases import (
+from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,

@@ -9,8 +9,8 @@ from decimal import Decimal
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.measured.sensitivity import Doubt, Flip, Sensitivity, Standing
 from coursebuild.model import Comparison, Filter, Recording
+from coursebuild.model.sensitivity import Doubt, Flip, Sensitivity, Standing
 from coursebuild.results import Outcome, ScriptRun, Trace
 from coursebuild.scripts.numbers import scan
 from coursebuild.scripts.sensitivity import noise, rounded, sensitivity, worth_moving

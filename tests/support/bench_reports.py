@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coursebuild.measured.bench import (
+from coursebuild.numerics.reports.bench import (
     Machine,
     OrderRow,
     ScenarioReport,
@@ -15,7 +15,7 @@ from coursebuild.measured.bench import (
     Verdict,
     WorkPrecisionRow,
 )
-from coursebuild.measured.cases import (
+from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,

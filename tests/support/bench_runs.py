@@ -7,9 +7,9 @@ from typing import Any
 
 import mujoco
 
-from coursebuild.measured.bench import ScenarioReport, WorkPrecisionRow
-from coursebuild.physics.bench import measure_scene
-from coursebuild.physics.problems import problem_named
+from coursebuild.numerics.bench import measure_scene
+from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
 

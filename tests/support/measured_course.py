@@ -8,7 +8,7 @@ from typing import Any
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.store import Store
-from coursebuild.measured.bench import ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.measuring import Loaded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import Scene

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from coursebuild.measured.bench import SceneCard, SceneReport
-from coursebuild.measured.cases import (
+from coursebuild.numerics.reports.bench import SceneCard, SceneReport
+from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
@@ -13,14 +13,14 @@ from coursebuild.measured.cases import (
     OrderLine,
     ReferenceLine,
 )
-from coursebuild.measured.diet import (
+from coursebuild.numerics.reports.diet import (
     DietReport,
     DietScenario,
     Finding,
     Place,
     Saving,
 )
-from coursebuild.measured.shown import Reports
+from coursebuild.numerics.reports.shown import Reports
 from support.bench_reports import MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

@@ -7,8 +7,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from coursebuild.effects.versions import engine_version
-from coursebuild.measured.bench import SceneReport
-from coursebuild.measured.records import (
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.records import (
     STABILITY_PATH,
     bench_path,
     diet_path,

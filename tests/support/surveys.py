@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 import mujoco
 
-from coursebuild.measured.diet import Finding
 from coursebuild.model.scenarios import Declarations
-from coursebuild.physics.diet.cases import cases
-from coursebuild.physics.diet.model_text import ModelText, open_model
-from coursebuild.physics.diet.readers import Reader, Readers
-from coursebuild.physics.diet.survey import Order, Survey, survey
+from coursebuild.numerics.pruning.cases import cases
+from coursebuild.numerics.pruning.model_text import ModelText, open_model
+from coursebuild.numerics.pruning.readers import Reader, Readers
+from coursebuild.numerics.pruning.survey import Order, Survey, survey
+from coursebuild.numerics.reports.diet import Finding
 
 PATH = "models/a.xml"
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>

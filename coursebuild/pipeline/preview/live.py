@@ -26,8 +26,8 @@ from coursebuild.checks.course import check_document
 from coursebuild.checks.links import Places, places
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.read import read_sources
-from coursebuild.measured.shown import Reports
 from coursebuild.model import Course, Document, Lesson
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.outlines import Task

@@ -16,7 +16,6 @@ from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.effects.versions import engine_version, python_version
-from coursebuild.measured.shown import Reports
 from coursebuild.model import (
     Bench,
     Course,
@@ -32,6 +31,7 @@ from coursebuild.model import (
     Script,
     document_blocks,
 )
+from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.preview.memo import PerDocument
 from coursebuild.render.asked import asked
 from coursebuild.render.assets import Assets

@@ -1,0 +1,271 @@
+"""MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
+
+Entry points: `compiled`, `varied`, `simulate`, `advance`, `watched`, `refsafe_active`.
+
+1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
+2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
+   the state before the step, so it is computed again, on other data, from the state sampled.
+3. Steps between two looks are made in one call.
+4. MuJoCo writes a warning to standard error and into a file in the working directory; here it is
+   counted, and said by the judgement.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.numerics.detector import Judgement, Peaks, deepest_contact, judge, observe, peaks
+from coursebuild.numerics.problem import Array, Integrator, Motion, Problem, Setup, whole_number
+
+_CODE = {
+    Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
+    Integrator.EULER_EXPLICIT: mujoco.mjtIntegrator.mjINT_EULER,
+    Integrator.IMPLICIT: mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    Integrator.IMPLICITFAST: mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    Integrator.RK4: mujoco.mjtIntegrator.mjINT_RK4,
+    Integrator.DISCRETE: mujoco.mjtIntegrator.mjINT_DISCRETE,
+}
+
+
+_WATCHED = 8
+"""Steps from one look at the state to the next."""
+
+
+@lru_cache(maxsize=64)
+def _original(mjcf: str) -> Any:
+    return mujoco.MjModel.from_xml_string(mjcf)
+
+
+def compiled(mjcf: str, integrator: Integrator, timestep: float) -> Any:
+    """A `mjModel` of its own with this integrator and timestep (s), and automatic reset off.
+
+    Raises:
+        ValueError: the MJCF is wrong.
+    """
+    return varied(_original(mjcf), integrator, timestep)
+
+
+def varied(model: Any, integrator: Integrator, timestep: float) -> Any:
+    """A copy of a `mjModel` with this integrator and timestep (s), and automatic reset off."""
+    model = copy.copy(model)
+    choose(model, integrator, timestep)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+def choose(model: Any, integrator: Integrator, timestep: float) -> None:
+    """Give a model this integrator and timestep (s)."""
+    model.opt.integrator = int(_CODE[integrator])
+    model.opt.timestep = timestep
+    if integrator is Integrator.EULER_EXPLICIT:
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+
+
+def advance(model: Any, data: Any, steps: int = 1) -> None:
+    """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
+    with silent():
+        mujoco.mj_step(model, data, steps)
+
+
+class silent:  # noqa: N801 - used as a function, and quicker than a generator
+    """Nothing that MuJoCo warns of is printed meanwhile."""
+
+    __slots__ = ("before",)
+
+    def __enter__(self) -> None:
+        self.before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(_ignore)
+
+    def __exit__(self, *_: object) -> None:
+        mujoco.set_mju_user_warning(self.before)
+
+
+def watched(
+    model: Any, data: Any, steps: int, seen: Peaks, thickness: Array | None = None
+) -> tuple[Peaks, int]:
+    """Make so many steps, and no more once the state is no number.
+
+    Gives the most that was seen, with what was `seen` before, and how many steps were made. Looks
+    at every eighth state: what shoots up takes longer to come back.
+    """
+    done = 0
+    while done < steps and seen.finite:
+        part = min(_WATCHED, steps - done)
+        advance(model, data, part)
+        done += part
+        seen = peaks(data, seen, thickness)
+    return seen, done
+
+
+def bounds_of(problem: Setup) -> Peaks:
+    """The most that can be in a problem."""
+    return Peaks(problem.position_bound, problem.velocity_bound, problem.penetration_bound)
+
+
+def _ignore(_: str) -> None:
+    pass
+
+
+class Run(Struct, frozen=True):
+    """A simulation, looked at n times."""
+
+    times: Array
+    """(n,) s."""
+    qpos: Array
+    """(n, nq)."""
+    qvel: Array
+    """(n, nv)."""
+    energy: Array
+    """(n + 1, 2) J: potential and kinetic, first those of the beginning."""
+    momentum: Array
+    """(n + 1, 3) kg m²/s: angular, of everything about its centre of mass, in the world's frame."""
+    penetration: float
+    """Deepest contact at those times, m."""
+    judgement: Judgement
+    act: Array
+    """(n, na): activations of actuators."""
+
+
+def simulate(problem: Problem, integrator: Integrator, timestep: float) -> Run:
+    """Run the problem's scenario.
+
+    Raises:
+        ValueError: the timestep (s) does not divide the interval of the looks.
+    """
+    return simulate_model(problem, compiled(problem.mjcf, integrator, timestep))
+
+
+def simulate_model(problem: Setup, model: Any, thickness: Array | None = None) -> Run:
+    """Run a scenario with a model whose options were set otherwise; `thickness` as for `peaks`.
+
+    Raises:
+        ValueError: its timestep does not divide the interval of the looks.
+    """
+    scenario = problem.scenario
+    step = float(model.opt.timestep)
+    every = whole_number(scenario.sample, step, "the sampling interval", "the timestep")
+    times = scenario.times
+    data, other = begun(problem, model), begun(problem, model)
+    qpos = np.empty((len(times), model.nq))
+    qvel = np.empty((len(times), model.nv))
+    act = np.empty((len(times), model.na))
+    kept = [invariants(model, other, data.qpos, data.qvel)]
+    seen = Peaks(penetration=deepest_contact(other))
+    holds, steps = held(problem), 0
+    for index in range(len(times)):
+        if scenario.controls:
+            data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
+        seen, done = watched(model, data, every, seen, thickness)
+        steps += done
+        if not seen.finite:
+            qpos[index:], qvel[index:], act[index:] = np.nan, np.nan, np.nan
+            break
+        qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
+        kept.append(invariants(model, other, data.qpos, data.qvel))
+        # Where a step ends, its contacts are still those of its beginning.
+        seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
+    judgement = judge(observe(model, data, steps * step, seen=seen, bounds=bounds_of(problem)))
+    kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
+    table = np.array(kept)
+    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement, act)
+
+
+def refsafe_active(model: Any) -> bool:
+    """Whether MuJoCo may soften a constraint because the timestep is long for its time constant.
+
+    See `refsafe_from`.
+    """
+    return float(model.opt.timestep) * (1 - 1e-12) > refsafe_from(model)
+
+
+def refsafe_from(model: Any) -> float:
+    """The timestep beyond which MuJoCo may soften a constraint, s; infinite where there is none.
+
+    Unless `refsafe` is off it raises time constants to two timesteps: that is stable, and another
+    model. Said of geoms that can touch, equalities, limits and dry friction.
+    """
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
+        return math.inf
+    disabled = int(model.opt.disableflags)
+    touching = (model.geom_contype | model.geom_conaffinity) != 0
+    if disabled & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
+        touching = np.zeros(model.ngeom, dtype=bool)
+    constants = np.concatenate(
+        [
+            model.geom_solref[touching, 0],
+            model.pair_solref[:, 0],
+            model.eq_solref[:, 0],
+            model.jnt_solref[model.jnt_limited != 0, 0],
+            model.dof_solref[model.dof_frictionloss > 0, 0],
+            model.tendon_solref_lim[model.tendon_limited != 0, 0],
+            model.tendon_solref_fri[model.tendon_frictionloss > 0, 0],
+        ]
+    )
+    # A constant that is not positive is a stiffness, which is taken as it is.
+    return float(np.min(constants[constants > 0], initial=math.inf)) / 2
+
+
+def begun(problem: Setup, model: Any) -> Any:
+    """`mjData` in the initial state of the problem's scenario."""
+    data = mujoco.MjData(model)
+    scenario = problem.scenario
+    if scenario.keyframe >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, scenario.keyframe)
+        data.time = 0.0
+    if scenario.qpos:
+        data.qpos[:] = scenario.qpos
+    if scenario.qvel:
+        data.qvel[:] = scenario.qvel
+    if scenario.controls:
+        data.ctrl[:] = scenario.controls[0]
+    return data
+
+
+def held(problem: Setup) -> int:
+    """Looks for which a command holds."""
+    scenario = problem.scenario
+    if not scenario.hold:
+        return 1
+    return whole_number(scenario.hold, scenario.sample, "the hold", "the sampling interval")
+
+
+def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
+    """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
+
+    `other` is data that nothing else uses.
+    """
+    other.qpos[:], other.qvel[:] = qpos, qvel
+    mujoco.mj_fwdPosition(model, other)
+    mujoco.mj_fwdVelocity(model, other)
+    mujoco.mj_energyPos(model, other)
+    mujoco.mj_energyVel(model, other)
+    mujoco.mj_subtreeVel(model, other)
+    return np.concatenate([other.energy, other.subtree_angmom[0]])
+
+
+def motion_of(model: Any, times: Array, qpos: Array, qvel: Array) -> Motion:
+    """Coordinates (n, nq), (n, nv) sorted into positions, attitudes and velocities."""
+    place: list[int] = []
+    turns: list[int] = []
+    for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
+        at = int(start)
+        match mujoco.mjtJoint(int(kind)):
+            case mujoco.mjtJoint.mjJNT_FREE:
+                place += [at, at + 1, at + 2]
+                turns.append(at + 3)
+            case mujoco.mjtJoint.mjJNT_BALL:
+                turns.append(at)
+            case _:
+                place.append(at)
+    attitude = np.empty((len(times), len(turns), 4))
+    for index, at in enumerate(turns):
+        attitude[:, index] = qpos[:, at : at + 4]
+    return Motion(times, qpos[:, place], attitude, qvel)

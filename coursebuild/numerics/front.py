@@ -1,0 +1,208 @@
+"""Which settings are worth their cost, and what that says of the scene's own.
+
+Entry points: `front(points)`, `verdict(rows, points, own)`.
+
+1. A setting is dominated where another costs no more and errs no more, and is clearly better in one
+   of the two. What differs by less than 3 % in cost or 5 % in error is no difference.
+2. Errors are the same in every run, and costs repeat to a few per cent only. The slack in cost is
+   between 3 % and 12 %, away from every cost that decides whether a point is dominated: so the
+   front is the same again.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from coursebuild.numerics.reports.bench import Setting, Verdict
+from coursebuild.numerics.reports.points import seconds_text
+
+COST_SLACK = (0.03, 0.12)
+"""Relative: no difference in cost below the first is one, and every one beyond the second is."""
+ERROR_SLACK = 0.05
+"""Relative."""
+
+
+class Point(Struct, frozen=True):
+    """A setting in the plane of cost and error."""
+
+    cost: float
+    """Relative to the scene's own setting."""
+    error: float
+    """In any unit; 0 is as good as can be told."""
+
+
+class Placed(Struct, frozen=True):
+    """Where a point lies."""
+
+    front: bool
+    dominated_by: int | None
+    """The number of a better point; `None` on the front, or for what is no point."""
+
+
+def front(points: Sequence[Point | None]) -> tuple[Placed, ...]:
+    """Which points no other dominates; `None` is a setting that was lost."""
+    logs = [None if p is None else (math.log(p.cost), _log_error(p.error)) for p in points]
+    slack = _slack(logs)
+    better = [
+        [] if mine is None else [j for j, other in enumerate(logs) if _beats(other, mine, slack)]
+        for mine in logs
+    ]
+    on_it = [mine is not None and not found for mine, found in zip(logs, better, strict=True)]
+    return tuple(
+        Placed(there, _best(logs, found, on_it)) for there, found in zip(on_it, better, strict=True)
+    )
+
+
+_Log = tuple[float, float]
+_ERROR = math.log(1 + ERROR_SLACK)
+
+
+def _log_error(error: float) -> float:
+    return math.log(error) if error > 0 else -1e9
+
+
+def _beats(other: _Log | None, mine: _Log, slack: float) -> bool:
+    """Whether another is clearly better in one respect, and no worse in the other."""
+    if other is None:
+        return False
+    cheaper, exacter = mine[0] - other[0], mine[1] - other[1]
+    return (cheaper > slack and exacter >= -_ERROR) or (exacter > _ERROR and cheaper >= -slack)
+
+
+def _slack(logs: Sequence[_Log | None]) -> float:
+    """Between the two slacks of cost, away from what decides about a point: rather a large one."""
+    low, high = (math.log(1 + part) for part in COST_SLACK)
+    there = [one for one in logs if one is not None]
+    edges = {low, high}
+    for mine in there:
+        # A point is dominated where the slack is less than `tied`, or more than `exact`.
+        tied = max((mine[0] - o[0] for o in there if abs(mine[1] - o[1]) <= _ERROR), default=0.0)
+        exact = min((o[0] - mine[0] for o in there if mine[1] - o[1] > _ERROR), default=math.inf)
+        if exact <= low or tied >= high:
+            continue  # dominated whatever the slack
+        edges |= {edge for edge in (tied, exact) if low < edge < high}
+    cuts = sorted(edges)
+    if len(cuts) == 2:
+        return low
+    gaps = [(b - a, (a + b) / 2) for a, b in itertools.pairwise(cuts)]
+    wide = [middle for width, middle in gaps if width >= _WIDE]
+    return wide[-1] if wide else max(gaps)[1]
+
+
+_WIDE = 0.03
+"""A gap between costs (logarithms) that their noise does not cross."""
+
+
+def _best(logs: Sequence[_Log | None], found: Sequence[int], on_it: Sequence[bool]) -> int | None:
+    """Of those that are better, the one whose cost and error together are least."""
+    chosen = [j for j in found if on_it[j]] or list(found)
+
+    def worth(index: int) -> tuple[float, int]:
+        log = logs[index]
+        assert log is not None
+        return sum(log), index
+
+    return min(chosen, key=worth, default=None)
+
+
+# --------------------------------------------------------------------------------------- verdict
+
+
+def verdict(
+    settings: Sequence[Setting],
+    points: Sequence[Point | None],
+    placed: Sequence[Placed],
+    own: int,
+    seen: float | None,
+    reasons: Sequence[str],
+    enough: int | None = None,
+    *,
+    hopeless: bool = False,
+) -> Verdict:
+    """What the measurement says of the scene's own setting, number `own`.
+
+    `seen`: its error in a picture, where 1 is just visible; `None` where it is not known.
+    `reasons`: why it has none.
+    `enough`: the cheapest setting whose error is not seen; `None` where there is none.
+    `hopeless`: whether the errors of all are.
+    """
+    noticeable = None if seen is None else seen >= 1
+    mine, better = points[own], placed[own].dominated_by
+    if reasons:
+        return _lost(settings, points, placed, own, reasons)
+    told = _noticed(seen) + _enough(settings, points, own, seen, enough, hopeless)
+    if mine is None:
+        text = "nothing was timed, so that no setting can be called better"
+        return Verdict(False, None, None, None, noticeable, text + _noticed(seen))
+    if better is None:
+        text = "no other setting is cheaper without being less accurate"
+        return Verdict(True, None, None, None, noticeable, text + told)
+    other = points[better]
+    assert other is not None
+    cost, error = other.cost / mine.cost, other.error / mine.error if mine.error > 0 else 1.0
+    text = f"{words(settings[better])} is {_compared(cost, error)}"
+    return Verdict(False, better, cost, error, noticeable, text + told)
+
+
+def _enough(
+    settings: Sequence[Setting],
+    points: Sequence[Point | None],
+    own: int,
+    seen: float | None,
+    enough: int | None,
+    hopeless: bool,
+) -> str:
+    """With what a learner would notice nothing, where something is noticed now."""
+    mine, other = points[own], None if enough is None else points[enough]
+    if seen is None or seen < 1 or mine is None:
+        return ""
+    if enough is None or other is None:
+        return ", and that of every other setting too" if hopeless else ""
+    cost = f"{other.cost / mine.cost:.2g} times its cost"
+    return f"; the cheapest without one that is seen is {words(settings[enough])}, at {cost}"
+
+
+def _lost(
+    settings: Sequence[Setting],
+    points: Sequence[Point | None],
+    placed: Sequence[Placed],
+    own: int,
+    reasons: Sequence[str],
+) -> Verdict:
+    """Of an own setting under which the scene does not run; the best one that does is named."""
+    text = f"the scene does not run under its own setting, {words(settings[own])}: "
+    text += "; ".join(reasons)
+    there = [(p.error, p.cost, i) for i, p in enumerate(points) if p and placed[i].front]
+    better = min(there)[2] if there else None
+    if better is not None:
+        text += f"; {words(settings[better])} is the most accurate that does"
+    return Verdict(False, better, None, None, None, text)
+
+
+def words(setting: Setting) -> str:
+    """A setting in a sentence."""
+    more = [setting.solver and f"{setting.solver}, at most {setting.iterations} iterations"]
+    more.append(setting.cone and f"{setting.cone} cone")
+    text = f"{setting.integrator} at {seconds_text(setting.timestep)}"
+    return ", ".join((text, *(part for part in more if part)))
+
+
+def _compared(cost: float, error: float) -> str:
+    cheap = f"takes {cost:.2g} of the time" if cost < 1 / 1.005 else "takes no more time"
+    if error < 1 / (1 + ERROR_SLACK):
+        exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
+    else:
+        exact = "errs no more"
+    return f"better: it {cheap} and {exact}"
+
+
+def _noticed(seen: float | None) -> str:
+    if seen is None:
+        return "; whether a learner would notice its error is not known"
+    if seen >= 1:
+        return f"; a learner would notice its error, which is {seen:.2g} times what can be seen"
+    return f"; a learner would not notice its error, which is {seen:.2g} of what can be seen"

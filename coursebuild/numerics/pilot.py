@@ -1,0 +1,231 @@
+"""A first run of a scene, in small steps: what acts in it, how far it can be told, what can be.
+
+Entry point: `pilot(model, scene)`.
+
+1. Every step is looked at: a contact, a limit that is reached or dry friction makes accelerations
+   jump, so that errors follow no power of the timestep and no smooth integration applies.
+2. Beside it runs a twin whose beginning is off by 1e-10. Where the two are a tenth apart, errors of
+   trajectories mean nothing any more: that is the horizon. The growth until there is the largest
+   Lyapunov exponent, about.
+3. What was seen of positions and velocities says what can be, with room for coarse timesteps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.numerics.detector import Peaks, peaks
+from coursebuild.numerics.engine import advance, begun, held, varied
+from coursebuild.numerics.problem import Array, Integrator, Scenario, whole_number
+from coursebuild.numerics.scene import Scene, SceneError
+
+NUDGE = 1e-10
+"""Of the twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
+APART = 0.1
+"""Where two motions have nothing in common any more: rad, or relative to the model's extent."""
+ROOM = 10.0
+"""Velocities so many times as large as those seen are called impossible, and positions that are so
+many extents (or radians) beyond."""
+
+
+_SELDOM = 8
+"""Steps from one look at how large the state is to the next."""
+
+
+class Bounded(Struct, frozen=True):
+    """A scenario, and the most that can be in it: a `Setup`."""
+
+    scenario: Scenario
+    position_bound: float
+    velocity_bound: float
+    penetration_bound: float = float("inf")
+
+
+class Pilot(Struct, frozen=True):
+    """What the first run says."""
+
+    contact: bool
+    """Whether anything touched."""
+    constrained: bool
+    """Whether a solver had anything to do."""
+    jumps: tuple[str, ...]
+    """What makes accelerations jump, in words; none: the scene is smooth."""
+    horizon: float
+    """s, a multiple of the sample; the duration where the twin stays near."""
+    lyapunov: float | None
+    """1/s; `None` where the twin stays near."""
+    setup: Bounded
+    deepest: float
+    """Deepest contact, m."""
+
+    @property
+    def smooth(self) -> bool:
+        """Whether accelerations are a smooth function of the state."""
+        return not self.jumps
+
+
+def pilot(model: Any, scene: Scene) -> Pilot:
+    """Run a scene at its shortest timestep under its own integrator.
+
+    Raises:
+        SceneError: it diverges even there.
+    """
+    step = min(scene.timesteps)
+    own = varied(model, _own(model), step)
+    open_end = Bounded(scene.scenario, math.inf, math.inf)
+    data, twin = begun(open_end, own), begun(open_end, own)
+    _nudge(own, twin)
+    look = _Look(own)
+    seen = peaks(data, Peaks())
+    times = scene.scenario.times
+    every = whole_number(scene.scenario.sample, step, "the sampling interval", "the timestep")
+    holds, gaps = held(open_end), np.full(len(times), np.nan)
+    for index in range(len(times)):
+        if scene.scenario.controls:
+            rows = scene.scenario.controls
+            data.ctrl[:] = twin.ctrl[:] = rows[min(index // holds, len(rows) - 1)]
+        for step_number in range(every):
+            advance(own, data)
+            look(data)
+            if step_number % _SELDOM == 0 or step_number == every - 1:
+                seen = peaks(data, seen)
+        if not seen.finite:
+            raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
+        if index == 0 or gaps[index - 1] < APART:
+            advance(own, twin, every)
+            gaps[index] = apart(own, data.qpos, twin.qpos)
+    horizon, lyapunov = _horizon(times, gaps)
+    return Pilot(
+        contact=look.contact,
+        constrained=look.constrained,
+        jumps=look.jumps(own),
+        horizon=horizon,
+        lyapunov=lyapunov,
+        setup=_bounds(own, scene.scenario, seen),
+        deepest=seen.penetration,
+    )
+
+
+def apart(model: Any, first: Array, second: Array) -> float:
+    """How far two positions (nq,) are from each other, at the joint where they differ most.
+
+    In rad for hinges and attitudes, relative to the model's extent for slides and free places.
+    """
+    difference = np.zeros(int(model.nv))
+    mujoco.mj_differentiatePos(model, difference, 1.0, first, second)
+    return float(np.max(np.abs(difference / scales(model)), initial=0.0))
+
+
+def scales(model: Any) -> Array:
+    """What a difference in each degree of freedom is large against: 1 rad, or the extent, m."""
+    found = np.ones(int(model.nv))
+    extent = max(float(model.stat.extent), mujoco.mjMINVAL)
+    for kind, dof in zip(model.jnt_type, model.jnt_dofadr, strict=True):
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            found[dof : dof + 3] = extent
+        elif kind == mujoco.mjtJoint.mjJNT_SLIDE:
+            found[dof] = extent
+    return found
+
+
+class _Look:
+    """Looks at every state, and keeps what acted."""
+
+    def __init__(self, model: Any) -> None:
+        self.contact = self.limit = self.constrained = False
+        self.friction = self.full = False
+        self._limited, self._range = _limited_activations(model)
+
+    def __call__(self, data: Any) -> None:
+        """See what acts."""
+        if data.nefc:
+            self.constrained = True
+            self.limit = self.limit or data.nl > 0
+            self.friction = self.friction or data.nf > 0
+        self.contact = self.contact or data.ncon > 0
+        if self._limited.size and not self.full:
+            act = data.act[self._limited]
+            self.full = bool(np.any((act <= self._range[:, 0]) | (act >= self._range[:, 1])))
+
+    def jumps(self, model: Any) -> tuple[str, ...]:
+        """What makes accelerations jump."""
+        found = (
+            (self.contact, "contact"),
+            (self.limit, "a limit that is reached"),
+            (self.friction, "dry friction"),
+            (self.full, "an activation at its limit"),
+            (bool(model.nplugin), "a plugin"),
+            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator")
+            if hasattr(model, "actuator_history")
+            else (False, ""),
+        )
+        return tuple(words for there, words in found if there)
+
+
+def _limited_activations(model: Any) -> tuple[Any, Array]:
+    """Which activations are clamped, by number (n,), and between what (n, 2)."""
+    found = [
+        (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
+        for i in np.flatnonzero(model.actuator_actlimited)
+        for k in range(int(model.actuator_actnum[i]))
+    ]
+    limits: Array = np.array([limits for _, limits in found]).reshape(-1, 2)
+    return np.array([number for number, _ in found], dtype=np.intp), limits
+
+
+def _own(model: Any) -> Integrator:
+    return OWN[int(model.opt.integrator)]
+
+
+OWN = {
+    int(mujoco.mjtIntegrator.mjINT_EULER): Integrator.EULER,
+    int(mujoco.mjtIntegrator.mjINT_IMPLICIT): Integrator.IMPLICIT,
+    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): Integrator.IMPLICITFAST,
+    int(mujoco.mjtIntegrator.mjINT_RK4): Integrator.RK4,
+    int(mujoco.mjtIntegrator.mjINT_DISCRETE): Integrator.DISCRETE,
+}
+"""By MuJoCo's numbers."""
+
+
+def _nudge(model: Any, data: Any) -> None:
+    """Push positions and velocities a little, in a direction that is always the same."""
+    direction = np.random.default_rng(1).normal(size=(2, int(model.nv)))
+    direction /= max(float(np.abs(direction).max(initial=0.0)), mujoco.mjMINVAL)
+    push = NUDGE * scales(model)
+    mujoco.mj_integratePos(model, data.qpos, direction[0] * push, 1.0)
+    data.qvel[:] += direction[1] * push
+
+
+def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
+    beyond = np.flatnonzero(gaps >= APART)
+    if not beyond.size:
+        return float(times[-1]), None
+    end = int(beyond[0])
+    usable = [
+        (float(t), math.log(gap))
+        for t, gap in zip(times[: end + 1], gaps[: end + 1], strict=True)
+        if gap > 0
+    ]
+    horizon = float(times[max(0, end - 1)])
+    if len(usable) < 3:  # too quick to be followed: from the nudge to the horizon
+        return horizon, math.log(APART / NUDGE) / float(times[end])
+    x, y = np.array(usable).T
+    return horizon, float(np.polyfit(x, y, 1)[0])
+
+
+def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Bounded:
+    extent = float(model.stat.extent)
+    fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
+    # A hinge without limits may go round the other way.
+    hinged = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
+    round_and_round = 2 * seen.velocity * scenario.duration if hinged else 0.0
+    return Bounded(
+        scenario,
+        position_bound=2 * seen.position + ROOM * max(extent, 1.0) + round_and_round,
+        velocity_bound=ROOM * max(seen.velocity, fall, 1e-3),
+    )

@@ -1,0 +1,251 @@
+"""Case 7: a block and a ball on a slope: the cone of friction, rolling, creep of what should stick.
+
+Entry point: `problems()`.
+
+Gravity is tilted instead of the floor, along an axis of the contact's frame or half-way between its
+two: a pyramidal cone gives only 1/√2 of the friction there.
+
+Sources: C.-A. de Coulomb's law, a = g (sin α − μ cos α) when sliding; a solid ball that rolls
+without slipping has a = 5/7 g sin α (L. D. Landau, E. M. Lifshitz, Mechanics, § 38).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+
+from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.problem import (
+    Array,
+    Figure,
+    Integrator,
+    Motion,
+    Problem,
+    Reference,
+    Scenario,
+)
+
+GRAVITY = 9.81
+SLIDING, STICKING, ROLLING = math.radians(45), math.radians(15), math.radians(20)
+FRICTION = 0.5
+Cone = Literal["pyramidal", "elliptic"]
+_CONES: tuple[Cone, ...] = ("elliptic", "pyramidal")
+_HALF, _WIDE = 0.05, 0.2
+"""m; a block as high as it is wide would rock."""
+_STEP = 1e-3
+
+
+def mjcf(shape: str, slope: float, across: bool, cone: Cone, friction: float) -> str:
+    """A block or a ball on a floor, with gravity tilted by `slope` (rad) towards x, or x and y."""
+    pull = GRAVITY * math.sin(slope)
+    x, y = (pull / math.sqrt(2), pull / math.sqrt(2)) if across else (pull, 0.0)
+    z = -GRAVITY * math.cos(slope)
+    size = f"{_WIDE} {_WIDE} {_HALF}" if shape == "box" else f"{_HALF}"
+    contact = f'condim="3" friction="{friction} 0.005 0.0001"'
+    return f"""\
+<mujoco>
+  <option gravity="{x!r} {y!r} {z!r}" cone="{cone}" tolerance="0" iterations="100"/>
+  <worldbody>
+    <geom type="plane" size="10 10 1" {contact}/>
+    <body pos="0 0 {_HALF}">
+      <freejoint/>
+      <geom type="{shape}" size="{size}" mass="1" {contact}/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def acceleration(text: str, integrator: Integrator) -> float:
+    """Along the slope, m/s²: from 0.5 s, when the contact has settled, to 1 s, at 1 ms."""
+    model = compiled(text, integrator, _STEP)
+    data = begun(_sliding("elliptic", False), model)
+    advance(model, data, round(0.5 / _STEP))
+    before = math.hypot(data.qvel[0], data.qvel[1])
+    advance(model, data, round(0.5 / _STEP))
+    return (math.hypot(data.qvel[0], data.qvel[1]) - before) / 0.5
+
+
+def creep(text: str, integrator: Integrator) -> float:
+    """The velocity at which a block slips that should stick, m/s: after two seconds at 1 ms."""
+    model = compiled(text, integrator, _STEP)
+    data = begun(_sliding("elliptic", False), model)
+    advance(model, data, round(2.0 / _STEP))
+    return math.hypot(data.qvel[0], data.qvel[1])
+
+
+def _straight(pull: float, turn: float, across: bool, times: Array) -> Motion:
+    """From rest with a constant acceleration (m/s²); a ball turns with it, `turn` 1/m."""
+    way, speed = pull * times**2 / 2, pull * times
+    return _as_motion(way, speed, turn, across)
+
+
+def _as_motion(way: Array, speed: Array, turn: float, across: bool) -> Motion:
+    along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if across else np.array([1.0, 0.0, 0.0])
+    axis = np.array([-along[1], along[0], 0.0])
+    place = way[:, None] * along + np.array([0.0, 0.0, _HALF])
+    half = way * turn / 2
+    attitude = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * axis], axis=1)
+    # Turning about an axis that does not move: the same in the body's frame and in the world's.
+    velocity = np.concatenate([speed[:, None] * along, speed[:, None] * turn * axis], axis=1)
+    times = np.arange(len(way), dtype=np.float64)
+    return Motion(times, place, attitude[:, None], velocity)
+
+
+def _integrated(force: float, inertia: float, turn: float, across: bool, times: Array) -> Motion:
+    """The same from the balance of energy and power, by Bulirsch–Stoer.
+
+    The kinetic energy E = (m + I/r²) v²/2 gains what gravity gives less what friction takes,
+    dE/dt = `force` v: with p = √E everything is smooth at rest.
+    """
+
+    def rate(state: State) -> State:
+        _, root = state.tolist()
+        speed = root * math.sqrt(2 / inertia)
+        return np.array([speed, force * math.sqrt(2 / inertia) / 2])
+
+    states = integrate(rate, np.zeros(2), times)
+    return _as_motion(states[:, 0], states[:, 1] * math.sqrt(2 / inertia), turn, across)
+
+
+def problems() -> tuple[Problem, ...]:
+    """Sliding along an axis and between two, rolling, sticking; with both cones."""
+    return (
+        *(_sliding(cone, across) for cone in _CONES for across in (False, True)),
+        *(_rolling(cone) for cone in _CONES),
+        *(_sticking(cone) for cone in _CONES),
+    )
+
+
+def _references(
+    law: str, pull: float, inertia: float, turn: float, across: bool, *, floor: float
+) -> tuple[Reference, Reference]:
+    """The closed form of a steady acceleration `pull` (m/s²), and the balance of energy.
+
+    `inertia` is that of the motion relative to the mass, `turn` rad for each metre.
+    """
+    closed = Reference(
+        "closed", law, lambda times: _straight(pull, turn, across, times), floor=floor
+    )
+    balance = Reference(
+        "ode",
+        "the balance of energy, Bulirsch–Stoer",
+        lambda times: _integrated(pull * inertia, inertia, turn, across, times),
+        floor=10 * floor,
+    )
+    return closed, balance
+
+
+_LADDER = (2e-3, 1e-3, 5e-4)
+
+
+def _sliding(cone: Cone, across: bool) -> Problem:
+    pull = GRAVITY * (math.sin(SLIDING) - FRICTION * math.cos(SLIDING))
+    text = mjcf("box", SLIDING, across, cone, FRICTION)
+    where = "across" if across else "along"
+    said = "between the axes" if across else "along an axis"
+    law = "Coulomb's law, a = g (sin α − μ cos α)"
+    reference, second = _references(law, pull, 1.0, 0.0, across, floor=1e-14)
+    return Problem(
+        name=f"sliding-block-{cone}-{where}",
+        title=f"Block sliding {said} of an {cone} cone"
+        if cone == "elliptic"
+        else f"Block sliding {said} of a {cone} cone",
+        case=7,
+        mjcf=text,
+        scenario=Scenario(1.0, 0.1),
+        position_bound=20.0,
+        velocity_bound=20.0,
+        reference=reference,
+        second=second,
+        timesteps=_LADDER,
+        figures=(
+            Figure(
+                "acceleration when sliding, from 0.5 s to 1 s at 1 ms",
+                "m/s²",
+                lambda _: pull,
+                lambda integrator: acceleration(text, integrator),
+                "Coulomb's law",
+            ),
+            *(_blunted(text),) * (cone == "pyramidal" and across),
+        ),
+        smooth=False,
+        penetration_bound=_HALF / 2,
+        note="the error is the model's: soft contacts, and the cone; no order is to be expected",
+    )
+
+
+def _blunted(text: str) -> Figure:
+    """Half-way between the axes |f₁| + |f₂| ≤ μ f leaves μ/√2."""
+    pull = GRAVITY * (math.sin(SLIDING) - FRICTION / math.sqrt(2) * math.cos(SLIDING))
+    return Figure(
+        "the same, against a pyramid's friction",
+        "m/s²",
+        lambda _: pull,
+        lambda integrator: acceleration(text, integrator),
+        "|f₁| + |f₂| ≤ μ f",
+    )
+
+
+def _rolling(cone: Cone) -> Problem:
+    pull = 5 / 7 * GRAVITY * math.sin(ROLLING)
+    text = mjcf("sphere", ROLLING, False, cone, 1.0)
+    law = "rolling without slipping, a = 5/7 g sin α"
+    reference, second = _references(law, pull, 7 / 5, 1 / _HALF, False, floor=1e-13)
+    return Problem(
+        name=f"rolling-ball-{cone}",
+        title=f"Ball rolling, {cone} cone",
+        case=7,
+        mjcf=text,
+        scenario=Scenario(1.0, 0.1),
+        position_bound=20.0,
+        velocity_bound=200.0,
+        reference=reference,
+        second=second,
+        timesteps=_LADDER,
+        figures=(
+            Figure(
+                "acceleration when rolling, from 0.5 s to 1 s at 1 ms",
+                "m/s²",
+                lambda _: pull,
+                lambda integrator: acceleration(text, integrator),
+                "a = 5/7 g sin α",
+            ),
+        ),
+        smooth=False,
+        penetration_bound=_HALF / 2,
+        note="the ball sinks in, and so rolls on a shorter arm: the error is the model's",
+    )
+
+
+def _sticking(cone: Cone) -> Problem:
+    text = mjcf("box", STICKING, False, cone, FRICTION)
+    law = "Coulomb's law: tan α < μ, so that it rests"
+    reference, second = _references(law, 0.0, 1.0, 0.0, False, floor=1e-15)
+    return Problem(
+        name=f"sticking-block-{cone}",
+        title=f"Block that should stick, {cone} cone",
+        case=7,
+        mjcf=text,
+        scenario=Scenario(2.0, 0.1),
+        position_bound=1.0,
+        velocity_bound=1.0,
+        reference=reference,
+        second=second,
+        timesteps=_LADDER,
+        figures=(
+            Figure(
+                "creep after 2 s at 1 ms",
+                "m/s",
+                lambda _: 0.0,
+                lambda integrator: creep(text, integrator),
+                "Coulomb's law",
+            ),
+        ),
+        smooth=False,
+        penetration_bound=_HALF / 2,
+        note="soft friction gives way at a steady velocity",
+    )

@@ -1,0 +1,103 @@
+"""Case 4: a stone thrown without air; the semi-implicit method is wrong by exactly g T h/2.
+
+Entry point: `problem()`.
+
+Source: with v ← v + gh before x ← x + vh, x after n steps is x₀ + v₀nh + gh²n(n + 1)/2.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.problem import (
+    Array,
+    Figure,
+    Integrator,
+    Motion,
+    Problem,
+    Reference,
+    Scenario,
+)
+from coursebuild.numerics.problems.common import NO_CONTACT
+
+GRAVITY = 9.81
+"""m/s²."""
+LAUNCH = (3.0, 0.0, 4.0)
+"""m/s."""
+_STEP = 0.01
+
+MJCF = f"""\
+<mujoco>
+  <option gravity="0 0 -{GRAVITY}">{NO_CONTACT}</option>
+  <worldbody>
+    <body>
+      <freejoint/>
+      <geom size="0.05" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _motion(times: Array, place: Array, speed: Array) -> Motion:
+    upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
+    velocity = np.concatenate([speed, np.zeros((len(times), 3))], axis=1)
+    return Motion(times, place, upright, velocity)
+
+
+def parabola(times: Array) -> Motion:
+    """Launched at the origin, at the times (n,) s: x = v₀t + gt²/2."""
+    t = times[:, None]
+    launch, fall = np.array(LAUNCH), np.array([0.0, 0.0, -GRAVITY])
+    return _motion(times, launch * t + fall * t**2 / 2, launch + fall * t)
+
+
+def integrated(times: Array) -> Motion:
+    """The same by Bulirsch–Stoer."""
+
+    def rate(state: State) -> State:
+        return np.concatenate([state[3:], [0.0, 0.0, -GRAVITY]])
+
+    states = integrate(rate, np.array([0.0, 0.0, 0.0, *LAUNCH]), times)
+    return _motion(times, states[:, :3], states[:, 3:])
+
+
+def fall_error(integrator: Integrator) -> float:
+    """Error of the height after a second at 10 ms, m: simulated less exact."""
+    one = problem()
+    model = compiled(MJCF, integrator, _STEP)
+    data = begun(one, model)
+    advance(model, data, round(one.scenario.duration / _STEP))
+    mujoco.mj_forward(model, data)
+    exact = parabola(np.array([one.scenario.duration])).position[0, 2]
+    return float(data.qpos[2] - exact)
+
+
+def exact_error(integrator: Integrator) -> float:
+    """What it should be: −gTh/2 where velocities are stepped first, nothing with RK4."""
+    return 0.0 if integrator is Integrator.RK4 else -GRAVITY * 1.0 * _STEP / 2
+
+
+def problem() -> Problem:
+    """A throw of one second."""
+    return Problem(
+        name="projectile",
+        title="Projectile",
+        case=4,
+        mjcf=MJCF,
+        scenario=Scenario(1.0, 0.1, qvel=(*LAUNCH, 0, 0, 0)),
+        position_bound=100.0,
+        velocity_bound=100.0,
+        reference=Reference("closed", "x = v₀t + gt²/2", parabola, floor=1e-15),
+        second=Reference("ode", "Bulirsch–Stoer", integrated, floor=1e-14),
+        timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160)),
+        energy_conserved=True,
+        figures=(
+            Figure(
+                "error of the height after 1 s at 10 ms", "m", exact_error, fall_error, "−gTh/2"
+            ),
+        ),
+    )

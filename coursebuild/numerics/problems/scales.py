@@ -1,0 +1,253 @@
+"""Case 13: things that are very small, very far, or given with few digits.
+
+Entry point: `problems()`; `plate_error()` is what the compiler says of a plate with few digits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.problem import (
+    Array,
+    Figure,
+    Integrator,
+    Motion,
+    Problem,
+    Reference,
+    Scenario,
+)
+from coursebuild.numerics.problems.common import (
+    NO_CONTACT,
+    NO_GRAVITY,
+    free_body_motion,
+    motion_without_attitude,
+)
+from coursebuild.numerics.problems.tops import FreeTop
+from coursebuild.numerics.rotation import from_axis_angle
+
+EDGE, DENSITY = 1e-3, 1000.0
+"""m and kg/m³."""
+FAR, CRAWL = 1e9, 1e-3
+"""m and m/s."""
+_TURN = (3.0, 4.0, 12.0)
+"""rad/s."""
+_GRAVITY = 9.81
+
+CUBE = f"""\
+<mujoco>
+  <option {NO_GRAVITY}>{NO_CONTACT}</option>
+  <worldbody>
+    <body>
+      <freejoint/>
+      <geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+RESTING = f"""\
+<mujoco>
+  <option gravity="0 0 -{_GRAVITY}"/>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body pos="0 0 {EDGE / 2!r}">
+      <freejoint/>
+      <geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+DISTANT = f"""\
+<mujoco>
+  <option {NO_GRAVITY}>{NO_CONTACT}</option>
+  <worldbody>
+    <body>
+      <joint type="slide" axis="1 0 0"/>
+      <geom size="0.1" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+PLATE_MOMENTS = (0.0833, 0.0833, 0.1667)
+"""A square plate of 1 kg and 1 m: 1/12, 1/12, 1/6, with four digits; A + B is less than C."""
+
+
+def plate(moments: tuple[float, float, float], *, balance: bool = False) -> str:
+    """A plate of 1 kg with these moments, kg m²."""
+    compiler = '<compiler balanceinertia="true"/>' if balance else ""
+    a, b, c = moments
+    return f"""\
+<mujoco>
+  {compiler}
+  <option {NO_GRAVITY}>{NO_CONTACT}</option>
+  <worldbody>
+    <body>
+      <freejoint/>
+      <inertial pos="0 0 0" mass="1" diaginertia="{a!r} {b!r} {c!r}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def plate_error() -> str:
+    """What MuJoCo says of the plate with four digits; empty where it takes it."""
+    try:
+        mujoco.MjModel.from_xml_string(plate(PLATE_MOMENTS))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _axial_moment(_: Integrator) -> float:
+    model = mujoco.MjModel.from_xml_string(plate(PLATE_MOMENTS, balance=True))
+    return float(model.body_inertia[1, 2])
+
+
+def steady(times: Array) -> Motion:
+    """A cube turns about any axis at a constant rate."""
+    omega = np.array(_TURN)
+    rate = float(np.linalg.norm(omega))
+    still = np.zeros((len(times), 3))
+    attitude = from_axis_angle(omega / rate, rate * times)
+    velocity = np.concatenate([still, still + omega], axis=1)
+    return Motion(times, still, attitude[:, None], velocity)
+
+
+def sunk(integrator: Integrator) -> float:
+    """How deep the resting cube lies in the floor, relative to its edge, after 1 s at 1 ms."""
+    model = compiled(RESTING, integrator, 1e-3)
+    data = mujoco.MjData(model)
+    advance(model, data, 1000)
+    return float((EDGE / 2 - data.qpos[2]) / EDGE)
+
+
+def crawled(integrator: Integrator, timestep: float) -> float:
+    """How far the distant body went in a second, m."""
+    model = compiled(DISTANT, integrator, timestep)
+    data = begun(problems()[1], model)
+    advance(model, data, round(1.0 / timestep))
+    return float(data.qpos[0] - FAR)
+
+
+def _line(times: Array) -> Motion:
+    return motion_without_attitude(
+        times, (FAR + CRAWL * times)[:, None], np.full((len(times), 1), CRAWL)
+    )
+
+
+def _line_integrated(times: Array) -> Motion:
+    def rate(state: State) -> State:
+        return np.array([state[1], 0.0])
+
+    states = integrate(rate, np.array([FAR, CRAWL]), times)
+    return motion_without_attitude(times, states[:, :1], states[:, 1:])
+
+
+def problems() -> tuple[Problem, ...]:
+    """The cube, the distant body and the plate."""
+    return (_cube(), _distant(), _plate())
+
+
+def _cube() -> Problem:
+    moment = DENSITY * EDGE**5 / 6
+    return Problem(
+        name="millimetre-cube",
+        title="Cube of 1 mm",
+        case=13,
+        mjcf=CUBE,
+        scenario=Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *_TURN)),
+        position_bound=1.5,
+        velocity_bound=100.0,
+        reference=Reference("closed", "a steady turn", steady, floor=1e-14),
+        second=Reference(
+            "ode",
+            "Euler's equations and quaternions, Bulirsch–Stoer",
+            lambda times: free_body_motion(np.full(3, moment), np.array(_TURN), times),
+            floor=1e-13,
+        ),
+        timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
+        figures=(
+            Figure(
+                "how deep it rests in the floor, in edges",
+                "",
+                lambda _: 0.0,
+                sunk,
+                "rigid bodies do not sink",
+            ),
+        ),
+        energy_conserved=True,
+        momentum_conserved=True,
+        note="default contacts give way by a length that does not depend on the size of a body",
+    )
+
+
+def _distant() -> Problem:
+    spacing = math.ulp(FAR)
+    return Problem(
+        name="distant-body",
+        title="Body 1e9 m away",
+        case=13,
+        mjcf=DISTANT,
+        scenario=Scenario(1.0, 0.1, (FAR,), (CRAWL,)),
+        position_bound=2 * FAR,
+        velocity_bound=1.0,
+        reference=Reference("closed", "a uniform motion", _line, floor=spacing),
+        second=Reference("ode", "Bulirsch–Stoer", _line_integrated, floor=spacing),
+        agreement=10 * spacing,
+        timesteps=tuple(0.1 / n for n in (10, 100, 1000)),
+        figures=tuple(
+            Figure(
+                f"distance gone in 1 s at 1 mm/s, {timestep:g} s a step",
+                "m",
+                lambda _: CRAWL,
+                lambda integrator, timestep=timestep: crawled(integrator, timestep),  # type: ignore[misc]
+                "a uniform motion",
+                (Integrator.EULER, Integrator.RK4),
+            )
+            for timestep in (1e-2, 1e-3, 1e-4, 1e-5)
+        ),
+        smooth=False,
+        note=f"numbers there lie {spacing:.2g} m apart",
+    )
+
+
+def _plate() -> Problem:
+    exact = (1 / 12, 1 / 12, 1 / 6)
+    turn = (1.0, 2.0, 3.0)
+    return Problem(
+        name="flat-plate",
+        title="Flat plate, A + B = C",
+        case=13,
+        mjcf=plate(exact),
+        scenario=Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *turn)),
+        position_bound=1.5,
+        velocity_bound=100.0,
+        reference=Reference(
+            "closed", "Goldstein, 5.6", FreeTop(exact[0], exact[2], turn).motion, floor=1e-13
+        ),
+        second=Reference(
+            "ode",
+            "Euler's equations and quaternions, Bulirsch–Stoer",
+            lambda times: free_body_motion(np.array(exact), np.array(turn), times),
+            floor=1e-13,
+        ),
+        timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
+        figures=(
+            Figure(
+                "axial moment of the plate with four digits, after balanceinertia",
+                "kg m²",
+                lambda _: PLATE_MOMENTS[2],
+                _axial_moment,
+                "what was written",
+                (Integrator.EULER,),
+            ),
+        ),
+        energy_conserved=True,
+        momentum_conserved=True,
+        note="with four digits A + B < C, and MuJoCo refuses it; balanceinertia makes it a sphere",
+    )

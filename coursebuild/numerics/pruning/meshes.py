@@ -1,0 +1,181 @@
+"""Meshes that are only looked at, where a primitive has the same shape.
+
+Entry point: `meshes(look)`.
+
+MuJoCo itself fits a primitive to each mesh. It does where no corner of the mesh is farther outside
+of it than one part in fifty of its size, and both have the same volume to that part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
+from coursebuild.numerics.pruning.edits import Edit, drop_attribute, set_attributes
+from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.unused import asset_name
+
+Points = NDArray[np.float64]
+
+SHARE = 0.02
+"""Of its size and its volume, by which the shape may be another."""
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_SHAPES = ("box", "sphere", "cylinder", "ellipsoid", "capsule")
+_PLACED = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "size", "mesh", "type")
+_MOST = 100
+"""Geoms that are tried; each is compiled a few times."""
+
+
+def meshes(look: Look) -> Iterator[Candidate]:
+    """Geoms that only show a mesh, and could be a primitive."""
+    items: list[Item] = []
+    for element in _shown(look)[:_MOST]:
+        item = _item(look, element)
+        if item is not None:
+            items.append(item)
+    if items:
+        what = "the geom {} is" if len(items) == 1 else "the geoms {} are"
+        blocked = "whether the shape is near enough to look at is for a person to say"
+        yield Candidate(
+            "mesh-primitive",
+            f"{what} a mesh with the shape of a primitive",
+            tuple(items),
+            "it is only looked at",
+            timed=False,
+            blocked=blocked,
+        )
+
+
+def _shown(look: Look) -> list[Element]:
+    """Geoms that are meshes of their own, and touch nothing."""
+    model = look.model
+    paired = {int(g) for g in (*model.pair_geom1, *model.pair_geom2)}
+    found = []
+    for element in look.scene.elements:
+        thing = look.scene.ids(element)
+        if element.tag != "geom" or thing is None or len(thing.ids) != 1:
+            continue
+        geom = thing.ids[0]
+        name = element.get("mesh")
+        if not name or model.geom_type[geom] != _MESH or geom in paired:
+            continue
+        if model.geom_contype[geom] or model.geom_conaffinity[geom]:
+            continue
+        if element.above is None or element.above.tag not in ("body", "worldbody"):
+            continue
+        if not look.readers.reads("mesh", name):
+            found.append(element)
+    return found
+
+
+def _item(look: Look, element: Element) -> Item | None:
+    thing = look.scene.ids(element)
+    assert thing is not None
+    geom = thing.ids[0]
+    corners, volume = _mesh(look.model, geom)
+    for shape in _SHAPES:
+        try:
+            other = look.scene.compiled(set_attributes(element, (("type", shape),)))
+        except ValueError:
+            continue
+        if other.ngeom != look.model.ngeom:
+            continue
+        size = np.asarray(other.geom_size[geom], dtype=np.float64)
+        near = _outside(shape, size, _inside(other, geom, corners)) <= SHARE * float(size.max())
+        same = abs(_volume(shape, size) / volume - 1.0) <= SHARE if volume > 0 else False
+        if near and same:
+            name = element.get("name") or place_of(element)
+            return Item(
+                name, element, _unshared(look, element), _replaced(element, shape, other, geom)
+            )
+    return None
+
+
+def _replaced(element: Element, shape: str, other: Any, geom: int) -> tuple[Edit, ...]:
+    count = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(shape, 3)
+    values = (
+        ("type", shape),
+        ("size", _text(other.geom_size[geom][:count])),
+        ("pos", _text(other.geom_pos[geom])),
+        ("quat", _text(other.geom_quat[geom])),
+    )
+    given = {name for name, _ in values}
+    drops = [a.name for a in element.attributes if a.name in _PLACED and a.name not in given]
+    return (*set_attributes(element, values), *(drop_attribute(element, name) for name in drops))
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(f"{float(number):.9g}" for number in numbers)
+
+
+def _unshared(look: Look, element: Element) -> tuple[Element, ...]:
+    """The mesh, if nothing else shows it."""
+    name = element.get("mesh")
+    using = [one for one in look.scene.elements if one.get("mesh") == name and one is not element]
+    if using:
+        return ()
+    return tuple(
+        one
+        for one in look.scene.elements
+        if one.tag == "mesh"
+        and one.above is not None
+        and one.above.tag == "asset"
+        and asset_name(one) == name
+    )
+
+
+def _mesh(model: Any, geom: int) -> tuple[Points, float]:
+    """Corners (n, 3) of a geom's mesh in the frame of its body, m; and its volume, m³."""
+    mesh = int(model.geom_dataid[geom])
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    own = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
+    start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    corners = own[np.asarray(model.mesh_face[start : start + faces])]
+    volume = float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
+    placed = own @ _matrix(model.geom_quat[geom]).T + model.geom_pos[geom]
+    return np.asarray(placed, dtype=np.float64), abs(volume)
+
+
+def _inside(model: Any, geom: int, points: Points) -> Points:
+    """Points of the body's frame in that of a geom."""
+    return np.asarray((points - model.geom_pos[geom]) @ _matrix(model.geom_quat[geom]))
+
+
+def _matrix(quat: Any) -> Points:
+    flat = np.empty(9)
+    mujoco.mju_quat2Mat(flat, np.asarray(quat, dtype=np.float64))
+    return flat.reshape(3, 3)
+
+
+def _outside(shape: str, size: Points, points: Points) -> float:
+    """How far the farthest point is outside of a primitive, m, or more."""
+    flat = np.hypot(points[:, 0], points[:, 1])
+    if shape == "box":
+        away = np.max(np.abs(points) - size, axis=1)
+    elif shape == "sphere":
+        away = np.linalg.norm(points, axis=1) - size[0]
+    elif shape == "cylinder":
+        away = np.maximum(flat - size[0], np.abs(points[:, 2]) - size[1])
+    elif shape == "capsule":
+        away = np.hypot(flat, np.maximum(np.abs(points[:, 2]) - size[1], 0.0)) - size[0]
+    else:
+        away = (np.linalg.norm(points / size, axis=1) - 1.0) * float(size.max())
+    return float(np.max(away))
+
+
+def _volume(shape: str, size: Points) -> float:
+    """m³."""
+    if shape == "box":
+        return float(8 * np.prod(size))
+    if shape == "sphere":
+        return float(4 / 3 * np.pi * size[0] ** 3)
+    if shape == "cylinder":
+        return float(2 * np.pi * size[0] ** 2 * size[1])
+    if shape == "capsule":
+        return float(np.pi * size[0] ** 2 * (2 * size[1] + 4 / 3 * size[0]))
+    return float(4 / 3 * np.pi * np.prod(size))

@@ -1,0 +1,293 @@
+"""A model as its files and as what MuJoCo makes of them.
+
+Entry point: `open_model`; then `ModelText.compiled(edits)`, `ModelText.elements`, `ModelText.ids`.
+
+1. Files that the model includes are found where MuJoCo finds them, and read as markup.
+2. To compile a change, all files are put together to one text. That this is the same model is
+   checked byte by byte on the unchanged one.
+3. Which bodies, geoms, … an element became is found by names: those without one are given one, and
+   the model is compiled once more. An element that is repeated became several.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.numerics.pruning.edits import Edit, applied, set_attributes
+from coursebuild.numerics.pruning.markup import Document, Element, parse_markup
+
+_DEEPEST = 32
+
+Read = Callable[[str], bytes | None]
+"""The bytes of a file by its path from the course's root; nothing where it is not there."""
+Compile = Callable[[bytes], Any]
+"""A text, as if it stood where the model's file stands, to a `mjModel`; ValueError if it cannot."""
+
+
+class ModelTextError(Exception):
+    """A model that the diet cannot work on; the text says why."""
+
+
+KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
+    "body": (mujoco.mjtObj.mjOBJ_BODY, "nbody"),
+    "joint": (mujoco.mjtObj.mjOBJ_JOINT, "njnt"),
+    "geom": (mujoco.mjtObj.mjOBJ_GEOM, "ngeom"),
+    "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
+    "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
+    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
+    "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
+}
+"""Kinds of things that elements become: MuJoCo's number for them, and where it counts them."""
+_BODY_PARTS = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
+_BODY_PARTS |= {"site": "site"}
+_HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
+_SECTIONS = frozenset(("sensor", "actuator", "tendon"))
+_TAG = "diet_"
+
+
+class Thing(Struct, frozen=True):
+    """What an element becomes in the compiled model."""
+
+    kind: str
+    """A key of `KINDS`."""
+    ids: tuple[int, ...]
+
+
+class ModelText:
+    """A model and its files."""
+
+    def __init__(self, documents: Sequence[Document], compile: Compile, *, check: bool) -> None:
+        self.documents = tuple(documents)
+        self.main = documents[0]
+        self.elements: tuple[Element, ...] = tuple(self.main.root.walk())
+        """All of them, in the order in which MuJoCo meets them."""
+        self._compile = compile
+        self.model: Any = self._checked() if check else self.compiled()
+        self._things: dict[int, Thing] = self._named()
+
+    def compiled(self, edits: Iterable[Edit] = ()) -> Any:
+        """A `mjModel` of the files with these changes.
+
+        Raises:
+            ValueError: MuJoCo does not take it, or the changes contradict each other.
+        """
+        return self._compile(self.text(edits))
+
+    def text(self, edits: Iterable[Edit] = ()) -> bytes:
+        """All files put together, with these changes."""
+        by_path: dict[str, list[Edit]] = {}
+        for edit in edits:
+            by_path.setdefault(edit.path, []).append(edit)
+        return _whole(self.main, by_path)
+
+    def files(self, edits: Iterable[Edit]) -> dict[str, bytes]:
+        """The new bytes of each file that these edits change."""
+        by_path: dict[str, list[Edit]] = {}
+        for edit in edits:
+            by_path.setdefault(edit.path, []).append(edit)
+        by_name = {document.path: document for document in self.documents}
+        return {path: applied(by_name[path].data, some) for path, some in by_path.items()}
+
+    def ids(self, element: Element) -> Thing | None:
+        """What an element becomes; `None` where that is not known."""
+        return self._things.get(id(element))
+
+    def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
+        """The numbers of one kind that elements become."""
+        found: set[int] = set()
+        for element in elements:
+            thing = self.ids(element)
+            if thing is not None and thing.kind == kind:
+                found |= set(thing.ids)
+        return frozenset(found)
+
+    def element_of(self, kind: str, number: int) -> Element | None:
+        """The element that became this thing."""
+        for element in self.elements:
+            thing = self.ids(element)
+            if thing is not None and thing.kind == kind and number in thing.ids:
+                return element
+        return None
+
+    def _checked(self) -> Any:
+        model = self._compile(self.main.data)
+        if len(self.documents) > 1:
+            try:
+                same = saved(self.compiled()) == saved(model)
+            except ValueError:
+                same = False
+            if not same:
+                raise ModelTextError("what it includes cannot be put into one text")
+        return model
+
+    def _named(self) -> dict[int, Thing]:
+        """What each element becomes, by its identity; nothing where names cannot be given."""
+        wanted: dict[int, tuple[str, str, bool]] = {}
+        edits: list[Edit] = []
+        inside = self.main.data
+        for number, element in enumerate(self.elements):
+            kind = thing_kind(element)
+            if kind is None:
+                continue
+            name = element.get("name")
+            if not name:
+                name = f"{_TAG}{number}_"
+                while name.encode() in inside:
+                    name += "_"
+                edits += set_attributes(element, (("name", name),))
+            wanted[id(element)] = (kind, name, is_repeated(element))
+        try:
+            model = self.compiled(edits) if edits else self.model
+        except ValueError:
+            return {}
+        if any(getattr(model, size) != getattr(self.model, size) for _, size in KINDS.values()):
+            return {}
+        names = {
+            kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
+            for kind, (code, size) in KINDS.items()
+        }
+        return _assigned(wanted, names)
+
+
+def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
+    """Read a model and what it includes.
+
+    Args:
+        path: the model's file, POSIX, from the course's root.
+        read: gives the bytes of such a file.
+        compile: gives the `mjModel` of a text that would stand there.
+        check: whether its files are those that MuJoCo would include, so that this can be checked.
+
+    Raises:
+        MarkupError: one of the files is no XML.
+        ModelTextError: it cannot be worked on.
+        ValueError: MuJoCo does not compile it.
+    """
+    data = read(path)
+    if data is None:
+        raise ModelTextError(f"there is no file {path}")
+    main = parse_markup(path, data)
+    if main.root.tag != "mujoco":
+        raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
+    documents = [main]
+    _follow(main, str(PurePosixPath(path).parent), read, documents, 0)
+    return ModelText(documents, compile, check=check)
+
+
+def _follow(
+    document: Document, folder: str, read: Read, documents: list[Document], depth: int
+) -> None:
+    for element in list(document.root.walk()):
+        if element.tag != "include" or element.included is not None:
+            continue
+        file = element.get("file") or ""
+        here = str(PurePosixPath(document.path).parent)
+        for candidate in dict.fromkeys(
+            _normal(f"{base}/{file}") if not file.startswith("/") else file
+            for base in (folder, here)
+        ):
+            data = read(candidate)
+            if data is not None:
+                break
+        else:
+            raise ModelTextError(f"it includes {file}, which is not in the course")
+        if depth >= _DEEPEST:
+            raise ModelTextError("its includes are nested too deeply")
+        inner = parse_markup(candidate, data)
+        inner.at = element
+        element.included = inner
+        documents.append(inner)
+        _follow(inner, folder, read, documents, depth + 1)
+
+
+def _normal(path: str) -> str:
+    parts: list[str] = []
+    for part in path.split("/"):
+        if part == ".." and parts and parts[-1] != "..":
+            parts.pop()
+        elif part not in ("", "."):
+            parts.append(part)
+    return "/".join(parts)
+
+
+def _whole(document: Document, edits: Mapping[str, Sequence[Edit]]) -> bytes:
+    """A file with edits, and in place of its includes what these hold."""
+    own = list(edits.get(document.path, ()))
+    removed = [(one.start, one.end) for one in own if not one.new and one.end > one.start]
+    for element in _includes(document.root):
+        if any(start <= element.start and element.end <= end for start, end in removed):
+            continue
+        inner = element.included
+        assert inner is not None
+        text = _whole(inner, edits)
+        root = parse_markup(inner.path, text).root
+        own.append(Edit(document.path, element.start, element.end, text[root.head : root.tail]))
+    return applied(document.data, own)
+
+
+def _includes(element: Element) -> Iterable[Element]:
+    if element.included is not None:
+        yield element
+        return
+    for child in element.children:
+        yield from _includes(child)
+
+
+def saved(model: Any) -> bytes:
+    """A compiled model as bytes."""
+    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def thing_kind(element: Element) -> str | None:
+    """What kind of thing an element becomes; `None` for others, and for templates of things."""
+    above = element.above
+    if above is None:
+        return None
+    if above.tag in _SECTIONS and above.above is not None and above.above.parent is None:
+        return above.tag
+    kind = _BODY_PARTS.get(element.tag)
+    return kind if kind is not None and above.tag in _HOLDERS else None
+
+
+def is_repeated(element: Element) -> bool:
+    """Whether MuJoCo makes several of it, with numbers behind their names."""
+    above = element.above
+    while above is not None:
+        if above.tag == "replicate":
+            return True
+        above = above.above
+    return False
+
+
+def _assigned(
+    wanted: Mapping[int, tuple[str, str, bool]], names: Mapping[str, Sequence[str]]
+) -> dict[int, Thing]:
+    """Elements by the names of what they became; nothing for those whose names two may mean."""
+    found: dict[int, Thing] = {}
+    taken: dict[tuple[str, int], list[int]] = {}
+    places = {kind: {name: i for i, name in enumerate(all)} for kind, all in names.items()}
+    for key, (kind, name, repeated) in wanted.items():
+        ids: tuple[int, ...]
+        if repeated:
+            shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
+            ids = tuple(i for i, one in enumerate(names[kind]) if shape.fullmatch(one))
+        else:
+            ids = (places[kind][name],) if name in places[kind] else ()
+        if ids:
+            found[key] = Thing(kind, ids)
+            for number in ids:
+                taken.setdefault((kind, number), []).append(key)
+    for keys in taken.values():
+        if len(keys) > 1:
+            for key in keys:
+                found.pop(key, None)
+    return found

@@ -1,0 +1,102 @@
+"""Changed models, compiled of the changed text, run and timed beside the original.
+
+Entry point: `Trials`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import mujoco
+from msgspec import Struct
+
+from coursebuild.numerics.pruning.candidates import Item, change
+from coursebuild.numerics.pruning.cases import Case
+from coursebuild.numerics.pruning.compare import Comparison, compare
+from coursebuild.numerics.pruning.edits import Edit
+from coursebuild.numerics.pruning.mapping import Mapping as Left
+from coursebuild.numerics.pruning.mapping import fits, mapping_without
+from coursebuild.numerics.pruning.model_text import ModelText, saved
+from coursebuild.numerics.pruning.timing import Clock, Ratio, time_ratio
+from coursebuild.numerics.reports.diet import Saving
+
+
+class Trial(Struct, frozen=True, eq=False):
+    """A changed model, and how it did."""
+
+    edits: tuple[Edit, ...]
+    model: Any
+    left: Left
+    result: Comparison
+
+
+class NotTriedError(Exception):
+    """A change that makes no model, or one that cannot be compared."""
+
+
+class Trials:
+    """Tries a model without things, in its scenarios."""
+
+    def __init__(
+        self, scene: ModelText, cases: Sequence[Case], clock: Clock, *, quick: bool
+    ) -> None:
+        self.scene = scene
+        self.cases = cases
+        self.clock = clock
+        self.quick = quick
+
+    def run(self, items: Iterable[Item]) -> Trial:
+        """The model without these, in all scenarios.
+
+        Raises:
+            NotTriedError: it is no model, or cannot be compared.
+        """
+        edits, model, left = self.changed(items)
+        return Trial(edits, model, left, self.compared(model, left))
+
+    def changed(self, items: Iterable[Item]) -> tuple[tuple[Edit, ...], Any, Left]:
+        """The edits without these, the model that they give, and what is left of the original.
+
+        Raises:
+            NotTriedError: it is no model, or not the one that it should be.
+        """
+        scene = self.scene
+        edits, gone = change(scene, items)
+        left = mapping_without(scene.model, gone)
+        try:
+            model = scene.compiled(edits)
+        except ValueError as error:
+            raise NotTriedError(" ".join(str(error).split())) from None
+        if not fits(left, scene.model, model):
+            raise NotTriedError("what is left cannot be told from what is gone")
+        return edits, model, left
+
+    def compared(self, model: Any, left: Left) -> Comparison:
+        """How a changed model does.
+
+        Raises:
+            NotTriedError: that cannot be compared.
+        """
+        try:
+            return compare(self.scene.model, model, left, self.cases)
+        except (ValueError, mujoco.FatalError) as error:
+            raise NotTriedError(" ".join(str(error).split())) from None
+
+    def ratio(self, model: Any, left: Left) -> Ratio | None:
+        """Time of the original over that of a changed model; `None` where it cannot be told."""
+        whole = self.scene.model
+        try:
+            return time_ratio(whole, model, left, self.cases, self.clock, quick=self.quick)
+        except (ValueError, mujoco.FatalError):
+            return None
+
+    def saving(self, trial: Trial, ratio: Ratio | None) -> Saving:
+        """What a change saves, in time and bytes."""
+        files = self.scene.files(trial.edits)
+        before = {one.path: len(one.data) for one in self.scene.documents}
+        text = sum(before[path] - len(data) for path, data in files.items())
+        memory = len(saved(self.scene.model)) - len(saved(trial.model))
+        if ratio is None:
+            return Saving(None, None, False, memory, text)
+        return Saving(ratio.value, ratio.spread, ratio.certain, memory, text)

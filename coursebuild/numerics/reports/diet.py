@@ -1,0 +1,161 @@
+"""What a model holds that its scenarios do not need.
+
+Entry point: `DietReport`.
+
+No number is infinite or missing by a code of its own: `None` stands for what is not there, so that
+it can be kept as JSON.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from coursebuild.numerics.reports.bench import Machine
+
+IDENTICAL = "bit-identical"
+"""Without it every bit is the same, and a reason says why that does not hang on the scenarios."""
+EQUAL = "equal within tolerance"
+UNTOUCHED = "never touched in these runs"
+"""Without it every bit was the same, and no reason says that it must be."""
+CHANGES = "changes the result"
+LABELS = (IDENTICAL, EQUAL, UNTOUCHED, CHANGES)
+
+
+class Place(Struct, frozen=True):
+    """An element of the model."""
+
+    name: str
+    """What it is called, or its way from the root."""
+    element: str
+    """The way to it from the root, such as `mujoco/worldbody/body[@name="arm"]/geom[2]`."""
+    path: str
+    """The file, POSIX, from the course's root."""
+    line: int
+    """From 1."""
+    column: int
+    """From 1, in characters."""
+
+
+class TextEdit(Struct, frozen=True):
+    """A part of a file replaced."""
+
+    path: str
+    line: int
+    column: int
+    start: int
+    """Bytes from the beginning of the file."""
+    end: int
+    old: str
+    new: str
+
+
+class Saving(Struct, frozen=True):
+    """What a change saves; times are those of one machine."""
+
+    time: float | None
+    """Time of the model as it is over that of the changed one; `None` where it was not measured."""
+    spread: float | None
+    """How far repeated ratios lie apart: half of their middle half, relative."""
+    certain: bool
+    """Whether the ratio is another than 1 beyond what can be told."""
+    memory: int
+    """Bytes of the compiled model (an MJB file)."""
+    text: int
+    """Bytes of the MJCF."""
+
+
+class Finding(Struct, frozen=True):
+    """What a model could be without."""
+
+    kind: str
+    """By which it is kept, such as `sensor-unread`."""
+    message: str
+    places: tuple[Place, ...]
+    """Empty where it is about the model as a whole."""
+    label: str
+    """One of `LABELS`."""
+    difference: float
+    """The largest within 50 ms, relative to a number's size where that is over 1; 0 where all bits
+    are the same."""
+    scenarios: tuple[str, ...]
+    """In which it was tried."""
+    proof: str
+    """Why it holds whatever happens; empty where only runs speak for it."""
+    setting: bool
+    """Whether it only chooses between ways of computing: no fault, and a matter of time."""
+    saving: Saving
+    edits: tuple[TextEdit, ...]
+    fixable: bool
+    """Whether `--fix` makes the change."""
+    unfixed: str
+    """Why it does not; empty where it does."""
+    kept: str
+    """The reason for which it stays; empty where there is none."""
+    doubt: str = ""
+    """Who may need it all the same; empty where nobody does."""
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is a fault of the model: nothing explains it."""
+        excused = self.kept or self.setting or self.doubt
+        return not excused and self.label in (IDENTICAL, EQUAL)
+
+
+class Tried(Struct, frozen=True):
+    """What could be left out and is no finding: it is needed, or saves no time."""
+
+    kind: str
+    message: str
+    places: tuple[str, ...]
+    difference: float | None
+    """As of a finding; `None` where the changed run was lost, or there was none."""
+    reason: str
+    """Why it was not run; empty where it was, and changed the result."""
+
+
+class DietScenario(Struct, frozen=True):
+    """A scenario that the model was tried in."""
+
+    name: str
+    steps: int
+    status: str
+    """`ok`, or how the run of the model as it is was lost: then nothing is claimed from it."""
+    reasons: tuple[str, ...]
+
+
+class StaleKeep(Struct, frozen=True):
+    """An entry `[[keep]]` that keeps nothing any more."""
+
+    finding: str
+    path: str
+    line: int
+    column: int
+
+
+class DietReport(Struct, frozen=True):
+    """Everything that was found in a model."""
+
+    model: str
+    """Its file below `models/`, without suffix, POSIX."""
+    digest: str
+    """Of all in the course that it depends on: the model with its files, and who reads it."""
+    quick: bool
+    machine: Machine
+    readers: tuple[str, ...]
+    """The files of the course that use the model."""
+    scenarios: tuple[DietScenario, ...]
+    findings: tuple[Finding, ...]
+    tried: tuple[Tried, ...]
+    fixed: Saving | None
+    """What all that `--fix` changes saves together; `None` where it changes nothing."""
+    slim: Saving | None
+    """What all findings save together that are no settings and are not kept."""
+    slim_difference: float | None
+    """How far the model without all of them is from the model as it is."""
+    stale: tuple[StaleKeep, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is to be done."""
+        lost = any(one.status != "ok" for one in self.scenarios)
+        return not (lost or self.stale or any(one.counts for one in self.findings))

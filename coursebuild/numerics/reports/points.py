@@ -1,0 +1,259 @@
+"""What of a scenario's report is drawn: which point stands for which row, and where.
+
+Entry points: `chart(report, quantity)`, `quantities(report)`, `setting_text`, `status_text`
+and other words.
+
+1. One line stands for an integrator, over those rows that have the scene's own solver, iterations
+   and cone; the rows with others are points beside it.
+2. A row that was not timed is put where its number of steps says: time goes by steps.
+3. Where nothing at all was timed, the number of steps stands in for the cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from coursebuild.numerics.reports.bench import ScenarioReport, Setting, WorkPrecisionRow
+
+KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
+"""Integrators in the order in which they are told, and keep their colour and mark."""
+FLOORS = 10.0
+"""No error under so many floors of the reference is given."""
+FEWEST_STEPS = 20
+"""Steps of a scenario at the longest timestep of which it is tried whether it is stable."""
+
+
+class Quantity(Struct, frozen=True):
+    """An error that can be drawn."""
+
+    name: str
+    """The field of a row: `figure`, `seen`, `position`, `attitude` or `velocity`."""
+    label: str
+    """What it is, with its unit."""
+    floor: float
+    """What the reference may be wrong by in it; 0 where that is not said."""
+
+    @property
+    def least(self) -> float:
+        """No error below this is given."""
+        return FLOORS * self.floor
+
+    def of(self, row: WorkPrecisionRow) -> float | None:
+        """The largest over the horizon; `None` where the row has none."""
+        found: tuple[float, float] | float | None = getattr(row, self.name)
+        value = found[0] if isinstance(found, tuple) else found
+        return None if value is None or not math.isfinite(value) else value
+
+
+class Point(Struct, frozen=True):
+    """A row that is drawn."""
+
+    row: int
+    cost: float
+    """Relative to the scene's own setting, or steps where nothing was timed."""
+    timed: bool
+    """Whether the cost was measured, and not taken from the number of steps."""
+    error: float | None
+    """`None` for a run that was lost."""
+
+
+class Line(Struct, frozen=True):
+    """What is drawn of an integrator."""
+
+    integrator: str
+    number: int
+    """Which colour, dash and mark."""
+    points: tuple[Point, ...]
+    """Joined by a line, by timestep."""
+    others: tuple[Point, ...]
+    """With another solver, iterations or cone."""
+    lost: tuple[Point, ...]
+    """Runs without an error to show: diverged, reset, or grown."""
+    boundary: float | None
+    """The cost at the largest stable timestep; `None` where there is none, or it is not known."""
+    stable: float | None
+    """The largest stable timestep, s; `None` as above, 0 where none tried is stable."""
+
+
+class Chart(Struct, frozen=True):
+    """What is drawn of a scenario."""
+
+    quantity: Quantity
+    lines: tuple[Line, ...]
+    timed: bool
+    """Whether any cost was measured."""
+
+
+def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
+    """The errors that some row has, what the scenario declares to be measured first."""
+    known = (
+        Quantity("figure", report.figure or "figure", 0.0),
+        Quantity("seen", "what is seen (1: just visible)", 0.0),
+        Quantity("position", "position (m or rad)", report.floor),
+        Quantity("attitude", "attitude (rad)", report.floor),
+        Quantity("velocity", "velocity (m/s or rad/s)", report.velocity_floor),
+    )
+    return tuple(one for one in known if any(one.of(row) is not None for row in report.rows))
+
+
+def telling(report: ScenarioReport) -> Quantity | None:
+    """The error to show where only one is: that of the front, else the first beyond its floor.
+
+    `None` where there is none at all.
+    """
+    found = quantities(report)
+    for one in found:
+        least = one.least * (1 + 1e-9)
+        if any((error := one.of(row)) is not None and error > least for row in report.rows):
+            return one
+    return found[0] if found else None
+
+
+def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
+    """What to draw of an error."""
+    rows = report.rows
+    timed = any(_positive(row.cost) for row in rows)
+    usual = usual_setting(rows)
+    kind = None if usual is None else _kind(usual)
+    names = sorted({row.setting.integrator for row in rows}, key=_rank)
+    stable = {one.integrator: one.largest for one in report.stable}
+    others = [name for name in names if name not in KNOWN]
+    lines = []
+    for name in names:
+        own = [n for n, row in enumerate(rows) if row.setting.integrator == name]
+        places = {n: _place(rows, n, own, timed=timed) for n in own}
+        shown = [Point(n, *places[n], _error(quantity, rows[n])) for n in own]
+        kept = [one for one in shown if one.error is not None]
+        line = [one for one in kept if _kind(rows[one.row].setting) == kind]
+        number = KNOWN.index(name) if name in KNOWN else len(KNOWN) + others.index(name)
+        largest = stable.get(name)
+        lines.append(
+            Line(
+                name,
+                number,
+                tuple(sorted(line, key=lambda one: -rows[one.row].setting.timestep)),
+                tuple(one for one in kept if one not in line),
+                tuple(one for one in shown if one.error is None),
+                _boundary(rows, [(n, places[n][0]) for n in own], largest),
+                largest,
+            )
+        )
+    return Chart(quantity, tuple(lines), timed)
+
+
+def is_cut_short(report: ScenarioReport) -> bool:
+    """Whether it is the duration that ended the search for stable timesteps."""
+    longest = report.duration / FEWEST_STEPS
+    return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
+
+
+def _rank(name: str) -> tuple[int, str]:
+    return (KNOWN.index(name) if name in KNOWN else len(KNOWN), name)
+
+
+def _positive(value: float | None) -> bool:
+    return value is not None and 0 < value < math.inf
+
+
+def _kind(setting: Setting) -> tuple[str, int, str]:
+    """All of a setting but integrator and timestep."""
+    return setting.solver, setting.iterations, setting.cone
+
+
+def usual_setting(rows: Sequence[WorkPrecisionRow]) -> Setting | None:
+    """One with the solver, iterations and cone of the scene itself; of most rows where it has none.
+
+    `None` where there are no rows.
+    """
+    for row in rows:
+        if row.own:
+            return row.setting
+    counted = Counter(_kind(row.setting) for row in rows)
+    most = max(sorted(counted), key=counted.__getitem__, default=None)
+    return next((row.setting for row in rows if _kind(row.setting) == most), None)
+
+
+def _error(quantity: Quantity, row: WorkPrecisionRow) -> float | None:
+    """Of a run that ended well; any other's says nothing."""
+    return quantity.of(row) if row.status == "ok" else None
+
+
+def _place(
+    rows: Sequence[WorkPrecisionRow], n: int, own: Sequence[int], *, timed: bool
+) -> tuple[float, bool]:
+    """What a row costs, and whether that was measured."""
+    row = rows[n]
+    if row.cost is not None and _positive(row.cost):
+        return row.cost, True
+    steps = max(row.steps, 1)
+    if not timed:
+        return float(steps), False
+
+    def like(other: int) -> tuple[bool, bool, float]:
+        """The row to go by: of the same integrator and solver, and about as many steps."""
+        away = abs(math.log(max(rows[other].steps, 1) / steps))
+        return other not in own, _kind(rows[other].setting) != _kind(row.setting), away
+
+    nearest = min((m for m in range(len(rows)) if _positive(rows[m].cost)), key=like)
+    cost = rows[nearest].cost
+    assert cost is not None
+    return cost * steps / max(rows[nearest].steps, 1), False
+
+
+def _boundary(
+    rows: Sequence[WorkPrecisionRow], places: Sequence[tuple[int, float]], largest: float | None
+) -> float | None:
+    """The cost at a timestep, by that of the nearest row."""
+    if largest is None or not 0 < largest < math.inf or not places:
+        return None
+    n, cost = min(
+        places, key=lambda place: abs(math.log(rows[place[0]].setting.timestep / largest))
+    )
+    return cost * rows[n].setting.timestep / largest
+
+
+def seconds_text(value: float, digits: int = 6) -> str:
+    """A short time with its unit."""
+    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
+        if value >= size * 0.9999995:
+            return f"{value / size:.{digits}g} {unit}"
+    return f"{value:.{digits}g} s"
+
+
+def setting_text(setting: Setting, like: Setting | None = None) -> str:
+    """A setting in words; solver, iterations and cone only where they differ from those of `like`.
+
+    All that there is where nothing is given.
+    """
+    parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
+    return ", ".join([*parts, *solving_parts(setting, like)])
+
+
+def solving_parts(setting: Setting, like: Setting | None = None) -> list[str]:
+    """Solver, iterations and cone of a setting in words; see `setting_text`."""
+    parts = []
+    if setting.solver and (like is None or setting.solver != like.solver):
+        parts.append(setting.solver)
+    if setting.iterations and (like is None or setting.iterations != like.iterations):
+        many = "iteration" if setting.iterations == 1 else "iterations"
+        parts.append(f"{setting.iterations} {many}")
+    if setting.cone and (like is None or setting.cone != like.cone):
+        parts.append(f"{setting.cone} cone")
+    return parts
+
+
+_STATUS = {
+    "ok": "ok",
+    "slow-growth": "grew",
+    "diverged": "diverged",
+    "reset": "reset",
+}
+
+
+def status_text(status: str) -> str:
+    """How a run went, in words."""
+    return _STATUS.get(status, status)

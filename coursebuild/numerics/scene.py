@@ -1,0 +1,248 @@
+"""A model in one of its scenarios, with everything that its author left out filled in.
+
+Entry points: `scenes(model, declared, quick)`, `Scene`.
+
+1. Without declarations each keyframe is a scenario; without a keyframe, the model's own state.
+2. Times are whole numbers of the model's own timestep: a sample is some of them, a hold and the
+   duration are some samples.
+3. The ladder of timesteps is geometric about the model's own; each divides the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.model.scenarios import (
+    Declarations,
+    DeclaredScenario,
+    Visible,
+    keyframe_scenarios,
+)
+from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.source import Span
+
+DURATION = 2.0
+"""Seconds of a scenario that does not say how long it takes."""
+MOST_STEPS = 20_000
+"""Steps under the model's own timestep that it takes at most."""
+LOOKS = 100
+"""Samples that a scenario has where its author does not say, about."""
+FEWEST = 25
+"""Samples that it has then at least."""
+LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
+"""Powers of 2 by which timesteps differ from the model's own."""
+
+
+LONGEST = 10_000_000
+"""Steps of a scenario at its shortest timestep, at most: more would take hours."""
+
+
+class SceneError(Exception):
+    """A scenario does not fit its model; `span` is where it says so."""
+
+    def __init__(self, message: str, span: Span | None = None, help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.span = span
+        self.help = help
+
+
+class Scene(Struct, frozen=True):
+    """A scenario of a model, ready to run."""
+
+    name: str
+    title: str
+    scenario: Scenario
+    timesteps: tuple[float, ...]
+    """Rising, the model's own among them, s."""
+    own: float
+    """The model's own timestep, s."""
+    visible: Visible
+    declared: DeclaredScenario | None
+    """`None` for a scenario that nobody wrote."""
+
+
+def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) -> tuple[Scene, ...]:
+    """The scenarios of a model (`mjModel`); none of one in which nothing can move.
+
+    Raises:
+        SceneError: one does not fit the model.
+    """
+    powers = QUICK_LADDER if quick else LADDER
+    if not model.nv:
+        if declared is not None and declared.scenarios:
+            raise SceneError("nothing can move in the model", declared.scenarios[0].span)
+        return ()
+    if declared is not None and declared.scenarios:
+        visible = declared.visible
+        return tuple(_declared(model, one, visible, powers) for one in declared.scenarios)
+    visible = Visible() if declared is None else declared.visible
+    step = float(model.opt.timestep)
+    scenario = _timed(step, None, None, None, ())
+    names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
+    found = []
+    for key in range(int(model.nkey)) or (-1,):
+        name = names[max(key, 0)]
+        title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
+        one = Scenario(scenario.duration, scenario.sample, keyframe=key)
+        found.append(Scene(name, title, one, _ladder(one, step, powers), step, visible, None))
+    return tuple(found)
+
+
+def thickness(model: Any) -> Array:
+    """Half the thickness of every geom, and infinity for what is none: (ngeom + 1,) m.
+
+    That of a plane or a height field is infinite: nothing is on its other side.
+    """
+    half = np.full(int(model.ngeom) + 1, np.inf)
+    bottomless = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    for geom in range(int(model.ngeom)):
+        if int(model.geom_type[geom]) not in bottomless:
+            half[geom] = float(model.geom_aabb[geom, 3:].min()) or np.inf
+    return half
+
+
+def _declared(
+    model: Any, declared: DeclaredScenario, visible: Visible, powers: Sequence[int]
+) -> Scene:
+    key = _keyframe(model, declared)
+    for name, given, wanted in (
+        ("qpos", declared.qpos, model.nq),
+        ("qvel", declared.qvel, model.nv),
+        ("controls", declared.controls[0] if declared.controls else (), model.nu),
+    ):
+        if given and len(given) != wanted:
+            message = f"`{name}` has {len(given)} numbers, and the model takes {wanted}"
+            raise SceneError(message, declared.place(name))
+    step = float(model.opt.timestep)
+    times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
+    scenario = Scenario(
+        duration=times.duration,
+        sample=times.sample,
+        qpos=_unit(model, declared.qpos),
+        qvel=declared.qvel,
+        controls=declared.controls,
+        hold=times.hold,
+        keyframe=key,
+    )
+    ladder = _ladder(scenario, step, powers)
+    if declared.timesteps:
+        ladder = _chosen(scenario, step, declared)
+    if scenario.duration > LONGEST * ladder[0]:
+        message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
+        place = declared.place("duration" if declared.duration is not None else "timesteps")
+        raise SceneError(message, place, "measure a shorter time, or longer timesteps")
+    title = declared.title or declared.name
+    return Scene(declared.name, title, scenario, ladder, step, visible, declared)
+
+
+def _keyframe(model: Any, declared: DeclaredScenario) -> int:
+    wanted = declared.keyframe
+    if wanted is None:
+        return -1
+    if isinstance(wanted, int):
+        if wanted >= model.nkey:
+            raise SceneError(f"the model has no keyframe {wanted}", declared.place("keyframe"))
+        return wanted
+    found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, wanted))
+    if found < 0:
+        raise SceneError(f"the model has no keyframe `{wanted}`", declared.place("keyframe"))
+    return found
+
+
+def _unit(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
+    """Positions with quaternions of length 1, which an author need not compute."""
+    if not qpos:
+        return ()
+    found = np.array(qpos)
+    mujoco.mj_normalizeQuat(model, found)
+    return tuple(found.tolist())
+
+
+# ----------------------------------------------------------------------------------------- times
+
+
+def _timed(
+    step: float,
+    duration: float | None,
+    sample: float | None,
+    hold: float | None,
+    controls: tuple[tuple[float, ...], ...],
+) -> Scenario:
+    """The times of a scenario, as whole numbers of the model's timestep.
+
+    Raises:
+        SceneError: what is given is no whole number of timesteps.
+    """
+    given = (("duration", duration), ("sample", sample), ("hold", hold))
+    whole = {name: _steps(length, step, name) for name, length in given if length is not None}
+    held, looks = whole.get("hold"), whole.get("sample")
+    last = held * len(controls) if held is not None and len(controls) > 1 else 0
+    total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
+    if looks is None:
+        basis = math.gcd(*(whole[name] for name in ("duration", "hold") if name in whole))
+        looks = _looks(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))
+    total = whole.get("duration") or looks * max(FEWEST, math.ceil(max(last, total) / looks))
+    if held is not None and "duration" not in whole:
+        total = held * math.ceil(total / held)
+    return Scenario(
+        duration or _decimal(total * step),
+        sample or _decimal(looks * step),
+        hold=0.0 if held is None else hold or _decimal(held * step),
+    )
+
+
+def _decimal(seconds: float) -> float:
+    """A product of decimal fractions as the decimal fraction that it is meant to be."""
+    meant = float(f"{seconds:.12g}")
+    return meant if abs(meant - seconds) <= 1e-15 * seconds else seconds
+
+
+def _steps(length: float, step: float, name: str) -> int:
+    count = round(length / step)
+    if count < 1 or abs(count * step - length) > 1e-9 * length:
+        message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+        raise SceneError(message)
+    return count
+
+
+def _looks(basis: int, total: int) -> int:
+    """The steps of a sample: a divisor of `basis`, near the usual number of looks.
+
+    Timesteps a few times as long should divide it too.
+    """
+    small = [n for n in range(1, math.isqrt(basis) + 1) if basis % n == 0]
+    divisors = {*small, *(basis // n for n in small)}
+
+    def badness(steps: int) -> float:
+        odd = 3 - min(3, (steps & -steps).bit_length() - 1)
+        away = math.log(steps * LOOKS / total)
+        return (away if away > 0 else -away / 2) + 0.7 * odd
+
+    return min(sorted(divisors), key=badness)
+
+
+def _ladder(scenario: Scenario, own: float, powers: Sequence[int]) -> tuple[float, ...]:
+    kept = {round(scenario.sample / own): own}
+    for power in powers:
+        count = max(1, round(scenario.sample / (own * 2.0**power)))
+        kept.setdefault(count, _decimal(scenario.sample / count))
+    return tuple(kept[count] for count in sorted(kept, reverse=True))
+
+
+def _chosen(scenario: Scenario, own: float, declared: DeclaredScenario) -> tuple[float, ...]:
+    kept = {round(scenario.sample / own): own}
+    for step in declared.timesteps:
+        count = round(scenario.sample / step)
+        if count < 1 or abs(count * step - scenario.sample) > 1e-9 * scenario.sample:
+            message = f"the timestep {step:g} s does not divide the sample, {scenario.sample:g} s"
+            help = "give `sample` a value that all timesteps divide"
+            raise SceneError(message, declared.place("timesteps"), help)
+        kept.setdefault(count, step)
+    return tuple(kept[count] for count in sorted(kept, reverse=True))

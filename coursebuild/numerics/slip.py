@@ -1,0 +1,92 @@
+"""How far contacts creep that should stick.
+
+Entry points: `sticking(model, scene, states)`, `slip(model, scene, states, sticks)`.
+
+1. In the reference, two geoms stick to each other between two samples where a point in which they
+   touch hardly moves along the surface, at both of them. A body that rolls sticks too.
+2. In another run the speed of that point along the surface, added up over the same time, is creep:
+   by the solver, by soft contact, or by the timestep.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+
+from coursebuild.numerics.engine import begun
+from coursebuild.numerics.forward import States
+from coursebuild.numerics.pilot import Bounded
+from coursebuild.numerics.problem import Array
+from coursebuild.numerics.scene import Scene
+
+Pair: TypeAlias = tuple[int, int]
+"""Two geoms, by number."""
+Sticks: TypeAlias = tuple[frozenset[Pair], ...]
+"""For every interval between two samples, and that before the first, the pairs that stick in it."""
+
+SLOW = 0.01
+"""A point that sticks moves slower than this part of the speed of a fall through the model's
+extent."""
+_STILL = 1e-3
+"""m/s, where nothing falls."""
+
+
+def sticking(model: Any, scene: Scene, states: States) -> Sticks:
+    """What sticks in a motion, from sample to sample."""
+    limit = SLOW * math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
+    speeds = speeds_of(model, scene, states)
+    slow = [
+        frozenset(pair for pair, speed in found.items() if speed < max(limit, _STILL))
+        for found in speeds
+    ]
+    return tuple(slow[max(0, i - 1)] & slow[i] for i in range(len(slow)))
+
+
+def slip(model: Any, scene: Scene, states: States, sticks: Sticks) -> float:
+    """The largest creep, m, of a pair that sticks in the reference."""
+    total: dict[Pair, float] = {}
+    before = 0.0
+    for time, found, pairs in zip(
+        states.times.tolist(), speeds_of(model, scene, states), sticks, strict=False
+    ):
+        for pair in pairs:
+            total[pair] = total.get(pair, 0.0) + found.get(pair, 0.0) * (time - before)
+        before = time
+    return max(total.values(), default=0.0)
+
+
+def speeds_of(model: Any, scene: Scene, states: States) -> list[dict[Pair, float]]:
+    """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
+    data = begun(Bounded(scene.scenario, math.inf, math.inf), model)
+    found = []
+    for qpos, qvel, act in zip(states.qpos, states.qvel, states.act, strict=True):
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        found.append(_touching(model, data))
+    return found
+
+
+def _touching(model: Any, data: Any) -> dict[Pair, float]:
+    least: dict[Pair, float] = {}
+    for contact in data.contact[: data.ncon]:
+        first, second = (int(geom) for geom in contact.geom)
+        if first < 0 or second < 0 or contact.dist > 0 or contact.dim < 3:
+            continue  # a flex, or not yet touching, or without friction
+        relative = _at(model, data, second, contact.pos) - _at(model, data, first, contact.pos)
+        normal = contact.frame[:3]
+        speed = float(np.linalg.norm(relative - normal * (normal @ relative)))
+        pair = (first, second)
+        least[pair] = min(speed, least.get(pair, math.inf))
+    return least
+
+
+def _at(model: Any, data: Any, geom: int, point: Array) -> Array:
+    """The velocity (3,) of a geom's material at a point of the world, m/s."""
+    found = np.zeros(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, found, 0)
+    velocity: Array = found[3:] + np.cross(found[:3], point - data.geom_xpos[geom])
+    return velocity

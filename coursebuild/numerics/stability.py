@@ -1,0 +1,228 @@
+"""The largest stable timestep of a problem for each integrator, and how fast it grows beyond.
+
+Entry points: `boundary(problem, integrator)`, `survey(problem)`; `scan(attempt, search)` and
+`attempted(setup, model, steps)` for what is no hard case.
+
+1. A grid of timesteps, even in the logarithm, is tried from end to end: stability need not be
+   monotone, and a bisection alone would find some boundary, not the first.
+2. The first boundary is then bisected.
+3. Stable is what stays within the problem's bounds, by the same judgement that every run gets. What
+   is just beyond the boundary grows slowly, so the number of steps sets the resolution.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.numerics.detector import Peaks, Status, judge, observe
+from coursebuild.numerics.engine import begun, bounds_of, compiled, watched
+from coursebuild.numerics.problem import (
+    INTEGRATORS,
+    STANDARD,
+    Array,
+    Integrator,
+    Limit,
+    Problem,
+    Scenario,
+    Setup,
+)
+
+GRID = 12
+"""Timesteps tried in a decade."""
+RESOLUTION = 1e-4
+"""Relative width at which the bisection ends."""
+_LOOKS = 20
+
+
+class Trial(Struct, frozen=True):
+    """One timestep tried."""
+
+    timestep: float
+    """s."""
+    status: Status
+    growth: float
+    """By what the state is multiplied in a step, from half the run to its end; 1 is neither growth
+    nor decay, and no number where the run was lost before."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether the run stayed within the problem's bounds."""
+        return self.status is Status.OK
+
+
+class Boundary(Struct, frozen=True):
+    """Where an integrator ceases to be stable."""
+
+    integrator: Integrator
+    largest: float
+    """The largest stable timestep below which all tried are stable, s; 0 where none is, infinite
+    where all tried are."""
+    monotone: bool
+    """Whether every timestep beyond is unstable."""
+    islands: tuple[float, ...]
+    """Timesteps beyond the first boundary that are stable all the same, s."""
+    beyond: Trial | None
+    """The first unstable one of the grid."""
+    theory: Limit | None
+    searched: tuple[float, float]
+    """Timesteps that were tried, from and to, s."""
+
+    @property
+    def difference(self) -> float | None:
+        """Measured against theory, relative; `None` where there is none or it is not finite."""
+        if self.theory is None or not 0 < self.theory.timestep < math.inf:
+            return None
+        if not 0 < self.largest < math.inf:
+            return math.inf
+        return self.largest / self.theory.timestep - 1
+
+
+def survey(problem: Problem) -> tuple[Boundary, ...]:
+    """The boundaries of all integrators for which they may differ.
+
+    None where the problem names no timesteps to look between.
+    """
+    if problem.search is None:
+        return ()
+    chosen = INTEGRATORS if _damped(problem) else STANDARD
+    return tuple(boundary(problem, integrator) for integrator in chosen)
+
+
+def _damped(problem: Problem) -> bool:
+    """Whether `eulerdamp` has anything to do: only joints with damping know it."""
+    return bool(np.any(compiled(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
+
+
+def boundary(problem: Problem, integrator: Integrator) -> Boundary:
+    """Look for the largest stable timestep.
+
+    Raises:
+        ValueError: the problem names no timesteps to look between.
+    """
+    if problem.search is None:
+        raise ValueError(f"{problem.name} has no range of timesteps to search")
+    found = scan(lambda step: attempt(problem, integrator, step), problem.search)
+    theory = None if problem.limit is None else problem.limit(integrator)
+    return Boundary(
+        integrator,
+        found.largest,
+        not found.islands,
+        found.islands,
+        found.beyond,
+        theory,
+        problem.search,
+    )
+
+
+class Scan(Struct, frozen=True):
+    """Where timesteps cease to be stable."""
+
+    largest: float
+    """s, as `Boundary.largest`."""
+    islands: tuple[float, ...]
+    """Timesteps beyond that are stable all the same, s."""
+    beyond: Trial | None
+    """The first unstable one of the grid."""
+
+
+def scan(
+    attempt: Callable[[float], Trial],
+    search: tuple[float, float],
+    *,
+    grid: int = GRID,
+    resolution: float = RESOLUTION,
+) -> Scan:
+    """Look for the largest stable timestep between two (s): on a grid, then by bisection.
+
+    `grid`: timesteps tried in a decade; `resolution`: relative width at which bisection ends.
+    """
+    low, high = search
+    count = max(2, round(grid * math.log10(high / low)) + 1)
+    steps = np.geomspace(low, high, count).tolist()
+    trials = [attempt(step) for step in steps]
+    first = next((i for i, trial in enumerate(trials) if not trial.stable), None)
+    if first is None:
+        return Scan(math.inf, (), None)
+    islands = tuple(trial.timestep for trial in trials[first:] if trial.stable)
+    largest = 0.0
+    if first > 0:
+        largest = _bisected(attempt, steps[first - 1], steps[first], resolution)
+    return Scan(largest, islands, trials[first])
+
+
+def _bisected(
+    attempt: Callable[[float], Trial], low: float, high: float, resolution: float
+) -> float:
+    while high / low > 1 + resolution:
+        middle = math.sqrt(low * high)
+        if attempt(middle).stable:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Trial:
+    """Run the problem's steps at a timestep (s), whatever its duration."""
+    return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.steps)
+
+
+def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = None) -> Trial:
+    """Make so many steps with a model's own timestep; `thickness` as for `detector.peaks`.
+
+    A command changes with the first step that begins after its time: the timestep need not divide
+    the hold.
+    """
+    data = begun(setup, model)
+    timestep = float(model.opt.timestep)
+    chunk = max(1, steps // _LOOKS)
+    sizes: list[float] = []
+    seen, total = Peaks(), 0
+    for _ in range(_LOOKS):
+        for part in _parts(setup.scenario, timestep, total, chunk):
+            _command(setup.scenario, data, total * timestep)
+            seen, done = watched(model, data, part, seen, thickness)
+            total += done
+        if not seen.finite:
+            break
+        sizes.append(_size(data))
+    elapsed = total * timestep
+    judgement = judge(observe(model, data, elapsed, seen=seen, bounds=bounds_of(setup)))
+    return Trial(timestep, judgement.status, _growth(sizes, chunk))
+
+
+def _parts(scenario: Scenario, timestep: float, done: int, count: int) -> list[int]:
+    """Steps cut at changes of the command."""
+    if len(scenario.controls) < 2:
+        return [count]
+    end = done + count
+    edges = {done, end}
+    for index in range(1, len(scenario.controls)):
+        edges.add(min(max(math.ceil(index * scenario.hold / timestep - 1e-9), done), end))
+    cuts = sorted(edges)
+    return [b - a for a, b in itertools.pairwise(cuts)]
+
+
+def _command(scenario: Scenario, data: Any, time: float) -> None:
+    if scenario.controls:
+        index = int(time / scenario.hold + 1e-9) if scenario.hold else 0
+        data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]
+
+
+def _size(data: object) -> float:
+    velocity: object = data.qvel  # type: ignore[attr-defined]
+    with np.errstate(over="ignore"):
+        return float(np.linalg.norm(np.asarray(velocity)))
+
+
+def _growth(sizes: list[float], chunk: int) -> float:
+    half = len(sizes) // 2
+    if half < 1 or not 0 < sizes[half - 1] < math.inf or not 0 < sizes[-1] < math.inf:
+        return math.nan
+    return float((sizes[-1] / sizes[half - 1]) ** (1 / ((len(sizes) - half) * chunk)))

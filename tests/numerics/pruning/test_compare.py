@@ -1,0 +1,172 @@
+"""Two models side by side: the same bits, nearly the same, or not; and how their times compare."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from coursebuild.model.scenarios import Declarations
+from coursebuild.numerics.pruning.cases import Case, begin, cases, command
+from coursebuild.numerics.pruning.compare import TOLERANCE, compare, watch
+from coursebuild.numerics.pruning.mapping import Gone, Mapping, fits, mapping_without, transfer
+from coursebuild.numerics.pruning.timing import time_ratio
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations
+
+DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
+  <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
+  </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
+CHAOS = Case("go", 0, (), (), 15_000, (), 0, False)
+
+
+def double(mass: float = 1.0) -> Any:
+    return mujoco.MjModel.from_xml_string(DOUBLE.format(mass=mass))
+
+
+def same(model: Any) -> Mapping:
+    return mapping_without(model, Gone())
+
+
+def test_chaos_is_no_difference() -> None:
+    """After 30 s the trajectories have nothing in common; within 50 ms they are one."""
+    one, other = double(), double(1.0 + 1e-13)
+    found = compare(one, other, same(one), [CHAOS])
+    assert not found.identical and found.equal and 0 < found.difference < 1e-11
+    ends = []
+    for model in (one, other):
+        data = begin(model, CHAOS)
+        mujoco.mj_step(model, data, CHAOS.steps)
+        ends.append(data.qpos.copy())
+    assert np.max(np.abs(ends[0] - ends[1])) > 1e-3
+
+
+def test_the_same_and_another_model() -> None:
+    one = double()
+    assert compare(one, double(), same(one), [CHAOS]) == compare(one, one, same(one), [])
+    other = compare(one, double(1.001), same(one), [CHAOS])
+    assert not other.identical and not other.equal and TOLERANCE < other.difference < 1
+
+
+def test_a_changed_model_that_diverges_is_not_equal() -> None:
+    one, other = double(), double()
+    other.dof_damping[:] = -1e6
+    found = compare(one, other, same(one), [CHAOS])
+    assert not found.identical and math.isinf(found.difference)
+
+
+def test_contacts_count_though_nothing_moves() -> None:
+    """The block stays where it is to the bit, but another geom bears it."""
+    text = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="{}" size=".1" pos="0 0 -.1"/>
+      <geom name="{}" size=".1" pos="0 0 -.1"/><body><freejoint/><geom size=".1" pos="0 0 .1"/>
+      </body></worldbody></mujoco>"""
+    one = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    other = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    other.geom_contype[0] = other.geom_conaffinity[0] = 0
+    case = Case("rest", None, (), (), 1, (), 0, False)
+    assert compare(one, one, same(one), [case]).identical
+    found = compare(one, other, same(one), [case])
+    assert not found.identical
+
+
+def test_what_a_run_shows() -> None:
+    text = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .3"><freejoint/>
+      <geom size=".1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    seen = watch(model, Case("fall", None, (), (), 500, (), 0, False))
+    assert seen.judgement.ok and seen.touching == {(0, 1)} and seen.constrained
+    assert seen.high[1, 2] == pytest.approx(0.3) and seen.low[1, 2] < 0.11
+    seen = watch(model, Case("fall", None, (), (), 50, (), 0, False))
+    assert not seen.touching and not seen.constrained
+
+
+FULL = """<mujoco><worldbody>
+  <body name="m" mocap="true"/><body name="n" mocap="true"/>
+  <body name="a"><freejoint/><geom name="ga" size=".1"/><body><joint type="ball"/><geom size=".1"/>
+  </body></body>
+  <body name="b"><joint name="j"/><geom name="gb" size=".1"/></body></worldbody>
+  <actuator><motor joint="j"/><general joint="j" dyntype="integrator"/>
+    <general joint="j" dyntype="filter" dynprm="1"/></actuator>
+  <sensor><framepos objtype="body" objname="a"/><clock/><framequat objtype="body" objname="b"/>
+  </sensor></mujoco>"""
+
+
+def test_what_is_left_of_a_model() -> None:
+    model = mujoco.MjModel.from_xml_string(FULL)
+    body = model.body("a").id
+    left = mapping_without(
+        model, Gone(frozenset({body}), frozenset(), frozenset({0}), frozenset({1}))
+    )
+    assert left.qpos.tolist() == [11] and left.dof.tolist() == [9]
+    assert left.act.tolist() == [1] and left.ctrl.tolist() == [0, 2]
+    assert left.sensor.tolist() == [3, 4, 5, 6, 7] and left.mocap.tolist() == [0, 1]
+    assert left.body.tolist() == [0, 1, 2, 5] and left.geom.tolist() == [2] and not left.equal
+    assert not fits(left, model, model) and fits(same(model), model, model)
+
+
+def test_a_state_is_brought_over() -> None:
+    model = mujoco.MjModel.from_xml_string(FULL)
+    spec = mujoco.MjSpec.from_string(FULL)
+    spec.delete(spec.sensors[0])
+    spec.delete(spec.body("a"))
+    other = spec.compile()
+    left = mapping_without(model, Gone(frozenset({model.body("a").id}), sensors=frozenset({0})))
+    assert fits(left, model, other)
+    data, into = mujoco.MjData(model), mujoco.MjData(other)
+    data.qpos[:], data.qvel[:] = range(12), range(10)
+    data.time, data.act[:], data.ctrl[:] = 3.0, [1, 2], [4, 5, 6]
+    data.mocap_pos[1], data.xfrc_applied[model.body("b").id] = 7, 8
+    transfer(model, data, left, other, into)
+    assert (into.time, into.qpos.tolist(), into.qvel.tolist()) == (3.0, [11.0], [9.0])
+    assert into.act.tolist() == [1, 2] and into.ctrl.tolist() == [4, 5, 6]
+    assert into.mocap_pos[1].tolist() == [7] * 3
+    assert into.xfrc_applied[other.body("b").id].tolist() == [8] * 6
+
+
+def declared(text: str) -> Declarations:
+    parsed = parse_declarations(Source("models/a.toml", text))
+    assert parsed.value is not None, parsed.diagnostics
+    return parsed.value
+
+
+def test_scenarios_as_the_author_wrote_them() -> None:
+    model = mujoco.MjModel.from_xml_string(FULL)
+    text = """[[scenario]]\nname = "push"\nduration = 1\nsample = 0.1\nhold = 0.2
+controls = [[1, 0, 0], [2, 0, 0]]\nqvel = [0, 0, 0, 0, 0, 0, 0, 0, 0, 5]\n"""
+    (case,) = cases(model, declared(text), quick=False)
+    assert (case.name, case.steps, case.hold, case.declared) == ("push", 500, 100, True)
+    given = {step: command(case, step) for step in range(case.steps)}
+    assert [(step, row[0]) for step, row in given.items() if row is not None] == [(0, 1), (100, 2)]
+    assert begin(model, case).qvel[-1] == 5
+    (short,) = cases(model, declared(text), quick=True)
+    assert short.steps == 250
+
+
+def test_scenarios_where_none_is_written() -> None:
+    names = [case.name for case in cases(double(), None, quick=True)]
+    assert names == ["keyframe-0"]
+    (still,) = cases(mujoco.MjModel.from_xml_string("<mujoco/>"), None, quick=True)
+    assert still.keyframe is None
+
+
+def test_a_ratio_of_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a clock that goes by the steps made, three times as fast for one model, noise and all."""
+    one, other = double(), double(2.0)
+    now = 0.0
+    noise = np.random.default_rng(0)
+
+    def step(model: Any, data: Any, nstep: int = 1) -> None:
+        nonlocal now
+        now += nstep * (3e-6 if model is one else 1e-6) * noise.uniform(1.0, 1.02)
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    ratio = time_ratio(one, other, same(one), [CHAOS], lambda: now, quick=False)
+    assert ratio is not None and ratio.certain
+    assert ratio.value == pytest.approx(3.0, rel=0.02) and ratio.spread < 0.02
+    equal = time_ratio(one, one, same(one), [CHAOS], lambda: now, quick=True)
+    assert equal is not None and not equal.certain
+    assert time_ratio(one, other, same(one), [CHAOS], lambda: 0.0, quick=True) is None
+    assert time_ratio(one, other, same(one), [], lambda: now, quick=True) is None

@@ -1,0 +1,256 @@
+"""MJCF with places, and changes of it that leave everything else as it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.numerics.pruning.edits import (
+    Edit,
+    applied,
+    drop_attribute,
+    drop_numbers,
+    joined,
+    remove,
+    set_attributes,
+    set_options,
+)
+from coursebuild.numerics.pruning.markup import Document, MarkupError, parse_markup, place_of
+
+
+def document(text: str) -> Document:
+    return parse_markup("models/a.xml", text.encode())
+
+
+def after(text: str, *edits: Edit) -> str:
+    return applied(text.encode(), edits).decode()
+
+
+def without(text: str, *tags: str) -> str:
+    found = [one for one in document(text).root.walk() if one.tag in tags]
+    assert found
+    return after(text, *remove(found))
+
+
+ODD = (
+    "\ufeff<?xml version='1.0' encoding='ISO-8859-1'?>\r\n"
+    '<!-- <geom name="no"/> -->\r\n'
+    "<mujoco model = 'é&amp;<'>\r\n".replace("&amp;<", "&amp;&lt;")
+    + '\t<worldbody >\r\n\t\t<body name="ü > ñ"\r\n\t\t\tpos=\'1 "2" 3\'\r\n\t\t><geom size=".1"/>'
+    "<geom\tname=\"🎈\" size='.1'   /></body>\r\n"
+    '<?pi <geom?><![CDATA[<geom name="no"/>]]></worldbody>\r\n</mujoco>\r\n'
+)
+
+
+def test_places_in_an_odd_text() -> None:
+    """A byte order mark, CRLF, a wrong encoding, quotes, references, comments, CDATA."""
+    found = document(ODD)
+    elements = list(found.root.walk())
+    assert [one.tag for one in elements] == ["mujoco", "worldbody", "body", "geom", "geom"]
+    assert found.root.get("model") == "é&<"
+    body = elements[2]
+    assert body.get("name") == "ü > ñ" and body.get("pos") == '1 "2" 3'
+    assert found.position(body.start) == (5, 3)
+    assert found.position(elements[3].start) == (7, 4)
+    assert found.position(elements[4].start) == (7, 21)
+    assert found.data[elements[4].start : elements[4].end].decode().startswith("<geom\tname=")
+    assert found.position(found.root.start) == (3, 1)
+    start, end = elements[4].attribute("name").inner  # type: ignore[union-attr]
+    assert found.data[start:end].decode() == "🎈"
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_lines_and_columns(newline: str) -> None:
+    text = newline.join(("<a>", "", " é<b/>", "</a>"))
+    found = document(text)
+    inner = found.root.children[0]
+    assert found.position(inner.start) == (3, 3)
+    assert found.position(len(found.data)) == (4, 5)
+    assert found.position(0) == (1, 1)
+
+
+def test_ways_to_elements() -> None:
+    found = document(
+        '<mujoco><default><default class="c"/></default><worldbody><body><geom/><geom name="g"/>'
+        "<geom/></body></worldbody><worldbody/></mujoco>"
+    )
+    places = [place_of(one) for one in found.root.walk()]
+    assert places == [
+        "mujoco",
+        "mujoco/default",
+        'mujoco/default/default[@class="c"]',
+        "mujoco/worldbody[1]",
+        "mujoco/worldbody[1]/body",
+        "mujoco/worldbody[1]/body/geom[1]",
+        'mujoco/worldbody[1]/body/geom[@name="g"]',
+        "mujoco/worldbody[1]/body/geom[3]",
+        "mujoco/worldbody[2]",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "words"),
+    [
+        ("<a>\n  <b c='1' c='2'/></a>", 2, 12, "duplicate attribute"),
+        ("<a>é<b></a>", 1, 10, "mismatched tag"),
+        ("", 1, 1, "no element found"),
+        ("<a b='x & y'/>", 1, 10, "not well-formed (invalid token)"),
+        ("<!DOCTYPE a [<!ENTITY e 'x'>]>\n<a b='&e;'/>", 1, 25, "it declares the entity `e`"),
+    ],
+)
+def test_what_is_no_xml_is_refused(text: str, line: int, column: int, words: str) -> None:
+    with pytest.raises(MarkupError) as caught:
+        document(text)
+    assert (caught.value.line, caught.value.column) == (line, column)
+    assert words in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("before", "left"),
+    [
+        ("<a>\n  <x/>\n  <y/>\n</a>", "<a>\n  <y/>\n</a>"),
+        ("<a>\r\n\t<x\r\n\tb='1'/>\r\n\t<y/>\r\n</a>", "<a>\r\n\t<y/>\r\n</a>"),
+        ("<a>\r  <x/>\r</a>", "<a>\r</a>"),
+        ("<a><x/><y/></a>", "<a><y/></a>"),
+        ("<a><y/> <x/></a>", "<a><y/></a>"),
+        ("<a>\n  <x/> <!-- why -->\n</a>", "<a>\n  <!-- why -->\n</a>"),
+        ("<a>\n  <!-- why -->\n  <x> <!-- in --> <y/></x>  \n</a>", "<a>\n  <!-- why -->\n</a>"),
+        ("<a>\n  <y/>  <x/>  \n</a>", "<a>\n  <y/>  \n</a>"),
+        ("<a><x>é</x>ü</a>", "<a>ü</a>"),
+    ],
+)
+def test_elements_go_with_their_lines_only(before: str, left: str) -> None:
+    assert without(before, "x") == left
+
+
+@pytest.mark.parametrize(
+    ("before", "left"),
+    [
+        ("<m>\n  <asset>\n    <x/>\n  </asset>\n  <y/>\n</m>", "<m>\n  <y/>\n</m>"),
+        ("<m>\n  <asset>\n    <x/>\n    <z/>\n  </asset>\n</m>", None),
+        ("<m>\n  <asset>\n    <!-- c -->\n    <x/>\n  </asset>\n</m>", None),
+        ("<m>\n  <worldbody>\n    <x/>\n  </worldbody>\n</m>", None),
+        ('<m><default><default class="c"><x/></default></default></m>', None),
+    ],
+)
+def test_only_empty_sections_go_with_the_last_of_them(before: str, left: str | None) -> None:
+    found = without(before, "x")
+    if left is None:
+        assert "<x/>" not in found and found != before
+        assert found.count("<") == before.count("<") - 1
+    else:
+        assert found == left
+
+
+def test_a_nested_element_goes_with_the_outer_one() -> None:
+    text = "<a><x><x/></x><y/></a>"
+    assert without(text, "x") == "<a><y/></a>"
+
+
+@pytest.mark.parametrize(
+    ("gone", "left"),
+    [
+        ([0], ' q="2\n 3  4"'),
+        ([3], ' q="1 2\n 3"'),
+        ([1, 2], ' q="1 4"'),
+        ([2, 3], ' q="1 2"'),
+        ([0, 2, 3], ' q="2"'),
+        ([0, 1, 2, 3], ""),
+        ([7], ' q="1 2\n 3  4"'),
+        ([3, 4, 5], ' q="1 2\n 3"'),
+        ([], ' q="1 2\n 3  4"'),
+    ],
+)
+def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
+    text = '<k q="1 2\n 3  4"/>'
+    assert after(text, *drop_numbers(document(text).root, "q", gone)) == f"<k{left}/>"
+    assert drop_numbers(document(text).root, "other", gone) == ()
+
+
+def test_attributes_come_and_go() -> None:
+    text = "<g  a = '1'\n   b=\"2\" />"
+    root = document(text).root
+    assert after(text, *set_attributes(root, (("a", "7"), ("c", "8")))) == (
+        '<g  a = \'7\'\n   b="2" c="8" />'
+    )
+    assert after(text, drop_attribute(root, "b")) == "<g  a = '1' />"
+    assert after("<ü/>", *set_attributes(document("<ü/>").root, (("é", "ñ"),))) == '<ü é="ñ"/>'
+
+
+DROP = (("energy", None),)
+
+
+@pytest.mark.parametrize(
+    ("before", "options", "flags", "left"),
+    [
+        (
+            "<m>\n  <y/>\n</m>",
+            (),
+            (("contact", "disable"),),
+            '<m>\n  <option><flag contact="disable"/></option>\n  <y/>\n</m>',
+        ),
+        (
+            "<m>\r\n\t<option a='1'/>\r\n</m>",
+            (),
+            (("contact", "disable"),),
+            "<m>\r\n\t<option a='1'>\r\n\t  <flag contact=\"disable\"/>\r\n\t</option>\r\n</m>",
+        ),
+        (
+            "<m><option><flag energy='enable'/></option></m>",
+            (),
+            (("energy", None), ("contact", "disable")),
+            '<m><option><flag contact="disable"/></option></m>',
+        ),
+        ("<m>\n  <option>\n    <flag energy='enable'/>\n  </option>\n</m>", (), DROP, "<m>\n</m>"),
+        (
+            "<m><option a='1'><flag energy='enable'/></option></m>",
+            (),
+            DROP,
+            "<m><option a='1'></option></m>",
+        ),
+        (
+            "<m><option><!-- --><flag energy='enable'/></option></m>",
+            (),
+            DROP,
+            "<m><option><!-- --></option></m>",
+        ),
+        ("<m><option wind='1 0 0'/></m>", (("wind", None),), (), "<m></m>"),
+        (
+            "<m><option wind='1 0 0'/></m>",
+            (("wind", None), ("cone", "elliptic")),
+            (),
+            '<m><option cone="elliptic"/></m>',
+        ),
+        (
+            "<m><option a='1'/><option a='2'/></m>",
+            (("a", "3"),),
+            (),
+            "<m><option a='1'/><option a='3'/></m>",
+        ),
+        ("<m/>", (("a", "3"),), (("b", "4"),), '<m>\n  <option a="3"><flag b="4"/></option>\n</m>'),
+    ],
+)
+def test_options_and_flags(
+    before: str,
+    options: tuple[tuple[str, str | None], ...],
+    flags: tuple[tuple[str, str | None], ...],
+    left: str,
+) -> None:
+    assert after(before, *set_options(document(before), options, flags)) == left
+
+
+def test_removals_that_follow_each_other_are_one() -> None:
+    edits = [
+        Edit("a", 4, 6, b""),
+        Edit("a", 0, 4, b""),
+        Edit("a", 6, 6, b"x"),
+        Edit("b", 6, 7, b""),
+    ]
+    assert joined(edits) == (Edit("a", 0, 6, b""), Edit("a", 6, 6, b"x"), Edit("b", 6, 7, b""))
+
+
+def test_edits_that_contradict_each_other_are_refused() -> None:
+    edits = (Edit("a", 0, 4, b"x"), Edit("a", 2, 6, b"y"))
+    with pytest.raises(ValueError, match="two changes overlap at byte 2 of a"):
+        applied(b"0123456789", edits)
+    inside = (Edit("a", 2, 6, b""), Edit("a", 3, 4, b"y"))
+    assert applied(b"0123456789", inside) == b"016789"

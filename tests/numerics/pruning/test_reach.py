@@ -1,0 +1,180 @@
+"""Bounds on where geoms can get, against MuJoCo itself in random states."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from coursebuild.numerics.pruning.reach import possible_pairs, separate
+
+
+def compiled(body: str, *, option: str = "", rest: str = "", root: str = "") -> mujoco.MjModel:
+    text = f"<mujoco>{root}<option>{option}</option><worldbody>{body}</worldbody>{rest}</mujoco>"
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def tree(random: np.random.Generator, depth: int) -> str:
+    """A random chain with branches; joints of every kind but free ones, off-centre."""
+
+    def vector(scale: float) -> str:
+        return " ".join(f"{x:.4f}" for x in random.normal(0, scale, 3))
+
+    joints = ""
+    for _ in range(int(random.integers(0, 3))):
+        kind = random.choice(["hinge", "slide", "ball"])
+        if "ball" in joints:
+            kind = "slide"
+        limit = 'range="-0.2 0.5" limited="true"' if kind == "slide" else ""
+        joints += f'<joint type="{kind}" axis="{vector(1)}" pos="{vector(0.2)}" {limit}/>'
+    joints = joints if joints.count("ball") == 0 or joints.count("<joint") == 1 else ""
+    shape = random.choice(["box", "capsule", "sphere", "ellipsoid", "cylinder"])
+    size = " ".join(f"{x:.3f}" for x in random.uniform(0.02, 0.2, 3))
+    geom = f'<geom type="{shape}" size="{size}" pos="{vector(0.3)}" euler="{vector(50)}"/>'
+    inner = ""
+    if depth:
+        inner = "".join(tree(random, depth - 1) for _ in range(int(random.integers(1, 3))))
+    place = f'pos="{vector(0.5)}" euler="{vector(50)}"'
+    return f"<body {place}>{joints}{geom}{inner}</body>"
+
+
+def random_state(random: np.random.Generator, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Any angles, and slides up to beyond their limits."""
+    for joint in range(model.njnt):
+        at = model.jnt_qposadr[joint]
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+            data.qpos[at] = random.uniform(-0.2 - 0.6, 0.5 + 0.6)
+        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_BALL:
+            turn = random.normal(size=4)
+            data.qpos[at : at + 4] = turn / np.linalg.norm(turn)
+        else:
+            data.qpos[at] = random.uniform(-np.pi, np.pi)
+
+
+@pytest.mark.site
+def test_what_is_said_to_be_separate_never_touches() -> None:
+    wrong = []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        fixed = "".join(
+            f'<geom size="0.1" pos="{x:.3f} {y:.3f} {z:.3f}"/>'
+            for x, y, z in random.normal(0, 1.5, (4, 3))
+        )
+        plane = '<geom type="plane" size="1 1 1" pos="0 0 -4" euler="10 5 0"/>'
+        model = compiled(fixed + plane + tree(random, 2) + tree(random, 3))
+        pairs = possible_pairs(model)
+        apart = separate(model, pairs)
+        assert apart < pairs or not pairs, seed
+        flat = set(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist())
+        data = mujoco.MjData(model)
+        for _ in range(60):
+            random_state(random, model, data)
+            mujoco.mj_forward(model, data)
+            touching = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
+            wrong += [(seed, "touch", *pair) for pair in touching & apart]
+            for a, b in apart:
+                if not {a, b} & flat and mujoco.mj_geomDistance(model, data, a, b, 10.0, None) <= 0:
+                    wrong.append((seed, "lie in each other", a, b))
+    assert wrong == []
+
+
+def test_the_bound_tells_an_arm_from_what_it_cannot_reach() -> None:
+    """The bound is no empty one."""
+    model = compiled(
+        """<geom name="base" size=".1 .1 .1" type="box"/>
+        <geom name="wall" type="plane" size="1 1 1" pos="-1 0 0" zaxis="1 0 0"/>
+        <body pos="0 0 .6"><joint axis="0 0 1"/>
+          <geom name="one" type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
+          <body pos=".3 0 0"><joint axis="0 1 0"/>
+            <geom name="two" type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
+            <body pos=".3 0 0"><joint axis="0 1 0"/>
+              <geom name="three" size=".03" pos=".1 0 0"/></body></body></body>"""
+    )
+    name = {model.geom(i).name: i for i in range(model.ngeom)}
+    apart = separate(model, possible_pairs(model))
+
+    def separated(a: str, b: str) -> bool:
+        return tuple(sorted((name[a], name[b]))) in apart
+
+    assert separated("base", "one")
+    assert separated("wall", "one") and separated("wall", "three")
+    assert not separated("base", "three") and not separated("one", "three")
+    assert tuple(sorted((name["one"], name["two"]))) not in possible_pairs(model)
+
+
+def test_only_bounded_joints_keep_a_body_away() -> None:
+    for joint, bounded in (
+        ('<joint type="hinge" axis="0 1 0"/>', True),
+        ('<joint type="ball"/>', True),
+        ('<joint type="slide" axis="1 0 0" range="-1 1" limited="true"/>', True),
+        ('<joint type="slide" axis="1 0 0" range="-5 5" limited="true"/>', False),
+        ('<joint type="slide" axis="1 0 0"/>', False),
+        ("<freejoint/>", False),
+    ):
+        model = compiled(f'<geom size=".1" pos="6 0 0"/><body>{joint}<geom size=".1"/></body>')
+        assert bool(separate(model, possible_pairs(model))) is bounded, joint
+
+
+def test_limits_that_are_off_bound_nothing() -> None:
+    body = """<geom size=".1" pos="6 0 0"/>
+        <body><joint type="slide" range="-1 1" limited="true"/><geom size=".1"/></body>"""
+    for flag in ("limit", "constraint"):
+        model = compiled(body, option=f'<flag {flag}="disable"/>')
+        assert not separate(model, possible_pairs(model))
+
+
+def test_what_a_user_moves_can_be_anywhere() -> None:
+    model = compiled(
+        """<body mocap="true" pos="50 0 0"><geom size=".1"/></body>
+        <body><joint/><geom size=".1" pos=".2 0 0"/></body>"""
+    )
+    assert len(possible_pairs(model)) == 1
+    assert not separate(model, possible_pairs(model))
+
+
+def test_margins_count() -> None:
+    body = '<geom size=".1" pos="2 0 0" margin="{}"/><body><joint/><geom size=".1"/></body>'
+    near, far = (compiled(body.format(margin)) for margin in ("0", "1.9"))
+    assert separate(near, possible_pairs(near)) and not separate(far, possible_pairs(far))
+    pair = '<contact><pair geom1="a" geom2="b" margin="1.9"/></contact>'
+    named = """<geom name="a" size=".1" pos="2 0 0"/>
+        <body><joint/><geom name="b" size=".1"/></body>"""
+    paired = compiled(named, rest=pair)
+    assert not separate(paired, possible_pairs(paired))
+
+
+@pytest.mark.parametrize("flag", ["", '<flag filterparent="disable"/>'])
+@pytest.mark.parametrize("seed", range(6))
+def test_possible_pairs_are_those_that_mujoco_looks_at(seed: int, flag: str) -> None:
+    """With a huge margin everything that MuJoCo looks at is a contact."""
+    random = np.random.default_rng(seed)
+    count = 0
+
+    def body(depth: int) -> str:
+        nonlocal count
+        count += 1
+        own = count
+        joint = random.choice(["", '<joint axis="0 1 0"/>', "<joint type='ball'/>"])
+        mask = f'contype="{random.integers(0, 4)}" conaffinity="{random.integers(0, 4)}"'
+        geoms = f'<geom name="g{own}" size=".1" {mask} margin="1000"/>'
+        inner = "".join(body(depth - 1) for _ in range(2)) if depth else ""
+        return f'<body name="b{own}" pos=".3 0 0">{joint}{geoms}{inner}</body>'
+
+    trees = body(2) + body(1) + '<geom size=".1" margin="1000"/>'
+    trees += '<body mocap="true"><geom size=".1" margin="1000"/></body>'
+    trees += '<body><geom size=".1" margin="1000"/></body>'
+    contact = """<contact><exclude body1="b1" body2="b5"/>
+        <pair geom1="g2" geom2="g3" margin="1000"/></contact>"""
+    size = '<size memory="50M"/>'
+    model = compiled(trees, option=flag, rest=contact, root=size)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    found = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
+    assert found == possible_pairs(model)
+
+
+def test_nothing_is_possible_where_contact_is_off() -> None:
+    body = '<geom size=".1"/><body><freejoint/><geom size=".1"/></body>'
+    for flag in ("contact", "constraint"):
+        model = compiled(body, option=f'<flag {flag}="disable"/>')
+        assert possible_pairs(model) == frozenset()

@@ -1,0 +1,251 @@
+"""Things of no use, with their labels, and the text without them."""
+
+from __future__ import annotations
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.detector import Status
+from coursebuild.numerics.reports.diet import IDENTICAL
+from support.surveys import PATH, PENDULUM, fixed, found, names, opened, scene, tried
+
+
+def test_a_model_without_anything_in_vain() -> None:
+    model, survey = tried(scene())
+    assert survey.findings == () and survey.edits == () and survey.stale == ()
+    assert survey.fixed is None and survey.slim is None
+    assert [one.judgement.status for one in survey.seen] == [Status.OK]
+    assert fixed(model, survey) == scene()
+
+
+@pytest.mark.parametrize("world", ["", "<!-- nothing -->", "<geom size='1'/>"])
+def test_nothing_that_moves(world: str) -> None:
+    _, survey = tried(scene(world))
+    assert survey.findings == ()
+    _, survey = tried("<mujoco/>")
+    assert survey.findings == ()
+
+
+# ---------------------------------------------------------------------------- things of no use
+
+
+ASSETS = """<asset>
+    <texture name="sky" type="skybox" builtin="flat" width="8" height="48"/>
+    <texture name="wood" type="2d" builtin="flat" width="8" height="8"/>
+    <texture name="cloth" type="2d" builtin="flat" width="8" height="8"/>
+    <material name="table" texture="wood"/>
+    <material name="curtain" texture="cloth"/>
+    <mesh name="used" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+    <mesh name="ünüsed" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+    <hfield name="hill" nrow="2" ncol="2" size="1 1 1 1" elevation="0 1 0 1"/>
+  </asset>"""
+SHOWN = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
+
+
+def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
+    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
+    model, survey = tried(text)
+    seen = found(survey)
+    assert {kind: names(one) for kind, one in seen.items()} == {
+        "unused-material": ["curtain"],
+        "unused-texture": ["cloth"],
+        "unused-mesh": ["ünüsed"],
+        "unused-hfield": ["hill"],
+    }
+    assert all(one.label == IDENTICAL and one.fixable for one in seen.values())
+    assert seen["unused-texture"].saving.memory > 3 * 64
+    left = fixed(model, survey)
+    for gone in ("curtain", "cloth", "ünüsed", "hill"):
+        assert gone not in left
+    assert len(left.splitlines()) == len(text.splitlines()) - 4
+    again, second = tried(left)
+    assert second.findings == () and fixed(again, second) == left
+
+
+def test_an_asset_that_a_lesson_mentions_is_used() -> None:
+    lesson = 'model.mat("curtain").rgba[:] = 1; model.mesh("ünüsed"); "cloth hill"'
+    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
+    _, survey = tried(text, lesson=lesson)
+    assert survey.findings == ()
+
+
+def test_a_texture_of_a_kept_material_is_used() -> None:
+    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
+    _, survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
+    seen = found(survey)
+    assert seen["unused-material"].kept == "for the next lesson"
+    assert not seen["unused-material"].fixable and not seen["unused-material"].counts
+    assert "unused-texture" not in seen and survey.stale == ()
+
+
+def test_an_asset_is_called_after_its_file() -> None:
+    mesh = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    head = '<asset><mesh file="one.obj"/><mesh file="two.obj"/></asset>'
+    world = PENDULUM.replace("</body>", '<geom type="mesh" mesh="one" mass="0"/></body>')
+    files = {PATH: scene(world, head=head), "models/one.obj": mesh, "models/two.obj": mesh}
+    _, survey = tried(files)
+    assert names(found(survey)["unused-mesh"]) == ["two"]
+
+
+def test_classes_that_no_element_is_of() -> None:
+    head = """<default>
+    <default class="outer"><geom rgba="1 0 0 1"/>
+      <default class="inner"><geom size=".06"/></default>
+    </default>
+    <!-- for later -->
+    <default class="idle"><geom rgba="1 0 0 1"/>
+      <default class="idle-inner"/>
+    </default> <!-- said of it -->
+    <default class="read"/>
+  </default>"""
+    model, survey = tried(
+        scene(PENDULUM.replace('name="ball"', 'name="ball" class="inner"'), head=head),
+        lesson='spec.find_default("read")',
+    )
+    assert names(found(survey)["unused-default"]) == ["idle"]
+    left = fixed(model, survey)
+    assert "<!-- for later -->\n    <!-- said of it -->\n" in left
+    assert "idle" not in left and 'class="outer"' in left and 'class="read"' in left
+
+
+SITES = """<body name="arm" pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".1" pos=".3 0 0"/>
+      <site name="held"/><site name="read"/><site/><site name="idle"/><site name="sensed"/>
+    </body>
+    <site name="end"/>"""
+TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/></spatial></tendon>
+  <sensor>
+    <framepos objtype="site" objname="sensed"/>
+  </sensor>"""
+
+
+def test_sites_and_sensors() -> None:
+    """Those of a tendon stay; one that only an unread sensor needs goes with it."""
+    model, survey = tried(scene(SITES, rest=TENDON), lesson='data.site("read")')
+    seen = found(survey)
+    assert names(seen["sensor-unread"]) == ["mujoco/sensor/framepos"]
+    assert names(seen["unused-site"]) == [
+        'mujoco/worldbody/body[@name="arm"]/site[3]',
+        "idle",
+        "sensed",
+    ]
+    left = fixed(model, survey)
+    assert '<site name="held"/><site name="read"/>\n' in left
+    assert "<sensor>" not in left and '"end"' in left
+    assert tried(left, lesson='data.site("read")')[1].edits == ()
+
+
+@pytest.mark.parametrize(
+    "lesson",
+    [
+        "print(data.sensordata[0])",
+        'print(data.sensor("touch").data, data.sensor("clock").data)',
+        "for i in range(model.nsensor): print(data.sensor(i).data)",
+        '{"readouts": [{"expr": "data.sensordata[model.sensor_adr[0]]"}]} ',
+        "mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SENSOR, 0)",
+        "state, sensor = rollout.rollout(model, data, initial)",
+        "[s.name for s in spec.sensors]",
+    ],
+)
+def test_a_sensor_that_may_be_read_is_no_finding(lesson: str) -> None:
+    sensors = '<sensor><clock name="clock"/><jointpos name="touch" joint="pivot"/></sensor>'
+    _, survey = tried(scene(rest=sensors), lesson=lesson)
+    assert survey.findings == ()
+
+
+def test_of_two_sensors_the_one_that_is_read_stays() -> None:
+    sensors = '<sensor><clock name="clock"/><jointpos name="angle" joint="pivot"/></sensor>'
+    model, survey = tried(scene(rest=sensors), lesson="print(data.sensor('angle').data)")
+    assert names(found(survey)["sensor-unread"]) == ["clock"]
+    left = fixed(model, survey)
+    assert '<sensor><jointpos name="angle" joint="pivot"/></sensor>' in left
+
+
+def test_flags_for_nobody() -> None:
+    head = '<option timestep="0.001">\n    <flag energy="enable" fwdinv="enable"/>\n  </option>'
+    model, survey = tried(scene(head=head))
+    assert set(found(survey)) == {"energy-flag", "fwdinv-flag"}
+    assert '<option timestep="0.001">\n  </option>' in fixed(model, survey)
+    _, survey = tried(scene(head=head), lesson="data.energy; data.solver_fwdinv")
+    assert survey.findings == ()
+
+
+# -------------------------------------------------------------------------- meshes to be seen
+
+
+CUBE = "-.1 -.2 -.3 -.1 -.2 .3 -.1 .2 -.3 -.1 .2 .3 .1 -.2 -.3 .1 -.2 .3 .1 .2 -.3 .1 .2 .3"
+
+
+def test_a_mesh_that_is_a_box() -> None:
+    head = f'<asset><mesh name="crate" vertex="{CUBE}"/></asset>'
+    shown = """<geom name="g" type="mesh" mesh="crate" pos=".1 .2 .3" euler="10 20 30" mass="0"
+        contype="0" conaffinity="0"/>"""
+    text = scene(PENDULUM.replace("</body>", shown + "</body>"), head=head)
+    model, survey = tried(text)
+    finding = found(survey)["mesh-primitive"]
+    assert finding.label == IDENTICAL and not finding.fixable and finding.saving.memory > 100
+    left = text.encode()
+    for edit in sorted(finding.edits, key=lambda one: -one.start):
+        assert left[edit.start : edit.end].decode() == edit.old
+        left = left[: edit.start] + edit.new.encode() + left[edit.end :]
+    slim = opened({PATH: left}).model
+    geom, whole = slim.geom("g"), model.model
+    assert geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX and slim.nmesh == 0
+    assert sorted(geom.size) == pytest.approx([0.1, 0.2, 0.3], rel=1e-3)
+    assert geom.pos == pytest.approx(whole.geom("g").pos, abs=1e-6)
+    assert "mesh" not in left.decode()
+
+
+def test_a_mesh_that_collides_or_is_no_primitive_stays() -> None:
+    head = f"""<asset><mesh name="crate" vertex="{CUBE}"/>
+    <mesh name="wedge" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>"""
+    shown = """<geom type="mesh" mesh="crate" mass="0"/>
+        <geom type="mesh" mesh="wedge" mass="0" contype="0" conaffinity="0"/>"""
+    _, survey = tried(scene(PENDULUM.replace("</body>", shown + "</body>"), head=head))
+    assert "mesh-primitive" not in found(survey)
+
+
+# ----------------------------------------------------------------------- runs and their labels
+
+
+def test_from_a_scenario_that_diverges_nothing_is_claimed() -> None:
+    head = '<option timestep="0.1"/>'
+    world = PENDULUM.replace("/>", ' stiffness="1e6" damping="0"/>', 1)
+    text = scene(world, head=head, rest='<sensor><clock name="t"/></sensor>')
+    text = text.replace("</mujoco>", '<keyframe><key name="go" qpos="1"/></keyframe></mujoco>')
+    _, survey = tried(text, quick=False)
+    assert survey.seen[0].judgement.status is not Status.OK
+    assert survey.findings == () and survey.edits == ()
+
+
+def test_a_keep_that_keeps_nothing_is_told() -> None:
+    keeps = {"sensor-unread t": "shown in class", "unused-site": "for labs", "contact": "?"}
+    _, survey = tried(scene(rest='<sensor><clock name="t"/></sensor>'), keeps=keeps)
+    assert found(survey)["sensor-unread"].kept == "shown in class"
+    assert survey.stale == ("unused-site", "contact")
+
+
+def test_of_a_kind_one_may_be_kept_and_another_found() -> None:
+    sensors = '<sensor><clock name="t"/><clock name="u"/></sensor>'
+    model, survey = tried(scene(rest=sensors), keeps={"sensor-unread t": "shown in class"})
+    by_name = {names(one)[0]: one for one in survey.findings if one.kind == "sensor-unread"}
+    assert by_name["t"].kept and not by_name["u"].kept
+    assert '<sensor><clock name="t"/></sensor>' in fixed(model, survey)
+
+
+def test_a_file_that_is_not_to_be_changed() -> None:
+    text = scene(rest='<sensor><clock name="t"/></sensor>')
+    model, survey = tried(text, locked={PATH: "models/b.xml uses models/a.xml too"})
+    finding = found(survey)["sensor-unread"]
+    assert finding.unfixed == "models/b.xml uses models/a.xml too" and finding.counts
+    assert fixed(model, survey) == text
+
+
+def test_settings_are_told_only_for_the_time_that_they_save() -> None:
+    """The clock of these tests says that nothing saves any."""
+    world = """<geom type="plane" size="1 1 1"/>
+    <body pos="0 0 .2"><freejoint/><geom type="box" size=".1 .1 .1" condim="4"/></body>"""
+    _, survey = tried(scene(world))
+    assert survey.findings == ()
+    kinds = {one.kind for one in survey.tried}
+    assert {"solver", "cone", "tolerance", "island", "sleep", "condim"} <= kinds
+    assert {one.reason for one in survey.tried} == {"it saves no time"}

@@ -1,0 +1,118 @@
+"""Speed against error of models, from the file to the report: errors, orders, drifts, statuses."""
+
+from __future__ import annotations
+
+import functools
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.bench import measure_scenario
+from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.scene import scenes
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations
+from support.bench_runs import FAMILY, MODELS, of_problem, orders, row
+
+pytestmark = pytest.mark.site
+LONG = ("flips", "major")
+
+
+@functools.cache
+def of_box(name: str) -> ScenarioReport:
+    """A scenario of the tumbling box; only the first flip with all timesteps."""
+    text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
+    declared = parse_declarations(Source("models/tumbling_box.toml", text)).value
+    model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
+    quick = name != "first-flip"
+    (scene,) = (one for one in scenes(model, declared, quick=quick) if one.name == name)
+    return measure_scenario(model, scene, quick=quick, clock=None)
+
+
+@pytest.fixture(params=["first-flip", *(pytest.param(one, marks=pytest.mark.slow) for one in LONG)])
+def report(request: pytest.FixtureRequest) -> ScenarioReport:
+    return of_box(request.param)
+
+
+@pytest.mark.slow
+def test_energy_of_the_tumbling_box() -> None:
+    drifts = {
+        name: 100 * (row(of_box("flips"), name, 0.002).energy_drift or 0.0)
+        for name in (*FAMILY, "RK4")
+    }
+    assert round(drifts["Euler"], 3) == 6.641
+    for name in ("implicit", "implicitfast", "discrete"):
+        assert round(drifts[name], 3) == -6.040
+    assert 0 < abs(drifts["RK4"]) < 1e-8
+
+
+def test_orders_of_the_tumbling_box() -> None:
+    report = of_box("first-flip")
+    assert report.reference == "closed"
+    for part in ("attitude", "velocity"):
+        found = orders(report, part)
+        for name in FAMILY:
+            assert found[name] == pytest.approx(1.0, abs=0.05)
+    assert orders(report, "attitude")["RK4"] == pytest.approx(2.0, abs=0.05)
+    assert orders(report, "velocity")["RK4"] == pytest.approx(4.0, abs=0.1)
+    assert orders(report, "position") == {}, "its centre does not move"
+
+
+def test_references_of_the_tumbling_box_agree(report: ScenarioReport) -> None:
+    if report.name == "flips":
+        assert report.floor > 1e-7, "an ill-conditioned motion is not called well known"
+    else:
+        assert report.agreement is not None and report.agreement < 1e-10
+
+
+def test_no_error_is_told_below_ten_floors(report: ScenarioReport) -> None:
+    for one in report.rows:
+        assert one.attitude is not None and one.velocity is not None
+        assert min(one.attitude) >= 9.999 * max(report.floor, 1e-14)
+        assert min(one.velocity) >= 9.999 * report.velocity_floor
+
+
+def test_what_the_box_conserves_is_found_out(report: ScenarioReport) -> None:
+    for one in report.rows:
+        assert one.energy_drift is not None and one.momentum_drift is not None
+        assert (one.status, one.penetration, one.slip) == ("ok", 0.0, None)
+        assert not one.refsafe
+
+
+def test_the_boxs_own_setting_is_there_once(report: ScenarioReport) -> None:
+    (own,) = (one for one in report.rows if one.own)
+    assert (own.setting.integrator, own.setting.timestep) == ("RK4", 0.002)
+    assert (own.setting.solver, own.setting.cone) == ("", ""), "nothing is solved"
+    assert report.verdict.noticeable is False
+    count = 35 if report.name == "first-flip" else 20
+    assert len({one.setting for one in report.rows}) == len(report.rows) == count
+
+
+def test_an_error_that_can_be_seen() -> None:
+    coarse, fine = (row(of_box("first-flip"), "Euler", h) for h in (0.004, 0.0005))
+    assert coarse.attitude is not None and coarse.seen is not None and fine.seen is not None
+    assert coarse.seen == pytest.approx(coarse.attitude[0] * 180 / 3.141592653589793)
+    assert coarse.seen > 1 > fine.seen
+
+
+# ------------------------------------------------------------------------------------- hard cases
+
+
+def test_a_pendulum_from_90_degrees() -> None:
+    qpos = problem_named("pendulum-hinge-90").scenario.qpos
+    report = of_problem("pendulum-hinge-90", f"qpos = {list(qpos)}\nduration = 4\nsample = 0.2\n")
+    assert orders(report, "position")["RK4"] >= 3.8
+    assert orders(report, "velocity")["RK4"] >= 3.8
+    for name in FAMILY:
+        assert orders(report, "position")[name] == pytest.approx(1.0, abs=0.05)
+    assert {one.energy_drift is None for one in report.rows} == {False}
+    assert {one.momentum_drift for one in report.rows} == {None}, "the pin turns it"
+
+
+def test_orders_and_drifts_of_springs() -> None:
+    for name, conserved in (("damped-spring-0", True), ("damped-spring-0.1", False)):
+        report = of_problem(name, "qpos = [1]\nqvel = [5]\nduration = 1\nsample = 0.1\n")
+        for part in ("position", "velocity"):
+            assert orders(report, part)["RK4"] == pytest.approx(4.0, abs=0.1), name
+        assert {one.energy_drift is not None for one in report.rows} == {conserved}, name

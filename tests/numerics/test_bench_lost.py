@@ -1,0 +1,111 @@
+"""Divergence never passes as success when a model is measured; and what is told meanwhile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.bench import measure_scene
+from coursebuild.numerics.scene import SceneError
+from support.bench_runs import measured
+
+pytestmark = pytest.mark.site
+
+STIFF = """\
+<mujoco>
+  <option timestep="{step}"/>
+  <worldbody>
+    <body>
+      <joint type="slide" stiffness="{stiffness}"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+  <keyframe><key qpos="{start}"/></keyframe>
+</mujoco>
+"""
+
+FROM_KEYFRAME = '[[scenario]]\nname = "a"\nkeyframe = 0\nreference = "self"\n'
+"""The engine is its own reference: integrating the stiff spring takes ten times as long."""
+
+
+def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
+    text = STIFF.format(step=step, start=start, stiffness=stiffness)
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def test_a_scene_that_blows_up_under_its_own_setting() -> None:
+    """Without `autoreset="disable"` such a run ends where it began, with error 0."""
+    (report,) = measured(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
+    (own,) = (one for one in report.rows if one.own)
+    assert own.status == "diverged"
+    assert "MuJoCo warned of bad accelerations" in own.reasons
+    assert (own.position, own.velocity, own.seen) == (None, None, None)
+    assert own.growth is None or own.growth > 1
+    assert not report.verdict.on_front
+    assert report.verdict.text.startswith(
+        "the scene does not run under its own setting, Euler at 8 ms: "
+    )
+    limits = {one.integrator: one.largest for one in report.stable}
+    for name in ("Euler", "implicit", "implicitfast"):
+        assert limits[name] == pytest.approx(2 / 1e5**0.5, rel=0.02)
+    assert limits["discrete"] is None
+
+
+def test_a_slow_growth_without_any_warning() -> None:
+    (report,) = measured(stiff(0.00635, 1e-30), FROM_KEYFRAME, quick=True)
+    own = next(one for one in report.rows if one.own)
+    assert own.status in ("slow-growth", "diverged")
+    assert own.position is None
+
+
+def test_bodies_that_lie_in_each_other_without_any_warning() -> None:
+    text = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <geom type="box" size="1 1 0.05"/>
+    <body pos="0 0 0.03">
+      <joint type="slide" axis="0 0 1"/>
+      <geom type="box" size="0.1 0.1 0.01" density="100"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+    short = '[[scenario]]\nname = "a"\nduration = 0.2\nsample = 0.02\n'
+    (report,) = measured(mujoco.MjModel.from_xml_string(text), short, quick=True)
+    statuses = {one.status for one in report.rows}
+    assert statuses == {"diverged"}
+    assert all("in each other" in " ".join(one.reasons) for one in report.rows)
+    warned = " ".join(" ".join(one.reasons) for one in report.rows)
+    assert "MuJoCo warned" not in warned
+
+
+def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"it diverges within .* s even at 0\.25 s a step"):
+        measured(stiff(1.0, 0.01), quick=True)
+
+
+def test_what_is_being_done_is_told() -> None:
+    said: list[str] = []
+    measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=None, said=said.append)
+    assert said[:3] == [
+        "keyframe-0: a first run",
+        "keyframe-0: the reference",
+        "keyframe-0: Euler at 20 ms",
+    ]
+    assert said[-1] == "keyframe-0: stable timesteps"
+
+
+def test_times_are_of_the_clock() -> None:
+    """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
+    ticks = iter(range(0, 10**15, 2_000_000))
+    (report,) = measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=lambda: next(ticks))
+    for one in report.rows:
+        assert one.cost is not None and one.cost > 0
+        assert one.realtime is not None and one.realtime > 0
+        assert one.spread == 1.0
+        assert one.cost_uncertainty == pytest.approx(0.0, abs=1e-12)
+    assert [one.cost for one in report.rows if one.own] == [1.0]
+    assert any(one.front for one in report.rows)

@@ -1,0 +1,207 @@
+"""Commands, chaos, contact: what a report says of scenes that are not smooth and free."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.reports.bench import ScenarioReport
+from support.bench_runs import measured, orders, row
+
+pytestmark = pytest.mark.site
+
+SERVO = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body>
+      <joint name="a" axis="0 1 0" damping="0.2"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0.4 0 0"/>
+      <site name="tip" pos="0.4 0 0"/>
+    </body>
+  </worldbody>
+  <actuator><position joint="a" kp="20"/></actuator>
+  <sensor><jointpos name="angle" joint="a"/></sensor>
+</mujoco>
+"""
+SERVO_TOML = """\
+[[scenario]]
+name = "reach"
+controls = [[0.5], [-1], [0.2]]
+hold = 0.3
+sample = 0.05
+measure = "site:tip"
+"""
+
+
+def test_commands_are_held_so_that_runge_kutta_keeps_its_order() -> None:
+    (report,) = measured(mujoco.MjModel.from_xml_string(SERVO), SERVO_TOML)
+    assert (report.reference, report.hold) == ("ode", 0.3)
+    assert orders(report, "position")["RK4"] == pytest.approx(4.0, abs=0.15)
+    assert report.figure == "place of the site tip [m]"
+    fine = row(report, "RK4", 0.001)
+    assert fine.figure is not None and fine.position is not None
+    assert 0.1 * fine.position[0] < fine.figure[0] < fine.position[0]
+    (sensed,) = measured(
+        mujoco.MjModel.from_xml_string(SERVO),
+        SERVO_TOML.replace("site:tip", "sensor:angle"),
+        quick=True,
+    )
+    again = row(sensed, "RK4", 0.001)
+    assert again.figure == pytest.approx(again.position)
+
+
+DOUBLE = """\
+<mujoco>
+  <option timestep="0.005" integrator="RK4"><flag contact="disable"/></option>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3"/>
+      <body pos="0 0 -0.3">
+        <joint axis="0 1 0"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3"/>
+      </body>
+    </body>
+  </worldbody>
+  <keyframe><key qpos="2.5 0.5"/></keyframe>
+</mujoco>
+"""
+
+
+def test_chaos_has_a_horizon_and_then_statistics() -> None:
+    (report,) = measured(
+        mujoco.MjModel.from_xml_string(DOUBLE),
+        '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 20\nsample = 0.04\n',
+        quick=True,
+    )
+    assert report.lyapunov is not None and 1 < report.lyapunov < 10
+    assert 1 < report.horizon < 20
+    assert any("errors count until" in note for note in report.notes)
+    own = next(one for one in report.rows if one.own)
+    assert own.mean_energy is not None and abs(own.mean_energy) < 0.5
+    assert own.energy_drift is not None
+
+
+BLOCK = """\
+<mujoco>
+  <option timestep="{step}" gravity="{side} 0 -9.6"/>
+  <worldbody>
+    <geom type="plane" size="5 5 1"/>
+    <body pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def block(step: float = 0.002, side: float = 2) -> Any:
+    return mujoco.MjModel.from_xml_string(BLOCK.format(step=step, side=side))
+
+
+@pytest.fixture(scope="module")
+def sticks() -> ScenarioReport:
+    model = block()
+    before = (model.opt.timestep, model.opt.integrator, model.opt.cone, model.opt.disableflags)
+    (report,) = measured(model, quick=True)
+    opt = model.opt
+    assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
+    return report
+
+
+def test_measuring_twice_gives_the_same_figures() -> None:
+    short = '[[scenario]]\nname = "a"\nduration = 0.16\nsample = 0.016\n'
+    once, again = (measured(block(), short, quick=True) for _ in range(2))
+    assert once == again
+
+
+def test_a_block_that_sticks_creeps(sticks: ScenarioReport) -> None:
+    report = sticks
+    assert (report.reference, report.smooth, report.orders) == ("self", False, ())
+    assert report.notes == (
+        "errors follow no power of the timestep, because of contact",
+        "beyond 0.01 s refsafe softens constraints: stable, but another model",
+    )
+    settings = [one.setting for one in report.rows]
+    assert {one.cone for one in settings} == {"pyramidal", "elliptic"}
+    assert {one.solver for one in settings} == {"PGS", "CG", "Newton"}
+    assert len({one.iterations for one in settings}) == 3
+    creep = {one.setting.cone: one.slip for one in report.rows}
+    assert creep["pyramidal"] and creep["elliptic"]
+    assert 5e-4 < creep["elliptic"] < creep["pyramidal"] < 5e-3
+    errors = {one.setting.cone: one.model_error for one in report.rows}
+    assert errors["elliptic"] is None
+    assert errors["pyramidal"] == pytest.approx(creep["pyramidal"] - creep["elliptic"], rel=0.2)
+    assert {one.energy_drift for one in report.rows} == {None}
+
+
+def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
+    mjcf = """\
+    <mujoco>
+      <option timestep="0.004" gravity="3 3 -9"/>
+      <worldbody>
+        <geom type="plane" size="50 50 1" friction="0.3"/>
+        <body pos="0 0 0.1">
+          <freejoint/><geom type="box" size="0.2 0.2 0.1" mass="1" friction="0.3"/>
+        </body>
+      </worldbody>
+    </mujoco>
+    """
+    (report,) = measured(mujoco.MjModel.from_xml_string(mjcf), quick=True)
+    own = next(one for one in report.rows if one.own)
+    slope, time = 3 * 2**0.5, 2.0
+    exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough
+    assert own.model_error == pytest.approx(exact, rel=0.02)
+    assert own.seen is not None and own.seen > 10
+    (round_one,) = (
+        one
+        for one in report.rows
+        if (one.setting.integrator, one.setting.timestep, one.setting.cone)
+        == ("Euler", 0.004, "elliptic")
+    )
+    assert round_one.seen is not None and round_one.seen < own.seen / 5
+    assert report.verdict.noticeable is True
+
+
+def test_no_model_error_is_told_below_ten_floors() -> None:
+    mjcf = """\
+    <mujoco>
+      <option timestep="0.004"/>
+      <worldbody>
+        <geom type="plane" size="1 1 1"/>
+        <body pos="0 0 0.2"><freejoint/><geom size="0.1"/></body>
+      </worldbody>
+    </mujoco>
+    """
+    (report,) = measured(mujoco.MjModel.from_xml_string(mjcf), quick=True)
+    for one in report.rows:
+        assert (one.model_error is None) == (one.setting.cone == "elliptic")
+        assert one.model_error is None or one.model_error >= 10 * report.floor > 0
+
+
+def test_an_error_as_large_as_the_motion_has_no_order() -> None:
+    spring = """\
+    <mujoco>
+      <option timestep="0.01" integrator="discrete"/>
+      <worldbody>
+        <body><joint type="slide" axis="1 0 0" stiffness="1e5"/><geom size="0.1" mass="1"/></body>
+      </worldbody>
+      <keyframe><key qpos="0.05"/></keyframe>
+    </mujoco>
+    """
+    short = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 0.4\nsample = 0.04\n'
+    (report,) = measured(mujoco.MjModel.from_xml_string(spring), short, quick=True)
+    errors = [
+        one.position[0]
+        for one in report.rows
+        if one.setting.integrator == "discrete" and one.position is not None
+    ]
+    assert len(errors) == 4 and 0.04 < min(errors) <= max(errors) < 0.1
+    assert orders(report, "position").get("discrete") is None
+
+
+def test_softened_contacts_are_told() -> None:
+    (report,) = measured(block(0.008), quick=True)
+    refsafe = {one.setting.timestep: one.refsafe for one in report.rows if not one.own}
+    assert refsafe == {0.002: False, 0.004: False, 0.008: False, 0.016: True}

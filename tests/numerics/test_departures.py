@@ -1,0 +1,249 @@
+"""Figures that left their band: which do, how it is said, and that times never do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coursebuild.model.scenarios import Bands
+from coursebuild.numerics.reports.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
+from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
+from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
+from support.bench_reports import CASE, MACHINE, lost, row, scenario, scene, swing
+
+BANDS = Bands()
+
+
+def between(old: ScenarioReport, new: ScenarioReport, bands: Bands = BANDS) -> list[Departure]:
+    return list(scene_departures(scene(old), scene(new), bands))
+
+
+def of_rows(old: WorkPrecisionRow, new: WorkPrecisionRow) -> list[tuple[str, ...]]:
+    found = between(scenario([old]), scenario([new]))
+    return [(one.figure, one.recorded, one.measured, one.band) for one in found]
+
+
+def test_nothing_departs_from_itself() -> None:
+    assert between(swing(), swing()) == []
+
+
+def test_times_and_what_follows_from_them_do_not_matter() -> None:
+    slow = [
+        replace(r, cost=9.0, realtime=1.0, spread=3.0, front=not r.front, dominated_by=0)
+        for r in swing().rows
+    ]
+    other = replace(swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere")
+    new = scene(other, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
+    assert scene_departures(scene(), new, BANDS) == ()
+    untimed = [replace(r, cost=None, realtime=None, spread=None) for r in swing().rows]
+    assert between(swing(), replace(swing(), rows=tuple(untimed))) == []
+
+
+def test_an_error_that_left_its_band_is_told_exactly() -> None:
+    new = replace(swing(), rows=(*swing().rows[:-1], replace(swing().rows[-1], position=(1, 1))))
+    first, last = between(swing(), new)
+    assert first == Departure("swing", "RK4 at 1 ms", "error of position", "1.92e-08", "1", "± 5 %")
+    assert last.figure == "error of position at the end"
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "departs"),
+    [
+        (1e-3, 1.0499e-3, False),
+        (1e-3, 0.9501e-3, False),
+        (1e-3, 1.0501e-3, True),
+        (1e-3, 0.9499e-3, True),
+        (1e-11, 1.9e-11, False),  # ten floors are 1e-11
+        (1e-11, 2.1e-11, True),
+        (1e-3, 1e-11, True),
+    ],
+)
+def test_the_band_of_an_error(was: float, now: float, departs: bool) -> None:
+    old, new = row(position=(was, was)), row(position=(now, was))
+    assert bool(of_rows(old, new)) == departs
+
+
+def test_a_band_of_ones_own() -> None:
+    old, new = scenario([row(position=(1.0, 1.0))]), scenario([row(position=(1.2, 1.0))])
+    assert len(between(old, new)) == 1
+    assert between(old, new, Bands(error=0.25)) == []
+    wide = replace(old, orders=(OrderRow("Euler", 1.0, None, None),))
+    other = replace(old, orders=(OrderRow("Euler", 1.2, None, None),))
+    assert len(between(wide, other)) == 1
+    assert between(wide, other, Bands(order=0.3)) == []
+
+
+def test_a_status_says_all_of_its_row() -> None:
+    assert of_rows(row(), lost("Euler", 0.002)) == [("status", "ok", "diverged", "the same")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "found"),
+    [
+        ({"own": True}, {}, ("own setting", "yes", "no", "the same")),
+        ({}, {"refsafe": True}, ("refsafe", "no", "yes", "the same")),
+        (
+            {"energy_drift": -0.0604},
+            {"energy_drift": 0.0664},
+            ("energy drift", "-0.0604", "0.0664", "± 5 %"),
+        ),
+        ({"energy_drift": 1e-14}, {"energy_drift": -3e-13}, None),
+        ({"momentum_drift": 1e-3}, {}, ("momentum drift", "0.001", "nothing", "± 5 %")),
+        ({"penetration": 0.01}, {"penetration": 0.02}, ("penetration", "0.01", "0.02", "± 5 %")),
+        ({"slip": 1e-3}, {"slip": 2e-3}, ("slip", "0.001", "0.002", "± 5 %")),
+        (
+            {"model_error": 0.29},
+            {"model_error": 0.1},
+            ("model error", "0.29", "0.1", "± 5 %"),
+        ),
+        (
+            {"figure": (1.0, 1.0)},
+            {"figure": None},
+            ("error of figure", "1", "nothing", "± 5 %"),
+        ),
+        ({"growth": 1.0}, {"growth": 2.0}, None),
+    ],
+)
+def test_which_figures_of_a_row_depart_and_how_it_is_said(
+    old: Any, new: Any, found: tuple[str, ...] | None
+) -> None:
+    assert of_rows(row(**old), row(**new)) == ([] if found is None else [found])
+
+
+def test_drifts_of_a_chaotic_scenario_or_a_lost_run_say_nothing() -> None:
+    one, other = row(energy_drift=0.1), row(energy_drift=0.2)
+    whole, chaotic = scenario([one]), scenario([one], horizon=0.5)
+    assert len(between(whole, scenario([other]))) == 1
+    assert between(chaotic, scenario([other], horizon=0.5)) == []
+    for old, new in ((whole, scenario([other], horizon=0.5)), (chaotic, scenario([other]))):
+        assert [found.figure for found in between(old, new)] == ["horizon"]
+    slow = {"status": "slow-growth", "reasons": ("it grows",)}
+    assert of_rows(replace(one, **slow), replace(other, **slow)) == []
+
+
+def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
+    old, new = row(velocity=(1e-3, 1e-3)), row(velocity=(2e-3, 2e-3))
+    assert len(between(scenario([old]), scenario([new]))) == 2
+    for floors in ((1e-4, 1e-11), (1e-11, 1e-4)):
+        one, other = (
+            scenario([line], velocity_floor=floor)
+            for line, floor in zip((old, new), floors, strict=True)
+        )
+        assert between(one, other) == []
+        one, other = (
+            scenario([row(position=error)], floor=floor)
+            for error, floor in zip(((1e-3, 1e-3), (2e-3, 2e-3)), floors, strict=True)
+        )
+        assert between(one, other) == []
+
+
+def test_settings_and_scenarios_that_come_and_go() -> None:
+    found = between(scenario([row("Euler")]), scenario([row("RK4", solver="CG")]))
+    assert [(d.setting, d.figure, d.recorded, d.measured) for d in found] == [
+        ("Euler at 2 ms", "setting", "there", "nothing"),
+        ("RK4 at 2 ms, CG", "setting", "nothing", "there"),
+    ]
+    found = between(scenario([]), scenario([], name="other"))
+    assert [(d.where, d.recorded, d.measured) for d in found] == [
+        ("swing", "there", "nothing"),
+        ("other", "nothing", "there"),
+    ]
+
+
+def test_what_is_said_of_the_whole_scenario() -> None:
+    new = scenario([], duration=2.0, horizon=0.5, hold=0.1, reference="self", figure="x (m)")
+    assert [(d.figure, d.recorded, d.measured) for d in between(scenario([]), new)] == [
+        ("duration", "1", "2"),
+        ("hold", "0", "0.1"),
+        ("horizon", "1", "0.5"),
+        ("reference", "ode", "self"),
+        ("figure", "nothing", "x (m)"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "told"),
+    [
+        (0.04, 0.0403, None),
+        (0.04, 0.041, ("0.04", "0.041", "± 1 %")),
+        (0.04, None, ("40 ms", "all", "the same")),
+        (None, 0.04, ("all", "40 ms", "the same")),
+        (0.0, 0.04, ("0", "0.04", "± 1 %")),
+        (None, None, None),
+    ],
+)
+def test_largest_stable_timesteps(
+    was: float | None, now: float | None, told: tuple[str, str, str] | None
+) -> None:
+    def stable(largest: float | None) -> ScenarioReport:
+        return scenario([], stable=(StableRow("Euler", largest, True, (1e-3, 0.1)),))
+
+    found = [(d.recorded, d.measured, d.band) for d in between(stable(was), stable(now))]
+    assert found == ([] if told is None else [told])
+
+
+def test_orders_that_can_be_fitted_no_more() -> None:
+    old = scenario([], orders=(OrderRow("RK4", 4.0, None, 3.9),))
+    new = scenario([], orders=(OrderRow("RK4", None, None, 3.94),))
+    (found,) = between(old, new)
+    assert found == Departure("swing", "RK4", "order of position", "4", "nothing", "± 0.05")
+
+
+@given(share=st.floats(-1, 1))
+def test_a_change_departs_exactly_beyond_the_band(share: float) -> None:
+    old, new = row(position=(1.0, 1.0)), row(position=(1.0 + share, 1.0))
+    if abs(abs(share) - 0.05) > 1e-6:
+        assert bool(of_rows(old, new)) == (abs(share) > 0.05)
+
+
+# --- hard cases
+
+
+def test_a_case_that_is_gone_is_a_departure() -> None:
+    assert case_departures([CASE], [CASE], BANDS) == ()
+    (gone,) = case_departures([CASE], [], BANDS)
+    assert gone == Departure("spring", "", "case", "there", "nothing", "the same")
+
+
+def figure(measured: float | None, exact: float | None = 1.0) -> Any:
+    return replace(CASE, figures=(FigureLine("growth", "m", "Euler", measured, exact, "a law"),))
+
+
+def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
+    assert case_departures([figure(1 + 1e-4)], [figure(1 + 1.04e-4)], BANDS) == ()
+    (found,) = case_departures([figure(1 + 1e-4)], [figure(1 + 2e-4)], BANDS)
+    assert found == Departure(
+        "spring", "Euler", "growth, against theory", "0.0001", "0.0002", "± 5 %"
+    )
+    assert case_departures([figure(1.0)], [figure(1 + 1e-12)], BANDS) == ()
+    assert case_departures([figure(-2e-15, 0.0)], [figure(3e-15, 0.0)], BANDS) == ()
+    assert case_departures([figure(2.0, None)], [figure(2.05, None)], BANDS) == ()
+    assert len(case_departures([figure(2.0, None)], [figure(2.2, None)], BANDS)) == 1
+    assert len(case_departures([figure(2.0)], [figure(None)], BANDS)) == 1
+
+
+def test_boundaries_and_runs_of_cases() -> None:
+    line = BoundaryLine("Euler", None, None, "", None, False, (), "diverged", 1.5, (1e-3, 1.0))
+    new = replace(CASE, boundaries=(line,), errors=(replace(CASE.errors[0], status="reset"),))
+    assert [
+        (d.setting, d.figure, d.recorded, d.measured) for d in case_departures([CASE], [new], BANDS)
+    ] == [
+        ("Euler", "largest stable timestep", "200 ms", "all"),
+        ("Euler", "monotone", "yes", "no"),
+        ("Euler", "beyond", "nothing", "diverged"),
+        ("Euler", "growth", "nothing", "1.5"),
+        ("Euler at 100 ms", "status", "ok", "reset"),
+    ]
+
+
+def test_drifts_of_a_case_are_compared_where_its_run_is_well() -> None:
+    for status, figures in (("ok", ["energy drift"]), ("diverged", [])):
+        old, new = (
+            replace(CASE, errors=(replace(CASE.errors[0], status=status, energy_drift=drift),))
+            for drift in (0.1, 0.2)
+        )
+        assert [found.figure for found in case_departures([old], [new], BANDS)] == figures

@@ -1,0 +1,156 @@
+"""Divergence never passes as success."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.numerics.detector import (
+    NO_BOUNDS,
+    Observation,
+    Peaks,
+    Status,
+    judge,
+    observe,
+    peaks,
+)
+from coursebuild.numerics.engine import advance, simulate
+from coursebuild.numerics.measure import measure
+from coursebuild.numerics.problem import Integrator
+from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.stability import attempt
+
+SPRING = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body><joint type="slide" stiffness="100"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def begun(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, Any]:
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    model.opt.timestep = timestep
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = qpos, qvel
+    return model, data
+
+
+def test_a_run_that_was_reset_and_ends_with_error_zero_is_lost() -> None:
+    model, data = begun(0.3, qvel=1.0)
+    advance(model, data, 1000)
+    assert data.qpos[0] == 0.0 == data.qvel[0]  # as if it had come to rest
+    found = judge(observe(model, data, 1000 * 0.3))
+    assert found.status is Status.RESET
+    assert "MuJoCo warned of bad accelerations" in found.reasons
+    assert any("the state was reset" in reason for reason in found.reasons)
+
+
+def test_the_clock_alone_tells_of_a_reset() -> None:
+    model, data = begun(0.01, qpos=0.5)
+    advance(model, data, 50)
+    mujoco.mj_resetData(model, data)
+    advance(model, data, 50)
+    assert judge(observe(model, data, 1.0)).status is Status.RESET
+    assert judge(observe(model, data, 0.5)).status is Status.OK
+
+
+def test_a_slow_growth_without_any_warning_is_seen() -> None:
+    model, data = begun(0.2002, qpos=0.5)
+    advance(model, data, 130)
+    assert abs(data.qpos[0]) > 100
+    assert not any(warning.number for warning in data.warning)
+    found = judge(
+        observe(model, data, 130 * 0.2002, bounds=replace(NO_BOUNDS, position=1.0, velocity=10.0))
+    )
+    assert found.status is Status.SLOW_GROWTH
+    assert any(reason.startswith("positions reached") for reason in found.reasons)
+
+
+def test_without_automatic_reset_a_divergence_stays_visible() -> None:
+    model, data = begun(0.3, qvel=1.0)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    advance(model, data, 2000)
+    found = judge(observe(model, data, 2000 * 0.3))
+    assert found.status is Status.DIVERGED
+    assert not np.isfinite(data.qpos[0]) or abs(data.qpos[0]) > 1e10
+
+
+@pytest.mark.parametrize("field", ["qpos", "qvel"])
+def test_a_state_that_is_no_number(field: str) -> None:
+    model, data = begun(0.01)
+    getattr(data, field)[0] = np.nan
+    assert judge(observe(model, data, 0.0)).reasons[0] == "the state is not finite"
+
+
+def test_what_was_no_number_on_the_way_stays_so() -> None:
+    _, data = begun(0.01, qpos=0.5, qvel=2.0)
+    for lost in (Peaks(position=math.nan), Peaks(velocity=math.nan)):
+        assert not peaks(data, lost).finite
+    assert peaks(data, Peaks(0.7, 1.0)) == Peaks(0.7, 2.0)
+
+
+def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
+    sunk = problem_named("stack-10000")
+    soft = replace(sunk, mjcf=sunk.mjcf.replace('solref="0.004 1"', 'solref="0.04 1"'))
+    soft = replace(soft, scenario=replace(soft.scenario, qpos=(0.0, 0.0)))
+    run = simulate(soft, Integrator.EULER, 1e-3)
+    assert run.judgement.status is Status.DIVERGED
+    assert len(run.judgement.reasons) == 1
+    assert "as deep in each other" in run.judgement.reasons[0]
+
+
+@pytest.mark.parametrize("integrator", [Integrator.EULER, Integrator.RK4])
+def test_no_error_is_given_for_a_run_that_was_lost(integrator: Integrator) -> None:
+    problem = problem_named("damped-spring-0")
+    fast = replace(problem, mjcf=problem.mjcf.replace('stiffness="100.0"', 'stiffness="1e6"'))
+    found = measure(fast, integrator, 0.02)
+    assert found.judgement.status is Status.DIVERGED
+    assert found.errors is None
+
+
+def test_every_seeded_divergence_is_flagged() -> None:
+    problem = problem_named("damped-spring-0.1")
+    assert problem.limit is not None
+    for integrator in Integrator:
+        limit = problem.limit(integrator)
+        assert limit is not None
+        if integrator is Integrator.DISCRETE:
+            continue
+        for factor in (1.005, 1.1, 2.0, 5.0):
+            trial = attempt(problem, integrator, factor * limit.timestep)
+            assert trial.status in (Status.DIVERGED, Status.SLOW_GROWTH), (integrator, factor)
+
+
+def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
+    # A rod's transverse velocity grows to 1e6 rad/s, turns the axial one down, and decays again.
+    problem = problem_named("thin-rod")
+    assert problem.limit is not None
+    limit = problem.limit(Integrator.RK4)
+    assert limit is not None
+    trial = attempt(problem, Integrator.RK4, 3.1 / math.sqrt(8) * limit.timestep)
+    assert not trial.stable
+
+
+def test_a_good_run_is_good() -> None:
+    good = Observation((0, 0, 0), 1.0, 1.0, 0.01, True, 0.5, 0.5)
+    assert judge(good).ok
+    assert judge(good).reasons == ()
+    assert judge(replace(good, clock=float("nan"))).status is Status.RESET
+    assert judge(replace(good, position=float("nan"))).status is Status.SLOW_GROWTH
+
+
+def test_warnings_are_counted_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    model, data = begun(0.3, qvel=1.0)
+    before = mujoco.get_mju_user_warning()
+    advance(model, data, 100)
+    assert data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number == 1
+    assert capfd.readouterr() == ("", "")
+    assert mujoco.get_mju_user_warning() is before

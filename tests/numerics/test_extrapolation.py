@@ -1,0 +1,64 @@
+"""The integration that references rest on."""
+
+from __future__ import annotations
+
+import decimal
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from coursebuild.numerics.extrapolation import NoConvergenceError, State, integrate
+from coursebuild.numerics.quadrature import cumulative
+
+TIMES = np.linspace(0.25, 20.0, 80)
+
+
+def test_a_circle() -> None:
+    found = integrate(lambda y: np.array([y[1], -y[0]]), np.array([1.0, 0.0]), TIMES)
+    assert np.max(np.abs(found - np.stack([np.cos(TIMES), -np.sin(TIMES)], axis=1))) < 5e-14
+
+
+def test_an_orbit_of_high_eccentricity_agrees_with_another_method() -> None:
+    def rate(y: State) -> State:
+        cube = (y[0] ** 2 + y[1] ** 2) ** 1.5
+        return np.array([y[2], y[3], -y[0] / cube, -y[1] / cube])
+
+    start = np.array([0.2, 0.0, 0.0, 3.0])  # e = 0.8
+    found = integrate(rate, start, TIMES)
+    other = solve_ivp(
+        lambda _, y: rate(y),
+        (0, 20),
+        start,
+        method="DOP853",
+        t_eval=TIMES,
+        rtol=3e-14,
+        atol=1e-16,
+    )
+    # A relative error of 1e-16 in a step moves the phase by this after three turns.
+    assert np.max(np.abs(found - other.y.T)) < 1e-10
+    energy = (found[:, 2] ** 2 + found[:, 3] ** 2) / 2 - 1 / np.hypot(found[:, 0], found[:, 1])
+    assert np.max(np.abs(energy + 0.5)) < 1e-12
+
+
+def test_decimal_numbers_have_the_digits_that_were_asked_for() -> None:
+    with decimal.localcontext(decimal.Context(prec=40)):
+        start = np.array([Decimal(1)], dtype=object)
+        found = integrate(lambda y: -y, start, np.array([1.0, 2.0]), 1e-30, columns=12)
+        for row, time in zip(found, (1, 2), strict=True):
+            assert abs(row[0] - Decimal(-time).exp()) < Decimal("1e-29")
+
+
+def test_a_solution_that_ends_is_not_passed() -> None:
+    found = integrate(lambda y: y * y, np.array([1.0]), np.array([0.5, 0.9]))
+    assert np.max(np.abs(found[:, 0] / [2.0, 10.0] - 1)) < 1e-13
+    with pytest.raises(NoConvergenceError, match="no step is small enough at 1 s"):
+        integrate(lambda y: y * y, np.array([1.0]), np.array([2.0]))
+
+
+def test_quadrature_to_each_time() -> None:
+    times = np.array([0.1, 0.5, 3.0, 3.5])
+    found = cumulative(lambda t: np.exp(-t) * np.sin(9 * t), times, 0.2)
+    exact = (9 - np.exp(-times) * (np.sin(9 * times) + 9 * np.cos(9 * times))) / 82
+    assert np.max(np.abs(found - exact)) < 1e-15

@@ -1,0 +1,132 @@
+"""Which settings are worth their cost."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from coursebuild.numerics.front import Point, front, verdict, words
+from coursebuild.numerics.reports.bench import Setting, Verdict
+
+EULER, RK4 = Setting("Euler", 0.002, "", 0, ""), Setting("RK4", 0.01, "", 0, "")
+
+
+def on_it(*points: tuple[float, float] | None) -> list[bool]:
+    found = front([None if one is None else Point(*one) for one in points])
+    return [place.front for place in found]
+
+
+def test_cheaper_and_more_accurate_is_better() -> None:
+    points = [Point(1, 1e-3), Point(0.5, 1e-5), Point(0.1, 0.3), Point(4, 1e-3), None]
+    found = front(points)
+    assert [place.front for place in found] == [False, True, True, False, False]
+    assert [place.dominated_by for place in found] == [1, None, None, 1, None]
+
+
+def test_small_differences_are_none() -> None:
+    assert on_it((1, 1e-3), (1.02, 1e-3)) == [True, True]
+    assert on_it((1, 1e-3), (1.02, 1.04e-3)) == [True, True]
+    assert on_it((1, 1e-3), (1.2, 1e-3)) == [True, False]
+    assert on_it((1, 1e-3), (1, 1.06e-3)) == [True, False]
+    assert on_it((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
+    assert on_it((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
+
+
+def test_errors_of_zero_and_nothing_at_all() -> None:
+    assert on_it((1, 0.0), (2, 0.0), (0.5, 1e-12)) == [True, False, True]
+    assert on_it() == []
+    assert on_it(None, None) == [False, False]
+
+
+def test_what_dominates_is_on_the_front() -> None:
+    points = [Point(8, 8.0), Point(4, 4.0), Point(2, 2.0), Point(1, 1.0)]
+    assert [place.dominated_by for place in front(points)] == [3, 3, 3, None]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_front_is_the_same_however_costs_are_disturbed(seed: int) -> None:
+    """Costs as they repeat: to two per cent; with ties, near ties and clear cases."""
+    noise = random.Random(seed)
+    true = [(1.0, 1e-3), (1.042, 1e-3), (1.049, 1e-3), (1.2, 1e-3), (0.5, 2e-3), (0.53, 2e-3)]
+    true += [(0.94, 1e-7), (1.9, 1e-9), (1.93, 1.2e-9), (0.25, 4e-3), (0.26, 3e-3)]
+    fronts = set()
+    for _ in range(60):
+        costs = [cost * (1 + noise.uniform(-0.01, 0.01)) for cost, _ in true]
+        fronts.add(tuple(on_it(*((c, e) for c, (_, e) in zip(costs, true, strict=True)))))
+    assert len(fronts) == 1
+
+
+def judged(
+    points: list[Point | None], seen: float | None, reasons: tuple[str, ...] = ()
+) -> Verdict:
+    return verdict([EULER, RK4], points, front(points), 0, seen, reasons)
+
+
+def test_a_verdict_on_a_good_choice() -> None:
+    found = judged([Point(1, 1e-3), Point(4, 1e-7)], 1e-3)
+    assert (found.on_front, found.better, found.noticeable) == (True, None, False)
+    assert found.text == (
+        "no other setting is cheaper without being less accurate; a learner would not notice its "
+        "error, which is 0.001 of what can be seen"
+    )
+
+
+def test_what_can_just_be_seen_is_noticed() -> None:
+    found = judged([Point(1, 1e-3), Point(4, 1e-7)], 1.0)
+    assert found.noticeable is True
+    assert "; a learner would notice its error, which is 1 times what can be seen" in found.text
+
+
+def test_a_verdict_on_a_bad_one() -> None:
+    found = judged([Point(1, 2.5), Point(0.94, 2.5e-6)], 2.5)
+    assert (found.on_front, found.better, found.noticeable) == (False, 1, True)
+    assert found.cost_ratio == pytest.approx(0.94)
+    assert found.error_ratio == pytest.approx(1e-6)
+    assert found.text == (
+        "RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; a learner would "
+        "notice its error, which is 2.5 times what can be seen"
+    )
+
+
+def test_a_verdict_names_what_would_be_enough() -> None:
+    points: list[Point | None] = [Point(0.5, 50), Point(2, 1e-6)]
+    found = verdict([EULER, RK4], points, front(points), 0, 50, (), 1)
+    assert found.text.endswith(
+        "a learner would notice its error, which is 50 times what can be seen; the cheapest "
+        "without one that is seen is RK4 at 10 ms, at 4 times its cost"
+    )
+    found = verdict([EULER, RK4], points, front(points), 0, 50, (), hopeless=True)
+    assert found.text.endswith("times what can be seen, and that of every other setting too")
+    found = verdict([EULER, RK4], points, front(points), 0, 0.5, (), 1)
+    assert found.text.endswith("which is 0.5 of what can be seen")
+
+
+def test_a_verdict_where_too_little_is_known() -> None:
+    found = judged([Point(1, 2.0), Point(0.5, 2.0)], None)
+    assert found.noticeable is None
+    assert found.text == (
+        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
+        "would notice its error is not known"
+    )
+
+
+def test_a_verdict_where_the_scene_does_not_run() -> None:
+    found = judged([None, Point(1, 2.0)], None, ("the state is not finite",))
+    assert (found.on_front, found.better, found.cost_ratio) == (False, 1, None)
+    assert found.text == (
+        "the scene does not run under its own setting, Euler at 2 ms: the state is not finite; "
+        "RK4 at 10 ms is the most accurate that does"
+    )
+    assert judged([None, None], None, ("it hangs",)).text.endswith("Euler at 2 ms: it hangs")
+
+
+def test_a_verdict_where_nothing_was_timed() -> None:
+    found = judged([None, None], 0.5)
+    assert (found.on_front, found.noticeable) == (False, False)
+    assert found.text.startswith("nothing was timed, so that no setting can be called better; a ")
+
+
+def test_settings_in_words() -> None:
+    full = Setting("implicitfast", 0.002, "Newton", 20, "elliptic")
+    assert words(full) == "implicitfast at 2 ms, Newton, at most 20 iterations, elliptic cone"

@@ -1,0 +1,246 @@
+"""References of scenes, and how well they are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.numerics.collocation import collocated
+from coursebuild.numerics.extrapolation import NoConvergenceError, integrate
+from coursebuild.numerics.forward import forward_states
+from coursebuild.numerics.knowing import Known, know
+from coursebuild.numerics.pilot import Bounded, pilot
+from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations
+from coursebuild.vocabulary import CLOSED_FORMS
+
+pytestmark = pytest.mark.site
+
+PENDULUM = """\
+<mujoco>
+  <option timestep="0.002">{option}</option>
+  <worldbody>
+    <geom type="plane" size="3 3 1" pos="0 0 {floor}"/>
+    <body>
+      <joint axis="0 1 0" {joint}/>
+      <geom type="sphere" size="0.02" mass="1" pos="0 0 -1"/>
+    </body>
+  </worldbody>
+  <actuator><general joint="{acts}" {actuator}/></actuator>
+  <keyframe><key name="level" qpos="1.5707963267948966"/></keyframe>
+</mujoco>
+"""
+
+
+def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str = "") -> Any:
+    text = PENDULUM.format(
+        joint=f'name="pin" {joint}', floor=floor, acts="pin", actuator=actuator, option=option
+    )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> Known:
+    parsed = parse_declarations(Source("models/m.toml", "[[scenario]]\n" + text))
+    assert parsed.value is not None, parsed.diagnostics
+    (scene,) = scenes(model, parsed.value, quick=True)
+    return know(model, scene, pilot(model, scene), quick=True)
+
+
+def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
+    closed = [p.name for p in all_problems() if p.reference and p.reference.kind == "closed"]
+    assert list(CLOSED_FORMS) == closed
+
+
+# ------------------------------------------------------------------------------------ collocation
+
+
+def test_collocation_of_an_oscillator() -> None:
+    times = np.linspace(0.1, 10.0, 40)
+    found = collocated(lambda y: np.array([y[1], -9.0 * y[0]]), np.array([1.0, 0.0]), times)
+    exact = np.stack([np.cos(3 * times), -3 * np.sin(3 * times)], axis=1)
+    assert np.max(np.abs(found - exact)) < 1e-13
+
+
+def test_collocation_and_extrapolation_agree_on_kepler() -> None:
+    def rate(y: Array) -> Array:
+        cubed = np.hypot(y[0], y[1]) ** 3
+        return np.array([y[2], y[3], -y[0] / cubed, -y[1] / cubed])
+
+    start, times = np.array([0.4, 0.0, 0.0, 2.0]), np.linspace(0.5, 12.0, 24)
+    apart = collocated(rate, start, times) - integrate(rate, start, times)
+    assert np.max(np.abs(apart)) < 2e-11
+
+
+def test_collocation_says_where_it_does_not_settle() -> None:
+    with pytest.raises(NoConvergenceError):
+        collocated(
+            lambda y: np.array([1.0, np.sign(np.sin(50 * y[0]))]), np.zeros(2), np.array([1.0])
+        )
+
+
+# ------------------------------------------------------------------------------------- references
+
+
+def test_a_smooth_scene_is_integrated_twice() -> None:
+    found = known(pendulum("damping='0.3'"))
+    assert (found.kind, found.note) == ("ode", "")
+    assert found.source == "Bulirsch–Stoer over mj_forward"
+    assert found.second == "Gauss's collocation of order 12 over mj_forward"
+    assert found.agreement < 1e-12
+    assert found.horizon == 0.5
+
+
+@pytest.mark.parametrize(
+    ("model", "why"),
+    [
+        (pendulum(floor=-0.5), "contact"),
+        (pendulum("range='60 120' limited='true'"), "a limit that is reached"),
+        (pendulum("frictionloss='0.2'"), "dry friction"),
+    ],
+    ids=["contact", "limit", "friction"],
+)
+def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: str) -> None:
+    (scene,) = scenes(model, None, quick=True)
+    first = pilot(model, scene)
+    assert first.jumps == (why,)
+    found = know(model, scene, first, quick=True)
+    assert found.kind == "self"
+    step = min(scene.timesteps) / 8
+    assert found.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
+    assert found.second == f"the same under Euler at {2 * step:g} s"
+    assert found.floor.place > 1e-7, "it is not called better known than it is"
+
+
+FULL = 'dyntype="integrator" gainprm="2" actlimited="true" actrange="-{most} {most}"'
+"""An activation that a constant command fills until it is full."""
+
+
+def test_an_activation_at_its_limit_is_a_jump() -> None:
+    # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    first = pilot(model, scene)
+    assert first.jumps == ("an activation at its limit",)
+    found = know(model, scene, first, quick=True)
+    assert found.kind == "self"
+    model.opt.timestep = 1e-4
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 20_000)
+    assert data.act[0] == 0.3
+    assert found.states.act[-1, 0] == 0.3
+    assert found.motion.position[-1, 0] == pytest.approx(data.qpos[0], abs=1e-3)
+    wide = pendulum("damping='1'", actuator=FULL.format(most=9))
+    wide.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(wide, None, quick=True)
+    assert pilot(wide, scene).jumps == ()
+
+
+def test_an_integration_of_other_accelerations_is_no_reference() -> None:
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    unseen = replace(pilot(model, scene), jumps=())  # as of something that is not looked for
+    found = know(model, scene, unseen, quick=True)
+    assert found.kind == "self"
+    assert found.note == "no integration: the engine in small steps tends elsewhere"
+
+
+def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
+    text = 'dyntype="filterexact" dynprm="0.1" gainprm="2"'
+    early = pendulum(actuator=f'{text} actearly="true"')
+    late = pendulum(actuator=text)
+    for model in (early, late):
+        model.key_ctrl[0, 0] = 1.0
+    first, second = known(early), known(late)
+    assert (first.kind, second.kind) == ("ode", "ode")
+    assert np.array_equal(first.states.qpos, second.states.qpos)
+
+
+def test_a_limit_that_is_not_reached_changes_nothing() -> None:
+    model = pendulum("range='-170 170' limited='true'")
+    (scene,) = scenes(model, None, quick=True)
+    assert pilot(model, scene).smooth
+
+
+def test_commands_and_activations_are_integrated() -> None:
+    """A filter of first order on a motor: what a formula says, with commands held."""
+    act = 'dyntype="filter" dynprm="0.2" gainprm="3"'
+    model = pendulum("", actuator=act, option='<flag gravity="disable"/>')
+    text = 'name = "a"\ncontrols = [[1], [-1]]\nhold = 0.2\nsample = 0.1\nduration = 0.4\n'
+    found = known(model, text)
+    times = found.states.times
+    rising = 1 - np.exp(-times / 0.2)
+    then = -1 + (1 + 1 - np.exp(-1.0)) * np.exp(-(times - 0.2) / 0.2)
+    exact = np.where(times <= 0.2 + 1e-9, rising, then)
+    assert found.kind == "ode"
+    assert np.max(np.abs(found.states.act[:, 0] - exact)) < 1e-12
+
+
+def test_an_integration_that_takes_too_long_ends() -> None:
+    model = pendulum()
+    setup = Bounded(Scenario(0.5, 0.1, (1.0,)), 1.0, 1.0)
+    with pytest.raises(NoConvergenceError, match="more than 20 evaluations"):
+        forward_states(model, setup, setup.scenario.times, integrate, evaluations=20)
+
+
+def test_an_author_may_choose() -> None:
+    text = 'name = "a"\nkeyframe = 0\nduration = 0.1\nreference = '
+    assert known(pendulum(), text + '"self"').kind == "self"
+    with pytest.raises(SceneError) as caught:
+        known(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
+    assert caught.value.message == "no integration can be the reference: there is contact"
+
+
+# ----------------------------------------------------------------------------------- closed forms
+
+
+SPRING = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <body>
+      <joint type="slide" axis="1 0 0" stiffness="{stiffness}" damping="2"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def spring(stiffness: float) -> Any:
+    return mujoco.MjModel.from_xml_string(SPRING.format(stiffness=stiffness))
+
+
+def test_a_closed_form_comes_first_and_is_checked() -> None:
+    text = (
+        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
+    )
+    found = known(spring(100), text)
+    assert found.kind == "closed"
+    assert found.second == "Bulirsch–Stoer over mj_forward"
+    assert found.agreement < 1e-11
+
+
+def test_a_closed_form_of_something_else_is_refused() -> None:
+    text = (
+        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
+    )
+    with pytest.raises(SceneError) as caught:
+        known(spring(101), text)
+    message = "the closed form of `damped-spring-0.1` is not this scene's motion"
+    assert caught.value.message == message
+    assert caught.value.span is not None
+    assert caught.value.span.text == '"closed:damped-spring-0.1"'
+    with pytest.raises(SceneError, match="begins otherwise than the hard case"):
+        known(spring(100), text.replace("[5]", "[5.1]"))
+    with pytest.raises(SceneError, match="other joints than the hard case"):
+        known(pendulum(), text.replace("damped-spring-0.1", "coin"))

@@ -1,0 +1,320 @@
+"""Errors, orders and drifts: what NUMERICS demands of the hard cases."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.numerics.detector import Judgement, Status
+from coursebuild.numerics.engine import Run
+from coursebuild.numerics.measure import (
+    FLOORS,
+    Error,
+    Errors,
+    Measurement,
+    energy_drift,
+    errors,
+    measure,
+    momentum_drift,
+    order,
+    orders,
+    raised,
+)
+from coursebuild.numerics.problem import STANDARD, Integrator, Motion
+from coursebuild.numerics.problems import (
+    double_pendulum,
+    impact,
+    incline,
+    problem_named,
+    projectile,
+    scales,
+    stack,
+    tops,
+    touching_cradle,
+    tumbling_box,
+)
+
+FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
+
+
+@functools.cache
+def measured(name: str, integrator: Integrator) -> tuple[Measurement, ...]:
+    problem = problem_named(name)
+    return tuple(measure(problem, integrator, h) for h in problem.timesteps)
+
+
+def slopes(name: str, integrator: Integrator) -> dict[str, float]:
+    """The orders that could be fitted, by what they are of."""
+    found = orders(problem_named(name), measured(name, integrator))
+    parts = {"position": found.position, "attitude": found.attitude, "velocity": found.velocity}
+    return {part: one.value for part, one in parts.items() if one is not None}
+
+
+# --- orders
+
+
+@pytest.mark.site
+def test_the_euler_family_is_of_first_order() -> None:
+    names = ("tumbling-box", "damped-spring-0", "free-top", "projectile")
+    for name, integrator in itertools.product(names, FIRST):
+        found = slopes(name, integrator)
+        if name != "tumbling-box":
+            found.pop("velocity", None)
+        assert found
+        assert found == pytest.approx(dict.fromkeys(found, 1.0), abs=0.05), (name, integrator)
+    assert set(slopes("tumbling-box", Integrator.EULER)) == {"attitude", "velocity"}
+
+
+@pytest.mark.site
+def test_rk4_is_of_fourth_order_in_velocity_and_of_second_in_attitude() -> None:
+    for name in ("tumbling-box", "free-top", "thin-rod", "coin", "flat-plate"):
+        found = slopes(name, Integrator.RK4)
+        assert found["velocity"] == pytest.approx(4.0, abs=0.1), name
+        assert found["attitude"] == pytest.approx(2.0, abs=0.05), name
+
+
+@pytest.mark.site
+def test_where_torque_depends_on_attitude_rk4_is_of_second_order_in_velocity_too() -> None:
+    assert slopes("heavy-top", Integrator.RK4)["velocity"] == pytest.approx(2.0, abs=0.05)
+
+
+def test_rk4_is_of_fourth_order_on_springs() -> None:
+    for name in ("damped-spring-0", "damped-spring-0.1", "damped-spring-1"):
+        expected = {"position": 4.0, "velocity": 4.0}
+        assert slopes(name, Integrator.RK4) == pytest.approx(expected, abs=0.1), name
+
+
+@pytest.mark.site
+def test_rk4_is_nearly_of_fourth_order_on_a_pendulum_from_90_degrees() -> None:
+    assert slopes("pendulum-hinge-90", Integrator.RK4)["position"] >= 3.8
+    assert slopes("pendulum-ball-90", Integrator.RK4)["attitude"] >= 3.8
+
+
+def test_an_order_is_fitted_only_where_it_shows() -> None:
+    steps = [2.0**-n for n in range(12)]
+    clean = [h**3 for h in steps]
+    spoilt = [max(e, 1e-7) if e < 0.1 else 5.0 for e in clean]
+    assert order(steps, spoilt, 1e-9) == order(steps[2:8], clean[2:8], 0.0)
+    assert order(steps[:2], clean[:2], 0.0) is None
+    three = order(steps[2:5], clean[2:5], 0.0)
+    assert three is not None
+    assert three.points == 3
+    assert order(steps, [1e-12] * 12, 1e-12) is None
+
+
+def test_no_order_is_fitted_where_none_is_to_be_expected() -> None:
+    found = measured("elastic-impact", Integrator.EULER)
+    fit = orders(problem_named("elastic-impact"), found)
+    assert (fit.position, fit.attitude, fit.velocity) == (None, None, None)
+
+
+# --- errors and floors
+
+
+@pytest.mark.site
+def test_no_error_lies_below_ten_floors() -> None:
+    for name in ("projectile", "millimetre-cube", "damped-spring-10"):
+        problem = problem_named(name)
+        assert problem.reference is not None
+        for one in measured(name, Integrator.RK4):
+            if one.errors is None:
+                continue
+            assert one.floor == FLOORS * problem.reference.floor
+            for part in (one.errors.position, one.errors.attitude, one.errors.velocity):
+                assert part is None or min(part.largest, part.end) >= one.floor
+
+
+def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
+    times = np.array([1.0, 2.0])
+    level = np.broadcast_to(np.array([1.0, 0, 0, 0]), (2, 1, 4))
+    turned = np.array([[[np.cos(0.05), np.sin(0.05), 0, 0]], [[-1.0, 0, 0, 0]]])
+    a = Motion(times, np.empty((2, 0)), level, np.zeros((2, 3)))
+    b = Motion(times, np.empty((2, 0)), turned, np.array([[3.0, 4, 0], [0, 0, 1]]))
+    found = errors(b, a)
+    assert found.position is None
+    assert found.attitude is not None
+    assert found.attitude.largest == pytest.approx(0.1, abs=1e-15)
+    assert found.attitude.end == 0.0
+    assert found.velocity == Error(5.0, 1.0)
+    assert raised(Errors(None, None, Error(5.0, 1.0)), 2.0).velocity == Error(5.0, 2.0)
+
+
+def test_a_timestep_that_misses_the_end_is_refused() -> None:
+    problem = problem_named("projectile")
+    with pytest.raises(ValueError, match=r"the sampling interval \(0\.1 s\) is no multiple"):
+        measure(problem, Integrator.EULER, 0.03)
+    longer = replace(problem, scenario=replace(problem.scenario, duration=1.05))
+    with pytest.raises(ValueError, match=r"the duration \(1\.05 s\) is no multiple"):
+        measure(longer, Integrator.EULER, 0.01)
+
+
+def test_commands_are_held_on_a_grid_that_all_timesteps_share() -> None:
+    found = orders(problem_named("stiff-servo-1"), measured("stiff-servo-1", Integrator.RK4))
+    assert found.velocity is not None
+    assert found.velocity.value > 3.9  # a command taken anew at every step would make it 1
+
+
+# --- invariants
+
+
+def test_energy_belongs_to_the_moment_it_is_given_for() -> None:
+    # The energy that MuJoCo gives after a step is that of before: it would seem to oscillate.
+    found = measure(problem_named("pendulum-hinge-90"), Integrator.RK4, 0.1 / 160)
+    assert found.energy_drift is not None
+    assert abs(found.energy_drift) < 1e-11
+
+
+def test_no_drift_of_energy_is_given_where_it_is_not_conserved() -> None:
+    spring = measure(problem_named("damped-spring-1"), Integrator.RK4, 0.1 / 160)
+    assert spring.energy_drift is None
+
+
+def run_of(energy: list[list[float]], momentum: list[list[float]]) -> Run:
+    """A run of which only the invariants are looked at: potential and kinetic energy, momentum."""
+    times, nothing = np.arange(1.0, len(energy)), np.empty((len(energy) - 1, 0))
+    ok, table = Judgement(Status.OK), np.array(energy)
+    return Run(times, nothing, nothing, table, np.array(momentum), 0.0, ok, nothing)
+
+
+def test_a_drift_is_the_largest_change_with_its_sign() -> None:
+    momentum = [[0.0, 0.0, 2.0], [0.0, 1.0, 2.0], [0.0, 0.0, 1.5]]
+    run = run_of([[1.0, 4.0], [2.0, 2.0], [3.0, 2.5]], momentum)
+    assert energy_drift(run) == -0.25
+    assert energy_drift(run, 0.5) == -2.0
+    assert momentum_drift(run) == 0.5
+    from_rest = run_of([[1.0, 0.0], [2.0, 2.0], [1.0, 0.5]], momentum)
+    assert energy_drift(from_rest) == 1.5
+
+
+def test_no_drift_is_given_of_what_is_no_number_or_was_nothing() -> None:
+    good = [[0.0, 0.0, 2.0], [0.0, 0.0, 1.0]]
+    for lost in (math.nan, math.inf):
+        assert energy_drift(run_of([[1.0, 4.0], [1.0, lost]], good)) is None
+        assert momentum_drift(run_of([[1.0, 4.0]] * 2, [[0.0, 0.0, 2.0], [lost, 0.0, 1.0]])) is None
+    assert energy_drift(run_of([[1.0, 0.0], [2.0, 0.0]], good)) is None
+    assert energy_drift(run_of([[1.0, 4.0], [2.0, 4.0]], good), 0.0) is None
+    assert momentum_drift(run_of([[1.0, 4.0]] * 2, [[0.0] * 3, [1.0, 0.0, 0.0]])) is None
+
+
+def test_energy_may_hold_where_attitude_does_not() -> None:
+    found = measure(problem_named("tumbling-box"), Integrator.RK4, 0.01)
+    assert found.errors is not None
+    assert found.errors.attitude is not None
+    assert found.energy_drift is not None
+    assert abs(found.energy_drift) < 1e-7
+    assert found.errors.attitude.largest > 1e-5
+    assert found.momentum_drift is not None
+    assert found.momentum_drift > 1e-7
+
+
+# --- figures of the cases
+
+
+def test_the_box_drifts_to_four_digits() -> None:
+    drift = {one: tumbling_box.kinetic_drift(one) for one in STANDARD}
+    assert round(drift[Integrator.EULER], 3) == 6.641
+    for one in (Integrator.IMPLICIT, Integrator.IMPLICITFAST, Integrator.DISCRETE):
+        assert round(drift[one], 3) == -6.040
+    assert abs(drift[Integrator.RK4]) < 1e-8
+
+
+def test_rk4_hits_the_first_crossing() -> None:
+    errors = {}
+    for nudge in tumbling_box.NUDGES:
+        exact = tumbling_box.Tumbling(nudge, tumbling_box.SPIN).first_crossing
+        errors[nudge] = abs(tumbling_box.measured_crossing(Integrator.RK4, nudge) - exact)
+    assert max(errors.values()) < 1e-8, errors
+
+
+def test_the_flip_interval_grows_by_a_constant_for_each_decade() -> None:
+    forms = [tumbling_box.Tumbling(nudge, tumbling_box.SPIN) for nudge in tumbling_box.NUDGES]
+    for smaller, larger in itertools.pairwise(forms[:-1]):
+        grown = smaller.flip_interval - larger.flip_interval
+        assert grown == pytest.approx(2 * math.log(10) / smaller.rate, rel=2e-5)
+
+
+def test_growth_of_the_transverse_velocity() -> None:
+    errors = {}
+    for name, integrator, z in itertools.product(tops.TOPS, STANDARD, (0.03, 0.1, 0.3)):
+        exact = tops.transverse_growth(integrator, z)
+        errors[name, integrator, z] = abs(tops.measured_growth(name, integrator, z) - exact)
+    assert max(errors.values()) < 1e-9, errors
+
+
+def test_a_projectile_is_off_by_half_a_step() -> None:
+    for integrator in STANDARD:
+        exact = projectile.exact_error(integrator)
+        assert abs(projectile.fall_error(integrator) - exact) < 1e-12, integrator
+
+
+@pytest.mark.site
+def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
+    """In second order: by π²/8n² at most, to leading order, as lesson 4.3 derives for Euler."""
+    for steps in (5, 10, 20, 40, 80):
+        off = abs(impact.restitution(Integrator.EULER, steps) - 1)
+        assert 0.7 < off / (math.pi**2 / (8 * steps**2)) < 1
+        assert abs(impact.restitution(Integrator.RK4, steps) - 1) < off
+    assert impact.restitution(Integrator.DISCRETE, 80) < 0.95  # it damps
+    assert impact.passed_on(Integrator.RK4, 20) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.site
+def test_a_cradle_that_touches_is_another_problem() -> None:
+    exact = touching_cradle.integrated(np.array([0.06])).velocity[0]
+    assert np.sum(exact) == pytest.approx(1.0, rel=1e-12)  # momentum
+    # The contact that opens first still pushed: its part of the energy is lost.
+    assert np.sum(exact**2) == pytest.approx(0.998656, abs=1e-6)
+    assert exact[0] < -0.3
+    assert exact[2] < 0.75
+    found = [touching_cradle.last_velocity(Integrator.RK4, ball) for ball in range(3)]
+    assert found == pytest.approx(exact.tolist(), abs=1e-3)
+
+
+def test_a_pyramid_has_less_friction_between_its_axes() -> None:
+    gravity, half = incline.GRAVITY, math.sqrt(0.5)
+    coulomb = gravity * half * (1 - incline.FRICTION)
+    blunted = gravity * half * (1 - incline.FRICTION * half)
+    for cone, across, exact in (
+        ("elliptic", False, coulomb),
+        ("elliptic", True, coulomb),
+        ("pyramidal", False, coulomb),
+        ("pyramidal", True, blunted),
+    ):
+        text = incline.mjcf("box", incline.SLIDING, across, cone, incline.FRICTION)  # type: ignore[arg-type]
+        found = incline.acceleration(text, Integrator.EULER)
+        # The block chatters: its contacts act only part of the time.
+        assert found == pytest.approx(exact, rel=0.04), (cone, across)
+
+
+def test_what_should_stick_creeps() -> None:
+    for cone in ("elliptic", "pyramidal"):
+        text = incline.mjcf("box", incline.STICKING, False, cone, incline.FRICTION)  # type: ignore[arg-type]
+        assert 1e-5 < incline.creep(text, Integrator.EULER) < 2e-3
+
+
+def test_a_stack_comes_to_rest_at_the_depth_of_its_soft_contacts() -> None:
+    for ratio in stack.RATIOS[:-1]:
+        sinking = problem_named(f"stack-{ratio:g}").figures[0]
+        exact = sinking.exact(Integrator.EULER)
+        assert exact is not None
+        assert sinking.measure(Integrator.EULER) == pytest.approx(exact, rel=1e-6), ratio
+
+
+@pytest.mark.site
+def test_the_horizon_of_the_double_pendulum() -> None:
+    euler, rk4 = (double_pendulum.horizon(one) for one in (Integrator.EULER, Integrator.RK4))
+    assert 1.5 < euler < 3.5
+    assert 9.0 < rk4 < 13.0
+
+
+def test_bodies_that_are_tiny_far_away_or_thin() -> None:
+    assert scales.crawled(Integrator.EULER, 1e-5) == 0.0  # less than half a number's distance
+    assert scales.crawled(Integrator.EULER, 1e-2) == pytest.approx(1e-3, rel=0.5)
+    assert scales.sunk(Integrator.EULER) > 0.05
+    assert "A + B >= C" in scales.plate_error()
+    assert scales.problems()[2].figures[0].measure(Integrator.EULER) == pytest.approx(0.1111)

@@ -1,0 +1,269 @@
+"""The work–precision plot: every report gives a drawing in which everything is told apart."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coursebuild.drawing.marks import text_width
+from coursebuild.drawing.symbols import colour, cross, dash, mark
+from coursebuild.numerics.reports.bench import ScenarioReport, StableRow
+from coursebuild.numerics.reports.plot import STYLE, plot_svg
+from coursebuild.numerics.reports.points import chart, quantities, telling
+from support.bench_reports import lost, row, scenario, swing
+
+PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
+
+
+def drawn(report: ScenarioReport, **how: Any) -> ElementTree.Element:
+    """The plot: well-formed, everything inside of it, and no two texts over each other."""
+    svg = plot_svg(report, name="p", **how)
+    root = ElementTree.fromstring(svg)
+    _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
+    boxes = []
+    for text in root.iter("text"):
+        assert text.text
+        if "x" not in text.attrib:
+            continue
+        x, y = float(text.attrib["x"]), float(text.attrib["y"])
+        wide = text_width(text.text, float(text.attrib.get("font-size", "12"))) * 0.85
+        left = x - {"end": wide, "middle": wide / 2}.get(text.attrib.get("text-anchor", ""), 0)
+        assert left >= -1 and left + wide <= width + 1, text.text
+        assert 0 <= y <= height, text.text
+        boxes.append((left, y - 8, left + wide, y, text.text))
+    for i, a in enumerate(boxes):
+        for b in boxes[i + 1 :]:
+            apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+            assert apart, (a, b)
+    for path in root.iter("path"):
+        for x, y in PLACE.findall(path.attrib["d"].split("a")[0].split("l")[0].split("h")[0]):
+            assert -1 <= float(x) <= width + 1
+            assert -1 <= float(y) <= height + 1
+    return root
+
+
+def titles(root: ElementTree.Element) -> list[str]:
+    return [title.text or "" for path in root.iter("path") for title in path.iter("title")]
+
+
+def texts(root: ElementTree.Element) -> list[str]:
+    return [text.text or "" for text in root.iter("text")]
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
+    report = swing()
+    root = drawn(report, narrow=narrow)
+    found = titles(root)
+    assert len(found) == len(report.rows)
+    assert "RK4 at 20 ms · error 0.00307 · cost 0.39 · 50 steps · on the Pareto front" in found
+    assert (
+        "Euler at 2 ms · error 0.0048 · cost 1 · 500 steps · the scene’s own setting · "
+        "RK4 at 20 ms is better" in found
+    )
+    (gone,) = [title for title in found if "diverged" in title]
+    assert gone == "Euler at 50 ms · diverged; the state is not finite · not timed · 20 steps"
+    shown = texts(root)
+    assert "own: Euler at 2 ms" in shown
+    assert "Euler is stable up to 40 ms" in shown
+    assert "RK4 is stable up to 90 ms" in shown
+    assert "cost, relative to the scene’s own setting" in shown
+    assert "error: position (m or rad)" in shown
+    for name in ("Euler", "implicit", "RK4"):
+        assert name in shown
+
+
+def test_lines_differ_by_colour_dash_and_mark() -> None:
+    root = drawn(swing())
+    for number in (0, 1, 3):
+        lines = [
+            path
+            for path in root.iter("path")
+            if path.attrib.get("stroke-width") == "1.7" and path.attrib["stroke"] == colour(number)
+        ]
+        assert len(lines) == 1
+        assert lines[0].attrib.get("stroke-dasharray", "") == dash(number)
+    assert len({re.sub(r"[\d.-]", "", mark(n, 0, 0, 4)) for n in (0, 1, 3)}) == 3
+
+
+def test_marks_of_the_front_are_filled_and_others_are_not() -> None:
+    report = swing()
+    marks = [path for path in drawn(report).iter("path") if list(path.iter("title"))]
+    fills = {titles_of(path)[0]: path.attrib["fill"] for path in marks}
+    for text, fill in fills.items():
+        if "on the Pareto front" in text:
+            assert fill == colour(3)
+        elif "diverged" in text:
+            assert fill == "none"
+        else:
+            assert fill == "var(--paper, Canvas)"
+
+
+def test_a_lost_run_is_a_cross_in_the_lane_of_its_integrator() -> None:
+    root = drawn(swing())
+    (gone,) = [p for p in root.iter("path") if any("diverged" in t for t in titles_of(p))]
+    assert gone.attrib["stroke"] == colour(0)
+    x, y = (float(v) + 3.6 for v in re.match(r"M(\S+) (\S+?)l", gone.attrib["d"]).groups())  # type: ignore[union-attr]
+    assert gone.attrib["d"] == cross(x, y, 3.6)
+    (edge,) = [p for p in root.iter("path") if p.attrib.get("stroke-opacity") == "0.7"]
+    top = float(edge.attrib["d"].split()[1].partition("V")[0])
+    assert y < top
+
+
+def titles_of(path: ElementTree.Element) -> list[str]:
+    return [title.text or "" for title in path.iter("title")]
+
+
+def test_what_is_not_resolved_is_a_band() -> None:
+    report = scenario([row("RK4", h, position=(max(h**4, 1e-10),) * 2) for h in (0.1, 0.01, 0.001)])
+    report = replace(report, floor=1e-11)
+    root = drawn(report)
+    assert "under 10⁻¹⁰: not resolved by the reference" in texts(root)
+    assert not [t for t in texts(drawn(replace(report, floor=1e-16))) if "not resolved" in t]
+
+
+def seen(*errors: float) -> ScenarioReport:
+    return scenario([row("RK4", 0.01 / (n + 1), seen=error) for n, error in enumerate(errors)])
+
+
+def test_from_where_on_an_error_is_visible() -> None:
+    for errors in ((30.0, 0.02), (5.0, 2.0), (0.5, 0.2)):
+        assert "just visible" in texts(drawn(seen(*errors)))
+    for errors in ((1e5, 1e3), (1e-6, 1e-9)):
+        shown = texts(drawn(seen(*errors)))
+        assert "just visible" not in shown
+        assert "error: what is seen (1: just visible)" in shown
+
+
+def test_the_key_says_what_there_is_and_nothing_else() -> None:
+    shown = texts(drawn(swing()))
+    assert shown[-5:] == [
+        *("on the Pareto front", "another is better", "the scene’s own setting"),
+        *("run lost", "unstable"),
+    ]
+    far = (StableRow("Euler", 1e-9, True, (1e-10, 1.0)),)
+    assert texts(drawn(scenario([row(front=True)], stable=far)))[-1] == "on the Pareto front"
+
+
+def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
+    for report in (swing(), scenario([lost(own=True), row("RK4", 0.01)])):
+        root = drawn(report)
+        first, *_ = root.iter("circle")
+        assert first.attrib["r"] == "8.5"
+        assert [text for text in texts(root) if text.startswith("own: Euler at ")]
+
+
+def test_described_for_who_cannot_see_it() -> None:
+    root = drawn(swing())
+    assert root.attrib["role"] == "img"
+    assert root.attrib["aria-labelledby"] == "p-title p-text"
+    title, text = root.find("title"), root.find("desc")
+    assert title is not None and text is not None
+    assert title.attrib["id"] == "p-title" and text.attrib["id"] == "p-text"
+    assert title.text == "A pendulum swings: error of position (m or rad) against cost"
+    assert text.text == (
+        "Euler: errors 0.048 to 0.0024 at costs of 0.1 to 2. "
+        "implicit: errors 0.12 to 0.0024 at costs of 0.048 to 2.4. "
+        "RK4: errors 0.12 to 1.9e-08 at costs of 0.156 to 7.8. "
+        "Euler is stable up to 40 ms. "
+        "The scene’s own setting is Euler at 2 ms. "
+        "RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate. "
+        "No error below 1.0e-11 is given."
+    )
+
+
+def test_the_same_bytes_and_a_file_of_its_own() -> None:
+    assert plot_svg(swing(), name="p") == plot_svg(swing(), name="p")
+    whole = plot_svg(swing(), name="p", whole=True)
+    assert STYLE in whole
+    assert ElementTree.fromstring(whole).tag == "{http://www.w3.org/2000/svg}svg"
+    assert "style" not in plot_svg(swing(), name="p")
+
+
+def test_other_solvers_are_small_marks_without_a_line() -> None:
+    rows = [row("Euler", h, solver="Newton", iterations=100) for h in (0.004, 0.002)]
+    rows.append(row("Euler", 0.002, solver="CG", iterations=100, own=False))
+    rows[1] = replace(rows[1], own=True)
+    root = drawn(scenario(rows))
+    assert "other solver, iterations or cone" in texts(root)
+    lines = [p for p in root.iter("path") if p.attrib.get("stroke-width") == "1.7"]
+    assert lines[0].attrib["d"].count("L") == 1
+    found = chart(scenario(rows), quantities(scenario(rows))[0])
+    assert [p.row for p in found.lines[0].others] == [2]
+
+
+def test_without_times_the_steps_stand_in() -> None:
+    rows = [row("Euler", h, cost=None) for h in (0.01, 0.001)]
+    root = drawn(scenario(rows))
+    assert "steps" in texts(root)
+    assert all("cost" not in title for title in titles(root))
+
+
+def test_a_row_without_a_time_goes_where_its_steps_say() -> None:
+    rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=None), row("RK4", 0.01, cost=3)]
+    found = chart(scenario(rows), quantities(scenario(rows))[0])
+    places = {p.row: (p.cost, p.timed) for line in found.lines for p in line.points}
+    assert places == {0: (1.0, True), 1: (2.0, False), 2: (3, True)}
+
+
+def test_the_boundary_is_at_the_cost_of_its_timestep() -> None:
+    rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=2.2)]
+    report = scenario(rows, stable=(StableRow("Euler", 0.004, True, (1e-3, 1.0)),))
+    (line,) = chart(report, quantities(report)[0]).lines
+    assert line.boundary == 0.5
+
+
+def test_which_error_is_shown() -> None:
+    still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
+    assert telling(scenario(still)).name == "attitude"  # type: ignore[union-attr]
+    report = scenario([row(figure=(1.0, 1.0))], figure="energy (J)")
+    assert [one.name for one in quantities(report)] == ["figure", "position", "velocity"]
+    assert telling(report).label == "energy (J)"  # type: ignore[union-attr]
+    assert "error: velocity (m/s or rad/s)" in texts(drawn(report, quantity=quantities(report)[2]))
+
+
+def test_where_there_is_nothing_to_draw() -> None:
+    assert plot_svg(scenario([]), name="p") == ""
+    assert plot_svg(scenario([lost(), lost("RK4")]), name="p") == ""
+
+
+def test_an_integrator_that_is_never_stable_and_one_that_is_unknown() -> None:
+    rows = [lost("Euler", 0.01), row("RK4", 0.01), row("a<b>&\ud800", 0.002), row("Ω" * 60, 0.001)]
+    report = scenario(rows, stable=(StableRow("Euler", 0.0, True, (1e-3, 1.0)),))
+    shown = texts(drawn(report))
+    assert "Euler is never stable" in shown
+    assert "a<b>&" in shown
+
+
+ERRORS = st.one_of(st.just(0.0), st.floats(1e-300, 1e300))
+STATUS = st.sampled_from(("ok", "ok", "ok", "diverged", "reset", "slow-growth"))
+
+
+@given(
+    rows=st.lists(
+        st.tuples(
+            st.sampled_from(("Euler", "implicit", "implicitfast", "RK4", "discrete")),
+            st.sampled_from((0.1, 0.01, 0.002, 0.0001)),
+            ERRORS,
+            st.one_of(st.none(), st.floats(1e-12, 1e12)),
+            STATUS,
+        ),
+        max_size=12,
+    ),
+    floor=st.sampled_from((0.0, 1e-15, 1e-3)),
+    narrow=st.booleans(),
+)
+def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
+    made = [
+        row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
+        for n, (name, h, e, cost, status) in enumerate(rows)
+    ]
+    stable = tuple(StableRow(name, 0.05, True, (1e-4, 1.0)) for name in ("Euler", "RK4"))
+    svg = plot_svg(scenario(made, floor=floor, stable=stable), name="p", narrow=narrow)
+    assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(made)

@@ -1,0 +1,133 @@
+"""Recorded reports: the same bytes, lines to compare, and nothing read that is not one."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.numerics.reports.records import (
+    RecordError,
+    bench_path,
+    decode_bench,
+    decode_stability,
+    encode_bench,
+    encode_stability,
+)
+from support.bench_reports import CASE, lost, row, scenario, scene, swing
+
+GOOD = encode_bench(scene())
+
+
+def line(at: int) -> int:
+    """The line of an offset."""
+    return GOOD.count(b"\n", 0, at) + 1
+
+
+COST = line(GOOD.index(b'"cost": 0.1,'))
+
+
+def test_what_is_written_is_read() -> None:
+    for report in (scene(), scene(scenario([])), scene(scenario([lost(), row("Ω\n", 1e-300)]))):
+        data = encode_bench(report)
+        assert decode_bench(data) == report
+        assert encode_bench(decode_bench(data)) == data
+    data = encode_stability([CASE])
+    assert decode_stability(data) == (CASE,)
+
+
+def test_a_row_is_a_line_and_keys_are_sorted() -> None:
+    lines = GOOD.decode().splitlines()
+    assert lines[:3] == ["{", ' "form": 1,', ' "holds": "coursebuild bench",']
+    assert sum('"timestep"' in line for line in lines) == len(swing().rows)
+    assert GOOD.endswith(b"}\n")
+
+    def keys(value: object) -> None:
+        if isinstance(value, dict):
+            assert list(value) == sorted(value)
+            list(map(keys, value.values()))
+        elif isinstance(value, list):
+            list(map(keys, value))
+
+    keys(json.loads(GOOD))
+
+
+def test_cases_are_in_their_order() -> None:
+    other = replace(CASE, name="a", case=7)
+    assert encode_stability([other, CASE]) == encode_stability([CASE, other])
+    assert [case.name for case in decode_stability(encode_stability([other, CASE]))] == [
+        "spring",
+        "a",
+    ]
+
+
+def test_where_a_report_is() -> None:
+    assert bench_path("arms/left arm") == "content/reports/arms/left arm.bench.json"
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "is damaged: input data was truncated"),
+        (b"\xff", "is damaged: no JSON at line 1"),
+        (b"[" * 100_000, "is damaged: values are nested too deep"),
+        (b"[]", "holds no report of `coursebuild bench`"),
+        (b'{"rows": []}', "holds no report of `coursebuild bench`"),
+        (b'{"holds": "x"}', 'holds a report of "x", not of `coursebuild bench`'),
+        (
+            encode_stability([CASE]),
+            'holds a report of "coursebuild stability", not of `coursebuild bench`',
+        ),
+        (b'{"holds": "coursebuild bench"}', "does not say which form it has"),
+        (b'{"holds": "coursebuild bench", "form": true}', "does not say which form it has"),
+        (
+            b'{"holds": "coursebuild bench", "form": 0}',
+            "was written by an older version of this tool (form 0, not 1)",
+        ),
+        (
+            b'{"holds": "coursebuild bench", "form": 2}',
+            "was written by a newer version of this tool (form 2, not 1)",
+        ),
+        (
+            b'{"holds": "coursebuild bench", "form": 1}',
+            "is damaged: object missing required field `scene`",
+        ),
+        (GOOD[:900], "is damaged: input data was truncated"),
+        (GOOD.replace(b'"cost": 0.1,', b'"cost": NaN,', 1), f"is damaged: no JSON at line {COST}"),
+        (
+            GOOD.replace(b'"cost": 0.1,', b'"cost": 1e999,', 1),
+            "is damaged: number out of range",
+        ),
+        (
+            GOOD.replace(b'"name": "swing"', b'"name": 7'),
+            "is damaged: expected `str`, got `int` - at `$.scene.scenarios[0].name`",
+        ),
+        (
+            GOOD.replace(b'"cpu"', b'"cup"'),
+            "is damaged: object missing required field `cpu` - at `$.scene.machine`",
+        ),
+        (
+            GOOD.replace(b'{"attitude"', b'{"x": 1, "attitude"', 1),
+            "is damaged: unknown field at `$.scene.scenarios[0].orders[0].x`",
+        ),
+        (
+            GOOD.replace(b'"better": 13', b'"better": 18'),
+            "points at a row that scenario `swing` does not have",
+        ),
+        (
+            GOOD.replace(b'"dominated_by": 13', b'"dominated_by": -1', 1),
+            "points at a row that scenario `swing` does not have",
+        ),
+        (encode_bench(scene(swing(), swing())), "holds two scenarios of one name"),
+    ],
+)
+def test_what_is_no_report(data: bytes, message: str) -> None:
+    with pytest.raises(RecordError) as caught:
+        decode_bench(data)
+    assert caught.value.message == message
+
+
+def test_two_cases_of_one_name() -> None:
+    with pytest.raises(RecordError, match="holds two cases of one name"):
+        decode_stability(encode_stability([CASE, CASE]))

@@ -1,0 +1,210 @@
+"""Scenarios of a model, with what their author left out filled in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.model import Declarations
+from coursebuild.numerics.scene import Scene, SceneError, scenes, thickness
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations, whole
+
+ARM = """\
+<mujoco>
+  <option timestep="{step}"/>
+  <worldbody>
+    <body>
+      <joint name="a" axis="0 1 0"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0.4 0 0"/>
+      <body pos="0.4 0 0">
+        <joint type="ball"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0.4 0 0" contype="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="a"/></actuator>
+  <keyframe><key name="home" qpos="0.1 1 0 0 0"/><key qpos="0.2 1 0 0 0"/></keyframe>
+</mujoco>
+"""
+
+
+def arm(step: float = 0.002) -> Any:
+    return mujoco.MjModel.from_xml_string(ARM.format(step=step))
+
+
+def declared(text: str) -> Declarations:
+    parsed = parse_declarations(Source("models/arm.toml", text))
+    assert parsed.value is not None, parsed.diagnostics
+    return parsed.value
+
+
+def only(text: str, model: Any = None) -> Scene:
+    (found,) = scenes(arm() if model is None else model, declared("[[scenario]]\n" + text))
+    return found
+
+
+def refused(text: str, step: float = 0.002) -> tuple[str, str]:
+    with pytest.raises(SceneError) as caught:
+        only(text, arm(step))
+    span = caught.value.span
+    return caught.value.message, "" if span is None else span.text
+
+
+def test_keyframes_are_scenarios_by_themselves() -> None:
+    first, second = scenes(arm(), None)
+    assert (first.name, first.scenario.keyframe) == ("home", 0)
+    assert (second.name, second.scenario.keyframe) == ("keyframe-1", 1)
+    assert first.scenario.duration == 2.0
+    assert scenes(arm(), declared("[[keep]]\nfinding='x'\nreason='y'\n"))[0].name == "home"
+
+
+def test_without_keyframes_it_is_the_models_own_state() -> None:
+    free = '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
+    (found,) = scenes(mujoco.MjModel.from_xml_string(free), None)
+    assert (found.name, found.scenario.keyframe) == ("start", -1)
+
+
+def test_where_nothing_moves_there_is_nothing_to_measure() -> None:
+    still = mujoco.MjModel.from_xml_string("<mujoco/>")
+    assert scenes(still, None) == ()
+    with pytest.raises(SceneError, match="nothing can move"):
+        scenes(still, declared('[[scenario]]\nname = "a"\n'))
+
+
+def test_what_is_declared_is_taken() -> None:
+    found = only(
+        'name = "a"\nkeyframe = "home"\nqpos = [0, 2, 0, 0, 0]\nqvel = [1, 2, 3, 4]\n'
+        "controls = [[1], [-1]]\nhold = 0.2\nsample = 0.04\nduration = 0.8\n"
+        "timesteps = [0.04, 0.0005]\n"
+    )
+    scenario = found.scenario
+    assert scenario.qpos == (0, 1, 0, 0, 0), "quaternions are made unit ones"
+    assert scenario.qvel == (1, 2, 3, 4)
+    assert (scenario.duration, scenario.sample, scenario.hold) == (0.8, 0.04, 0.2)
+    assert (scenario.keyframe, scenario.controls) == (0, ((1,), (-1,)))
+    assert found.timesteps == (0.0005, 0.002, 0.04)
+    assert (found.own, found.title) == (0.002, "a")
+
+
+def test_commands_are_all_given_before_the_end() -> None:
+    rows = ", ".join(["[1]"] * 30)
+    found = only(f'name = "a"\ncontrols = [{rows}]\nhold = 0.1\n')
+    assert found.scenario.duration == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "place"),
+    [
+        ('keyframe = "hom"', "the model has no keyframe `hom`", '"hom"'),
+        ("keyframe = 2", "the model has no keyframe 2", "2"),
+        ("qpos = [1]", "`qpos` has 1 numbers, and the model takes 5", "["),
+        ("controls = [[1, 2]]", "`controls` has 2 numbers, and the model takes 1", "["),
+        (
+            "duration = 1.0001",
+            "the model's timestep, 0.002 s, does not divide `duration` (1.0001 s)",
+            "",
+        ),
+        (
+            "duration = 0.5\ntimesteps = [0.25, 0.1]",
+            "the timestep 0.25 s does not divide the sample, 0.004 s",
+            "[",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(text: str, message: str, place: str) -> None:
+    assert refused(f'name = "a"\n{text}\n') == (message, place)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    step=st.sampled_from([1e-4, 3e-4, 5e-4, 1e-3, 1 / 480, 2e-3, 3e-3, 5e-3, 0.01, 1 / 60, 0.1]),
+    steps=st.integers(1, 30_000) | st.none(),
+    sample=st.integers(1, 200) | st.none(),
+    hold=st.integers(1, 400) | st.none(),
+    count=st.integers(1, 40),
+    quick=st.booleans(),
+)
+def test_all_times_are_whole_numbers_of_each_other(
+    step: float, steps: int | None, sample: int | None, hold: int | None, count: int, quick: bool
+) -> None:
+    given_ones = {"duration": steps, "sample": sample, "hold": hold}
+    lines = [f"{k} = {v * step!r}" for k, v in given_ones.items() if v is not None]
+    if hold is not None:
+        lines.append("controls = [" + "[1]," * count + "]")
+    text = '[[scenario]]\nname = "a"\n' + "\n".join(lines) + "\n"
+    parsed = parse_declarations(Source("models/arm.toml", text))
+    assume(parsed.value is not None)
+    (found,) = scenes(arm(step), parsed.value, quick=quick)
+    scenario = found.scenario
+    assert whole(scenario.duration, scenario.sample)
+    assert whole(scenario.sample, found.own)
+    if hold is not None:
+        assert whole(scenario.hold, scenario.sample)
+    if steps is not None:
+        assert scenario.duration == pytest.approx(steps * step)
+    else:
+        assert scenario.duration >= 2.0 * (1 - 1e-9)
+        assert len(scenario.times) >= 2
+    assert found.own in found.timesteps
+    assert sorted(set(found.timesteps)) == list(found.timesteps)
+    for one in found.timesteps:
+        assert whole(scenario.sample, one)
+
+
+def test_half_thicknesses() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="plane" size="1 1 1"/><geom size="0.3"/>'
+        '<geom type="box" size="1 0.02 3"/></worldbody></mujoco>'
+    )
+    assert np.array_equal(thickness(model), [np.inf, 0.3, 0.02, np.inf])
+
+
+def test_names_of_scenarios_that_nobody_wrote_differ() -> None:
+    keys = '<key qpos="1"/><key name="keyframe-0"/><key name="  "/><key name="low"/>'
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody>"
+        f"<keyframe>{keys}</keyframe></mujoco>"
+    )
+    names = [one.name for one in scenes(model, None)]
+    assert names == ["keyframe-0-", "keyframe-0", "keyframe-2", "low"]
+
+
+def test_a_tiny_timestep_makes_a_short_scenario() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><option timestep='1e-6'/><worldbody><body><joint/><geom size='1'/></body>"
+        "</worldbody></mujoco>"
+    )
+    (found,) = scenes(model, None)
+    assert found.scenario.duration == pytest.approx(0.02, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "line"),
+    [
+        (
+            "duration = 1e9",
+            "1e+09 s in steps of 0.0005 s are over 10,000,000 steps",
+            3,
+        ),
+        (
+            "sample = 0.1\ntimesteps = [1e-8]",
+            "2.5 s in steps of 1e-08 s are over 10,000,000 steps",
+            4,
+        ),
+    ],
+)
+def test_a_scenario_that_would_take_hours_is_refused(text: str, message: str, line: int) -> None:
+    source = Source("models/arm.toml", f'[[scenario]]\nname = "a"\n{text}\n')
+    parsed = parse_declarations(source)
+    assert parsed.value is not None
+    with pytest.raises(SceneError) as caught:
+        scenes(arm(0.002), parsed.value, quick=True)
+    assert caught.value.message == message
+    assert caught.value.help == "measure a shorter time, or longer timesteps"
+    assert caught.value.span is not None and caught.value.span.line == line

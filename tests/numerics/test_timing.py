@@ -1,0 +1,158 @@
+"""What steps cost, by a clock that does not tick by itself."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.costs import costs
+from coursebuild.numerics.pilot import pilot
+from coursebuild.numerics.reports.bench import Setting
+from coursebuild.numerics.scene import scenes
+from coursebuild.numerics.timing import FEWEST, Job, timed
+
+
+class Machine:
+    """A machine whose time passes with its work, and with what else it does."""
+
+    def __init__(self, disturbed: Callable[[], float] = lambda: 1.0) -> None:
+        self.now = 0.0
+        self.disturbed = disturbed
+        self.done: list[float] = []
+        self.slowed: list[bool] = []
+
+    def clock(self) -> int:
+        return round(self.now)
+
+    def job(self, cost: float) -> Job:
+        def work() -> None:
+            factor = self.disturbed()
+            self.done.append(cost)
+            self.slowed.append(factor > 1.2)
+            self.now += cost * factor
+
+        return work
+
+
+class Neighbours:
+    """Others who come in bursts, for longer than a job, and slow everything; and slow drift."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.left = 0
+        self.factor = self.drift = 1.0
+
+    def __call__(self) -> float:
+        if self.left == 0:
+            busy = self.random.random() < 0.4
+            self.left = self.random.randint(1, 25)
+            self.factor = self.random.uniform(1.3, 4.0) if busy else 1.0
+        self.left -= 1
+        self.drift *= 1.0001
+        jitter = abs(self.random.gauss(0.0, 0.01))
+        spike = 8.0 if self.random.random() < 0.03 else 1.0
+        return self.factor * self.drift * spike * (1 + jitter)
+
+
+def test_a_quiet_machine_is_asked_as_seldom_as_can_be() -> None:
+    machine = Machine()
+    found = timed([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
+    assert [one.ratio for one in found] == [2.0, 1.0, 5.0]
+    assert [one.least for one in found] == [2e6, 1e6, 5e6]
+    assert [one.spread for one in found] == [1.0, 1.0, 1.0]
+    assert found[0].rounds == FEWEST
+    assert found[0].uncertainty == 0.0
+
+
+def test_each_is_timed_beside_the_own_in_alternating_order() -> None:
+    machine = Machine()
+    timed([machine.job(c) for c in (1.0, 2.0, 3.0)], 0, machine.clock, most=2)
+    assert machine.done[:3] == [1.0, 2.0, 3.0], "first, everything is made warm"
+    assert machine.done[3:] == [2.0, 1.0, 1.0, 3.0, 1.0, 2.0, 3.0, 1.0]
+
+
+def test_what_is_not_to_be_timed_is_taken_off() -> None:
+    machine = Machine()
+    jobs = [machine.job(c) for c in (3e6, 5e6)]
+    found = timed(jobs, 0, machine.clock, idle=[1e6, 1e6])
+    assert found[1].ratio == 2.0
+
+
+def test_alone_there_is_nothing_to_compare() -> None:
+    machine = Machine()
+    (found,) = timed([machine.job(7e5)], 0, machine.clock)
+    assert (found.ratio, found.least) == (1.0, 7e5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_ratios_repeat_on_a_noisy_machine(seed: int) -> None:
+    true = [0.1, 0.97, 1.0, 1.05, 3.0, 20.0]
+    runs = []
+    for half in (0, 1):
+        machine = Machine(Neighbours(2 * seed + half))
+        found = timed([machine.job(1e6 * c) for c in true], 2, machine.clock)
+        runs.append([one.ratio for one in found])
+        assert sum(machine.slowed) > 0.2 * len(machine.slowed), "there was noise"
+        for one, cost in zip(found, true, strict=True):
+            assert one.ratio == pytest.approx(cost, rel=0.02)
+            assert one.uncertainty < 0.1
+    assert runs[0] == pytest.approx(runs[1], rel=0.05)
+
+
+def test_without_end_there_is_a_cap() -> None:
+    machine = Machine(Neighbours(3))
+    found = timed([machine.job(c) for c in (1e6, 2e6)], 0, machine.clock, most=20, enough=0.0)
+    assert found[1].rounds == 20
+
+
+SPRING = """\
+<mujoco>
+  <option timestep="0.004"/>
+  <worldbody>
+    <body><joint type="slide" stiffness="10"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+  <keyframe><key qpos="0.2"/></keyframe>
+</mujoco>
+"""
+
+
+def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step has a price, a call has one too: what is told is the price of all steps."""
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    (scene,) = scenes(model, None)
+    first = pilot(model, scene)
+    machine = Machine()
+    price = {mujoco.mjtIntegrator.mjINT_EULER: 300.0, mujoco.mjtIntegrator.mjINT_RK4: 1300.0}
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        machine.now += 900.0 + nstep * price[mujoco.mjtIntegrator(model.opt.integrator)]
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    chosen = [
+        Setting(name, h, "", 0, "") for name in ("RK4", "Euler") for h in (0.008, 0.004, 0.001)
+    ]
+    found = costs(model, scene, first, chosen, 4, machine.clock)
+    expected = [price * 0.004 / h for price in (13 / 3, 1.0) for h in (0.008, 0.004, 0.001)]
+    assert [one.ratio for one in found] == pytest.approx(expected, rel=1e-4)
+    assert [one.step for one in found] == pytest.approx([1300] * 3 + [300] * 3, rel=1e-4)
+
+
+def test_the_clock_is_told_of_no_step_beyond_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    (scene,) = scenes(model, None)
+    first = pilot(model, scene)
+    real, latest = mujoco.mj_step, [0.0]
+    machine = Machine()
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        real(model, data, nstep)
+        machine.now += 1000.0 * nstep
+        latest[0] = max(latest[0], data.time)
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    chosen = [Setting("Euler", h, "", 0, "") for h in (0.016, 0.004)]
+    costs(model, scene, first, chosen, 1, machine.clock, quick=True)
+    assert 0.9 * scene.scenario.duration < latest[0] <= scene.scenario.duration * 1.05
