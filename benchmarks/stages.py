@@ -33,11 +33,10 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import pack
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
-from coursebuild.python_text import forget_texts
 from coursebuild.render.assets import Assets
 from coursebuild.render.draft import Draft
 from coursebuild.render.draw import draw
-from coursebuild.render.folding import forget_folds, imported
+from coursebuild.render.folding import fold, imported
 from coursebuild.render.fonts import FontJob, subset_font
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
@@ -45,6 +44,7 @@ from coursebuild.render.record import record
 from coursebuild.render.site import SiteOptions, render_site
 from coursebuild.results import Formula, MathError, Results
 from coursebuild.syntax.document import parse_document
+from coursebuild.syntax.script import python_mistake
 
 
 def timed(
@@ -147,15 +147,15 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     tools = library.tools
 
     def draws() -> list[Draft]:
-        forget_folds()
+        fold.cache_clear()
         return [draw(sheet, document, tools) for sheet, document in drawn]
 
     def modules() -> list[frozenset[str]]:
-        forget_folds()
+        imported.cache_clear()
         return [imported(script) for script in scripts]
 
     def parses() -> list[object]:
-        forget_texts()
+        python_mistake.cache_clear()
         return [parse_document(d.source, kinds, lesson=True) for d in documents]
 
     drafts = draws()

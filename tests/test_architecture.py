@@ -18,7 +18,7 @@ ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"patterns"}),
-    frozenset({"source", "drawing", "python_text"}),
+    frozenset({"source", "drawing"}),
     frozenset({"rules"}),
     frozenset({"diagnostics"}),
     frozenset({"model"}),

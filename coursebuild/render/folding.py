@@ -1,7 +1,6 @@
 """Which parts of a long script a reader sees at first, and which are folded.
 
-Entry points: `fold(code)`; `imported(code)`, the modules that it imports. A text is parsed once for
-both.
+Entry points: `fold(code)`; `imported(code)`, the modules that it imports.
 
 1. The code is cut at its top-level statements: a fold never begins or ends inside one.
 2. The head (docstring, imports, constants) is folded when it is long: the page around the script
@@ -13,10 +12,10 @@ both.
 from __future__ import annotations
 
 import ast
+import functools
+import warnings
 
 from msgspec import Struct
-
-from coursebuild.python_text import text_key, top_level
 
 LONG = 48
 """Lines; a script up to this length is shown whole."""
@@ -27,8 +26,6 @@ SHOWN = 44
 TAIL = 12
 """Lines; a `__main__` guard up to this length stays in sight, and a fold shorter than this is not
 made."""
-_MOST = 4096
-"""Texts of which parts and imports are known."""
 
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
@@ -47,45 +44,20 @@ class Part(Struct, frozen=True):
     """Names that are defined in it."""
 
 
+@functools.lru_cache(maxsize=64)
 def fold(code: str) -> tuple[Part, ...]:
     """The parts of a script; a short one, and one that does not parse, is one part in sight."""
-    lines = code.count("\n") + (not code.endswith("\n"))
-    return (Part(1, lines, folded=False),) if lines <= LONG else _read(code).parts
+    lines = code.removesuffix("\n").split("\n")
+    if len(lines) <= LONG:
+        return (Part(1, len(lines), folded=False),)
+    return _cut(_statements(code), lines)
 
 
+@functools.lru_cache(maxsize=64)
 def imported(code: str) -> frozenset[str]:
     """Top-level modules that a Python text imports by name; none where it does not parse."""
-    return _read(code).modules
-
-
-class _Outline(Struct, frozen=True):
-    parts: tuple[Part, ...]
-    modules: frozenset[str]
-
-
-_known: dict[bytes, _Outline] = {}
-
-
-def _read(code: str) -> _Outline:
-    key = text_key(code)
-    if key not in _known:
-        if len(_known) >= _MOST:
-            _known.pop(next(iter(_known)), None)
-        body = top_level(code)
-        parts = _cut(body or [], code.removesuffix("\n").split("\n"))
-        _known[key] = _Outline(parts, _imported(body or []))
-    return _known[key]
-
-
-def forget_folds() -> None:
-    """Forget what was parsed, for whoever wants to know how long it takes."""
-    _known.clear()
-
-
-def _imported(body: list[ast.stmt]) -> frozenset[str]:
-    """The modules that are imported by statements, at any depth."""
     found: set[str] = set()
-    waiting: list[ast.AST] = [*body]
+    waiting: list[ast.AST] = [*_statements(code)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.Import):
@@ -95,16 +67,23 @@ def _imported(body: list[ast.stmt]) -> frozenset[str]:
                 found.add(node.module.partition(".")[0])
         else:
             for name in ("body", "orelse", "finalbody", "handlers", "cases"):
-                if inner := getattr(node, name, None):
-                    waiting += inner
+                waiting += getattr(node, name, None) or ()
     return frozenset(found)
 
 
+def _statements(code: str) -> list[ast.stmt]:
+    """The statements of a text; none where it does not parse."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(code).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return []
+
+
 def _cut(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
-    """The parts of a script that parses."""
+    """The parts of a long script."""
     whole = (Part(1, len(lines), folded=False),)
-    if len(lines) <= LONG:
-        return whole
     starts = [_start(statement) for statement in body]
     if not body or len(set(starts)) != len(starts):
         return whole

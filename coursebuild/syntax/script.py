@@ -6,14 +6,16 @@ script; `fragment` of code that need not parse.
 
 from __future__ import annotations
 
+import functools
 import re
 import shlex
 import sys
+import warnings
+from typing import NamedTuple
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.model import PlainCode, Script
 from coursebuild.patterns import pattern
-from coursebuild.python_text import python_mistake
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.fence import Fence
 from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
@@ -220,3 +222,32 @@ def _lower(sentence: str) -> str:
     if sentence[1:2].islower():
         return sentence[:1].lower() + sentence[1:]
     return sentence
+
+
+class PythonMistake(NamedTuple):
+    """Where and why a text does not compile."""
+
+    line: int
+    """From 1."""
+    column: int
+    """From 0."""
+    end_line: int
+    end_column: int
+    message: str
+
+
+@functools.lru_cache(maxsize=64)
+def python_mistake(code: str) -> PythonMistake | None:
+    """The first thing that Python has against a text."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(code, "<lesson>", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        line, column = error.lineno or 1, max((error.offset or 1) - 1, 0)
+        end_column = max((error.end_offset or 0) - 1, 0)
+        return PythonMistake(line, column, error.end_lineno or line, end_column, error.msg)
+    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
+        message = f"the code cannot be compiled: {error}"
+        return PythonMistake(1, 0, 1, 0, message if str(error) else "the code is nested too deeply")
+    return None

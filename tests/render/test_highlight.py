@@ -10,7 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
-from coursebuild.render.highlight import highlight, highlight_lines, marked, visible
+from coursebuild.render.characters import visible
+from coursebuild.render.highlight import highlight_lines
+
+
+def highlight(language: str, code: str) -> str:
+    return "\n".join(highlight_lines(language, code))
 
 
 def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
@@ -75,33 +80,3 @@ def test_no_language_loses_the_end_of_a_text() -> None:
 
 def plain(html: str) -> str:
     return unescape(re.sub(r"<[^>]*>", "", html))
-
-
-def by_lines(runs: list[tuple[str, str]]) -> str:
-    """The same as `marked`, line after line and run after run."""
-    lines: list[str] = []
-    line, css, run = "", "", ""
-    for kind, text in runs:
-        first, *others = text.split("\n")
-        if kind == css or (run and not first.strip()):
-            run += first
-        else:
-            line, css, run = line + element(css, run), kind, first
-        for part in others:
-            lines.append(line + element(css, run))
-            line, css, run = "", kind, part
-    return "\n".join([*lines, line + element(css, run)])
-
-
-def element(css: str, text: str) -> str:
-    html = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    core = html.strip()
-    return html.replace(core, f'<span class="{css}">{core}</span>') if css and core else html
-
-
-RUNS = st.tuples(st.sampled_from(["", "k", "s"]), st.text(" \n\u00a0\tab<&", max_size=4))
-
-
-@given(st.lists(RUNS, max_size=9))
-def test_runs_of_one_class_on_a_line_get_one_element(runs: list[tuple[str, str]]) -> None:
-    assert marked(runs) == by_lines(runs)
