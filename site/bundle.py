@@ -66,6 +66,7 @@ _AHEAD = (
     "coursebuild/render/compressed.py",
     "coursebuild/render/cutting.py",
     "coursebuild/render/fonts.py",
+    "coursebuild/render/templates.py",
     "templates/icon.svg",
 )
 """What makes things ahead."""

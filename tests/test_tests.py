@@ -162,7 +162,6 @@ TO_MEND: dict[Rule, str] = {
         "effects/test_resources.py effects/test_stamp.py effects/test_v8.py "
         "effects/test_v8_library.py effects/test_write.py pipeline/test_behind.py "
         "pipeline/test_cards.py pipeline/test_memory_files.py pipeline/test_noted.py "
-        "render/test_templates.py "
         "syntax/test_toml_text.py"
     ),
 }

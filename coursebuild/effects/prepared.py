@@ -1,6 +1,6 @@
 """What comes with the tool made ahead: fonts cut or ready to be cut, templates, compressed copies.
 
-Entry points: `prepared_cut`, `prepared_source`; `prepared_template`; `prepared_copy`. The modules
+Entry points: `prepared_cut`, `prepared_source`; `prepared_copy`; `prepared_folder`. The modules
 `site/prepare_*.py` make the files when site/dist is made.
 
 1. A font cut to the characters that are always kept is the result of a job, under the job's key.
@@ -18,6 +18,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+from pathlib import Path
 from typing import Any
 
 from coursebuild.effects.resources import assets_dir
@@ -26,10 +27,15 @@ FOLDER = "prepared"
 """In the folder of the bundled files."""
 
 
+def prepared_folder() -> Path:
+    """Where it all lies."""
+    return assets_dir() / FOLDER
+
+
 def prepared_cut(key: str) -> bytes | None:
     """The result of a job, by its key."""
     file: str | None = _listing()["cuts"].get(key)
-    return None if file is None else (assets_dir() / FOLDER / file).read_bytes()
+    return None if file is None else (prepared_folder() / file).read_bytes()
 
 
 def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
@@ -41,26 +47,17 @@ def prepared_source(font: bytes, characters: str, version: int) -> bytes | None:
     if found is None or not set(characters) <= set(found["characters"]):
         return None
     file: str = found["file"]
-    return (assets_dir() / FOLDER / file).read_bytes()
-
-
-def prepared_template(name: str) -> str | None:
-    """The Python of a template, by the name that `render.templates.made_ahead` gives it."""
-    return _templates().get(name)
+    return (prepared_folder() / file).read_bytes()
 
 
 def prepared_copy(key: str) -> bytes | None:
     """A compressed copy, by the key that `render.compressed` gives it."""
     file = _copies().get(key)
-    return None if file is None else (assets_dir() / FOLDER / file).read_bytes()
+    return None if file is None else (prepared_folder() / file).read_bytes()
 
 
 def _copies() -> dict[str, str]:
     return _made_ahead("copies.json")
-
-
-def _templates() -> dict[str, str]:
-    return _made_ahead("templates.json")
 
 
 def _listing() -> dict[str, Any]:
@@ -71,7 +68,7 @@ def _listing() -> dict[str, Any]:
 def _made_ahead(name: str) -> dict[str, Any]:
     """A list of what was made ahead; empty in a bundle that somebody made without."""
     try:
-        text = (assets_dir() / FOLDER / name).read_text(encoding="utf-8")
+        text = (prepared_folder() / name).read_text(encoding="utf-8")
     except FileNotFoundError:
         return {}
     found: dict[str, Any] = json.loads(text)

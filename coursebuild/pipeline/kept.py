@@ -1,64 +1,27 @@
-"""What is made of the tool's own files, and small findings, kept in the store from run to run.
+"""Cut fonts and small findings, kept in the store from run to run.
 
-Entry points: `CompiledTemplates`, `words_for`, `kept_font`, `fonts_beside`; `KeptBindings`.
+Entry points: `kept_font`, `fonts_beside`; `KeptBindings`.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from coursebuild.effects.prepared import prepared_cut, prepared_source, prepared_template
+from coursebuild.effects.prepared import prepared_cut, prepared_source
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
-from coursebuild.render.strings import Strings
 
 if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob
     from coursebuild.scripts.held import Asked, Borne
 
-_TEMPLATES, _WORDS, _FONTS, _BINDINGS = "templates", "words", "fonts", "bindings"
-
-
-class CompiledTemplates:
-    """The code that templates were compiled to, in the store."""
-
-    def __init__(self, store: Store) -> None:
-        self._store = store
-
-    def load(self, name: str) -> bytes | None:
-        """The code of a template, by a name that says all that it depends on but the tool."""
-        return None if self._store.fresh else self._store.peek(_TEMPLATES, self._key(name))
-
-    def generated(self, name: str) -> str | None:
-        """The Python of a template, where that came with the tool."""
-        return prepared_template(name)
-
-    def keep(self, name: str, data: bytes) -> None:
-        """Keep the code of a template."""
-        self._store.keep(_TEMPLATES, self._key(name), data, local=True)
-
-    def _key(self, name: str) -> str:
-        return hashlib.sha256(f"{tool_digest()}\0{name}".encode()).hexdigest()
-
-
-def words_for(store: Store, texts: tuple[tuple[str, str], ...], language: str) -> Strings:
-    """The interface's words in a language, by the texts of the tool's files."""
-    key = hashlib.sha256(f"{tool_digest()}\0{language}".encode()).hexdigest()
-    data = None if store.fresh else store.peek(_WORDS, key)
-    if data is not None:
-        return Strings.of(json.loads(data), language)
-    from coursebuild.render.assets import strings_for
-
-    words = strings_for(texts, language)
-    store.keep(_WORDS, key, json.dumps(dict(words.entries)).encode(), local=True)
-    return words
+_FONTS, _BINDINGS = "fonts", "bindings"
 
 
 def kept_font(store: Store, job: FontJob, cut: Callable[[FontJob], bytes] | None = None) -> bytes:
@@ -131,7 +94,7 @@ class KeptBindings:
 
     def before(self, leans: Asked) -> Borne:
         """Not kept: what is said of a course does not depend on what was said of it before."""
-        from coursebuild.scripts.held import Borne  # fonts and templates need it not
+        from coursebuild.scripts.held import Borne  # fonts need it not
 
         return Borne()
 

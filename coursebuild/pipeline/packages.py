@@ -24,6 +24,7 @@ from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.archives import check_archive, write_archive
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
+from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.model import Block, Course, Quiz, document_blocks
@@ -36,7 +37,7 @@ from coursebuild.pipeline.pages import page_key
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reading import drawing_tools
 from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
-from coursebuild.pipeline.site import Site, library_of, site_files
+from coursebuild.pipeline.site import Site, site_files
 from coursebuild.render import urls
 from coursebuild.render.assets import Assets
 from coursebuild.render.library import Library
@@ -82,14 +83,14 @@ def _packed(
     reports: Reports,
 ) -> Site:
     """The files of a package, as the files of a site."""
-    assets = Assets(template_texts(), Bundle())
+    assets = Assets(template_texts(), Bundle(), prepared_folder())
     match kind:
         case "scorm":
             site = site_files(course, results, documents, options, reports)
             tools = drawing_tools(options.store, course.language)
             return replace(site, files=tuple(_scorm(course, tools, assets, site)), listed=None)
         case "qti":
-            library = library_of(course, results, assets, options.store, reports)
+            library = Library.of(course, results, assets, reports)
             items = _Items(library, documents, options)
             return Site(tuple(items.files()), None, tuple(items.diagnostics), ())
         case _:

@@ -25,6 +25,7 @@ from msgspec.structs import replace
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.resources import template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import engine_digest, tool_digest
@@ -32,7 +33,6 @@ from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.faces import outline_face
-from coursebuild.pipeline.kept import CompiledTemplates, words_for
 from coursebuild.pipeline.outlines import Outline, Task, pack, packed
 from coursebuild.pipeline.records import join, pack_record, pack_value
 from coursebuild.pipeline.requests import (
@@ -50,8 +50,10 @@ from coursebuild.pipeline.requests import (
     Read,
     Request,
 )
+from coursebuild.render.assets import strings_for
 from coursebuild.render.lookup.lexicon import lexicon, misdeclared
 from coursebuild.render.record import record
+from coursebuild.render.templates import templates_of
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
 from coursebuild.results import Formula, MathError
@@ -297,12 +299,10 @@ class Reader:
 
 
 def drawing_tools(store: Store, language: str) -> Tools:
-    """Words and templates, these compiled by an earlier run where there was one."""
-    from coursebuild.render.templates import templates_of
-
+    """Words, templates and the store's marked code."""
     texts = template_texts()
-    templates = templates_of(texts, CompiledTemplates(store))
-    return Tools(words_for(store, texts, language), templates, mark=_Marks(store))
+    templates = templates_of(texts, prepared_folder())
+    return Tools(strings_for(texts, language), templates, mark=_Marks(store))
 
 
 class _Marks:

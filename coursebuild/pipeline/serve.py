@@ -19,6 +19,7 @@ import threading
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.leaving import leave
 from coursebuild.effects.packages import distributions, library_files
+from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.server import PreviewServer
@@ -114,7 +115,7 @@ def serve(options: Options, port: int) -> None:
 
 def live_course(options: Options) -> LiveCourse:
     """The course of these options, not read yet."""
-    assets = Assets(template_texts(), bundled_files())
+    assets = Assets(template_texts(), bundled_files(), prepared_folder())
     fonts = functools.partial(kept_font, options.store)
     around = functools.partial(_surroundings, options)
     # Later readings are few, and no copies are made of a process with threads.

@@ -24,7 +24,7 @@ from msgspec.structs import replace
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import kept_distributions, library_files
-from coursebuild.effects.prepared import prepared_copy
+from coursebuild.effects.prepared import prepared_copy, prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.effects.store import Store
@@ -32,7 +32,7 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.kept import CompiledTemplates, fonts_beside, kept_font, words_for
+from coursebuild.pipeline.kept import fonts_beside, kept_font
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import all_imports
 from coursebuild.pipeline.pages import Pages
@@ -45,7 +45,6 @@ from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.sheet import search_words
 from coursebuild.render.shared import PageFacts, common_characters, needed_fonts
-from coursebuild.render.templates import templates_of
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
 
@@ -81,20 +80,6 @@ def site_files(
     return _Site(course, results, documents, options, reports).made()
 
 
-def library_of(
-    course: Course, results: Results, assets: Assets, store: Store, reports: Reports
-) -> Library:
-    """What pages look up, with templates and words that an earlier run has compiled."""
-    return Library.of(
-        course,
-        results,
-        assets,
-        templates_of(assets.templates, CompiledTemplates(store)),
-        words_for(store, assets.templates, course.language),
-        reports,
-    )
-
-
 class _Site:
     def __init__(
         self,
@@ -108,8 +93,8 @@ class _Site:
         self.options = options
         self.store = options.store
         self.documents = documents
-        self.assets = Assets(template_texts(), Bundle())
-        self.library = library_of(course, results, self.assets, self.store, reports)
+        self.assets = Assets(template_texts(), Bundle(), prepared_folder())
+        self.library = Library.of(course, results, self.assets, reports)
         self._packed: dict[str, tuple[str, Callable[[], zips.Archive | None]]] = {}
         """The archives, with their keys."""
         self._imports: Callable[[str], frozenset[str]] = zips.imports

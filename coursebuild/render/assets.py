@@ -13,6 +13,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Mapping
+from pathlib import Path
 
 from msgspec import Struct
 
@@ -38,6 +39,8 @@ class Assets(Struct, frozen=True):
     dist: tuple[tuple[str, bytes], ...] | Mapping[str, bytes]
     """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
     bytes; a mapping may read them when they are asked for."""
+    compiled: Path | None = None
+    """Where the templates lie compiled, see `templates_of`."""
 
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
+from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct
 
@@ -38,7 +39,7 @@ from coursebuild.render.assets import Assets, strings_for
 from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.lookup.references import CrossReferences, Mentions, mentions
 from coursebuild.render.strings import Strings
-from coursebuild.render.templates import Templates, templates_of
+from coursebuild.render.templates import templates_of
 from coursebuild.render.tools import Tools
 from coursebuild.results import CompileResult, Formula, MathError, Results, ScriptRun, Verdict
 from coursebuild.vocabulary import CALLOUTS
@@ -64,8 +65,7 @@ class Library(Struct, frozen=True):
     course: Course
     results: Results
     words: Strings
-    templates: Templates
-    """Gives the template engine."""
+    templates: Environment
     lessons: Mapping[str, Lesson]
     levels: Mapping[str, Level]
     pages: Mapping[str, Page]
@@ -98,11 +98,9 @@ class Library(Struct, frozen=True):
         course: Course,
         results: Results,
         assets: Assets,
-        templates: Templates | None = None,
-        words: Strings | None = None,
         reports: Reports | None = None,
     ) -> Library:
-        """Look everything over once, with templates and words, where there are some already."""
+        """Look everything over once."""
         formulas = dict(results.formulas)
 
         def said(document: Document) -> Mentions:
@@ -118,8 +116,6 @@ class Library(Struct, frozen=True):
             labs=lab_files(results.labs, assets),
             formulas=formulas,
             verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
-            templates=templates,
-            words=words,
             reports=reports,
         )
 
@@ -137,8 +133,6 @@ class Library(Struct, frozen=True):
         formulas: Mapping[Formula, str | MathError],
         verdicts: Mapping[tuple[str, int], Verdict],
         asked_of: Callable[[Document], str] = asked_in,
-        templates: Templates | None = None,
-        words: Strings | None = None,
         reports: Reports | None = None,
     ) -> Library:
         """The same from parts that whoever calls remembers; they are not copied."""
@@ -154,8 +148,8 @@ class Library(Struct, frozen=True):
         return cls(
             course=course,
             results=results,
-            words=words or strings_for(assets.templates, course.language),
-            templates=templates or templates_of(assets.templates),
+            words=strings_for(assets.templates, course.language),
+            templates=templates_of(assets.templates, assets.compiled),
             lessons={lesson.id: lesson for lesson in course.lessons},
             levels={level.id: level for level in course.levels},
             pages={page.id: page for page in course.pages},

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
+from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct, field
 
 from coursebuild.render.direction import direction
 from coursebuild.render.quantities import text_html
 from coursebuild.render.strings import Strings
-from coursebuild.render.templates import Templates
 from coursebuild.results import Formula, MathError
 
 _SLOT = "\ue000"
@@ -35,7 +35,7 @@ class Tools(Struct, frozen=True):
     """The interface's words in the course's language, the templates, and formulas as MathML."""
 
     words: Strings
-    templates: Templates
+    templates: Environment
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
     mark: Mark = mark_now
     """How code is marked: whoever calls may keep what was marked before."""
@@ -48,7 +48,7 @@ class Tools(Struct, frozen=True):
         It sees `t`, the interface's words, and `authored`, see `text`.
         """
         seen = {"t": self.words, "authored": self.text, **values}
-        return Markup(self.templates.render(template, seen).rstrip("\n"))
+        return Markup(self.templates.get_template(template).render(seen).rstrip("\n"))
 
     def text(self, text: str) -> Markup:
         """Text of an author that is not Markdown, with its quantities kept together."""

@@ -58,7 +58,7 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     folder = make(FIRST)
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
-        "rare = {'mujoco', 'numpy', 'jinja2', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
+        "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
         " 'subprocess', 'coursebuild.effects.v8_library', 'coursebuild.numerics.reports.bench',"
         " 'coursebuild.numerics.reports.points', 'coursebuild.render.cutting',"
         " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"

@@ -21,7 +21,7 @@ from coursebuild.effects.prepared import (
     prepared_cut,
     prepared_source,
 )
-from coursebuild.effects.resources import assets_dir
+from coursebuild.effects.resources import assets_dir, template_texts
 from coursebuild.render import Assets
 from coursebuild.render.assets import SCRIPTS, page_script
 from coursebuild.render.compressed import compressed_files
@@ -37,6 +37,7 @@ from coursebuild.render.fonts import (
     ready_font,
 )
 from coursebuild.render.fonts import subset_font as cut
+from coursebuild.render.templates import archive_name, compile_templates
 from coursebuild.results import OutputFile
 
 pytestmark = pytest.mark.site
@@ -52,8 +53,8 @@ def test_they_are_up_to_date() -> None:
     assert listing["made_from"] == making["made_from"](assets_dir())
     files = {*listing["cuts"].values(), *(found["file"] for found in listing["smaller"].values())}
     files |= set(json.loads((folder / "copies.json").read_bytes()).values())
-    lists = {"fonts.json", "templates.json", "copies.json"}
-    assert {path.name for path in folder.iterdir()} == files | lists
+    files |= {"fonts.json", "copies.json", archive_name(template_texts())}
+    assert {path.name for path in folder.iterdir()} == files
 
 
 def test_copies_are_up_to_date() -> None:
@@ -179,7 +180,9 @@ def test_what_the_list_notes_of_the_fonts_is_what_they_say(assets: Any) -> None:
         assert (face.measure is not None) == (face.subset == "latin")
 
 
-def test_templates_are_up_to_date() -> None:
+def test_templates_are_up_to_date(tmp_path: Path) -> None:
     """If not, run `python site/bundle.py`."""
-    made = runpy.run_path(str(ROOT / "site" / "prepare_templates.py"))["prepared"]()
-    assert (assets_dir() / FOLDER / "templates.json").read_bytes() == made
+    texts = template_texts()
+    compile_templates(texts, tmp_path)
+    name = archive_name(texts)
+    assert (assets_dir() / FOLDER / name).read_bytes() == (tmp_path / name).read_bytes()
