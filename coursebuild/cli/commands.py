@@ -177,11 +177,12 @@ def serve_command(arguments: argparse.Namespace) -> int:
 def explain_command(arguments: argparse.Namespace) -> int:
     """Say why something would run again, and what depends on it."""
     from coursebuild.pipeline.explain import explain
-    from coursebuild.report.explained import explained_json, explained_text
+    from coursebuild.report.explained import explained_text
+    from coursebuild.report.plain import json_text
 
     explanation = explain(options_of(arguments), arguments.path)
     if arguments.format == "json":
-        return write(explained_json(explanation), CLEAN)
+        return write(json_text(explanation), CLEAN)
     return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
 
 

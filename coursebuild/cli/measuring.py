@@ -17,13 +17,19 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.pipeline.recorded_cases import Cases
 
+_RECORDED = ("failures", "checked", "remarks")
+"""What commands say of recorded reports."""
+_NOTHING_TO_MEASURE = "there is no model to measure\n"
+
 
 def bench(arguments: argparse.Namespace) -> int:
     """Report speed against error of the course's models."""
     from msgspec.structs import replace
 
     from coursebuild.pipeline.plots import plot_file, write_plots
-    from coursebuild.report.measured import bench_report, bench_values
+    from coursebuild.report.bench import bench_text
+    from coursebuild.report.bench_json import bench_values
+    from coursebuild.report.measuring import measured_json, measured_text
 
     options = options_of(arguments)
     plot = None if arguments.plot is None else plot_file(arguments.plot)
@@ -34,11 +40,12 @@ def bench(arguments: argparse.Namespace) -> int:
     finally:
         options.store.close()
     status = CLEAN if found.ok else WRONG
-    parts = (found.diagnostics, found.failures, found.checked, found.remarks)
+    around = {name: getattr(found, name) for name in ("diagnostics", *_RECORDED)}
     if arguments.format == "json":
-        return write(bench_values(found.scenes, *parts), status)
-    shown = () if arguments.check else found.scenes
-    return write(bench_report(shown, *parts, style_of(sys.stdout)), status)
+        return write(measured_json(bench_values(found.scenes), **around), status)
+    style = style_of(sys.stdout)
+    shown = bench_text(() if arguments.check else found.scenes, style)
+    return write(measured_text(shown, style, **around) or _NOTHING_TO_MEASURE, status)
 
 
 def _benched(options: Options, arguments: argparse.Namespace) -> Benched:
@@ -54,7 +61,9 @@ def _benched(options: Options, arguments: argparse.Namespace) -> Benched:
 
 def stability(arguments: argparse.Namespace) -> int:
     """Measure MuJoCo on hard cases, beside theory."""
-    from coursebuild.report.measured import cases_report, cases_values
+    from coursebuild.report.measuring import measured_json, measured_text
+    from coursebuild.report.plain import json_text
+    from coursebuild.report.stability import stability_text
 
     options = options_of(arguments)
     try:
@@ -62,12 +71,14 @@ def stability(arguments: argparse.Namespace) -> int:
     finally:
         options.store.close()
     status = CLEAN if found.ok else WRONG
-    parts = (found.failures, found.checked, found.remarks)
+    around = {name: getattr(found, name) for name in _RECORDED}
     if arguments.format == "json":
-        recorded = arguments.record or arguments.check
-        return write(cases_values(found.cases, *parts, recorded=recorded), status)
-    shown = () if arguments.check else found.cases
-    return write(cases_report(shown, *parts, style_of(sys.stdout)), status)
+        if arguments.record or arguments.check:
+            return write(measured_json({"cases": found.cases}, **around), status)
+        return write(json_text(found.cases), status)
+    style = style_of(sys.stdout)
+    shown = stability_text(() if arguments.check else found.cases, style)
+    return write(measured_text(shown, style, **around), status)
 
 
 def _cases(options: Options, arguments: argparse.Namespace) -> Cases:
@@ -85,7 +96,8 @@ def _cases(options: Options, arguments: argparse.Namespace) -> Cases:
 def diet(arguments: argparse.Namespace) -> int:
     """Say what models hold that their scenarios do not need."""
     from coursebuild.pipeline import diet as dieting
-    from coursebuild.report.diet import diet_report, diet_values
+    from coursebuild.report.diet import diet_text, diet_values
+    from coursebuild.report.measuring import measured_json, measured_text
 
     options = options_of(arguments)
     work = dieting.fix if arguments.fix else dieting.record if arguments.record else dieting.diet
@@ -94,12 +106,13 @@ def diet(arguments: argparse.Namespace) -> int:
     finally:
         options.store.close()
     status = CLEAN if found.ok else WRONG
-    if arguments.format == "json":
-        parts = (found.reports, found.diagnostics, found.failures, found.remarks)
-        return write(diet_values(*parts), status)
-    if options.quiet:
+    if options.quiet and arguments.format == "text":
         if found.ok:
             return status
         found = found.wrong
-    parts = (found.reports, found.diagnostics, found.failures, found.remarks)
-    return write(diet_report(*parts, style_of(sys.stdout)), status)
+    around = {name: getattr(found, name) for name in ("diagnostics", "failures", "remarks")}
+    if arguments.format == "json":
+        return write(measured_json(diet_values(found.reports), **around), status)
+    style = style_of(sys.stdout)
+    told = measured_text(diet_text(found.reports, style), style, **around)
+    return write(told or "there is no model to look at\n", status)

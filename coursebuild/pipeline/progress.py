@@ -15,10 +15,11 @@ import os
 import sys
 import threading
 import time
-import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
+
+from coursebuild.report.terminal import clipped
 
 _RENEWED = 0.1
 """Seconds from one live line to the next."""
@@ -124,17 +125,6 @@ class Progress:
             self.stream.flush()
         except (OSError, ValueError):  # nobody reads any more; the work goes on
             self.quiet = True
-
-
-def clipped(text: str, cells: int) -> str:
-    """The beginning of a text that fits into so many cells of a terminal."""
-    used = 0
-    for index, char in enumerate(text):
-        if not unicodedata.combining(char):
-            used += 2 if unicodedata.east_asian_width(char) in "WF" else 1
-        if used > cells:
-            return text[:index]
-    return text
 
 
 def _columns(stream: TextIO) -> int:

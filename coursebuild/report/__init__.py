@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias, assert_never
 
-from coursebuild.report.text import Style as Style
+from coursebuild.report.terminal import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import to_text
 from coursebuild.report.values import LabLine as LabLine

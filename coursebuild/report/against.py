@@ -5,18 +5,27 @@ Entry points: `AgainstReport`, `against_text`, `against_json`.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.report.text import Style, visible, visible_lines
+from coursebuild.report.plain import json_text, plain
+from coursebuild.report.terminal import (
+    BOLD,
+    FAINT,
+    GREEN,
+    RED,
+    YELLOW,
+    Style,
+    visible,
+    visible_lines,
+)
+from coursebuild.report.text import place
 from coursebuild.report.values import plural
 from coursebuild.results import Change, DriftKind
 
-_BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
-_COLOURS = {"same": _GREEN, "changed": _RED, "fails": _RED}
+_COLOURS = {"same": GREEN, "changed": RED, "fails": RED}
 _NAMED = 20
 _WIDTH = 60
 
@@ -59,58 +68,26 @@ class AgainstReport(Struct, frozen=True):
 
 def against_json(report: AgainstReport) -> str:
     """As one JSON object."""
-    scripts = [
-        {
-            "path": s.path,
-            "lesson": s.lesson,
-            "status": s.status,
-            "by_mujoco": s.status in ("changed", "fails"),
-            "why": s.why,
-            "changes": [_change_values(change) for change in s.changes],
-            "diffs": s.diffs,
-            "failure": None if s.failure is None else _failure_values(s.failure),
-        }
-        for s in report.scripts
-    ]
-    models = [{"path": m.path, "line": m.line, "error": m.error} for m in report.models]
     lost = sum(bool(model.error) for model in report.models)
-    value = {
-        "engine": report.engine,
-        "against": report.other,
-        "python": report.python,
-        "scripts": scripts,
-        "models": models,
-        "summary": {
-            **_counts(report.scripts),
-            "models_lost": lost,
-        },
-    }
-    return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+    return json_text(
+        {
+            **plain(report, other="against"),
+            "scripts": [_script_value(script) for script in report.scripts],
+            "summary": {**_counts(report.scripts), "models_lost": lost},
+        }
+    )
 
 
 _STATUSES = ("same", "changed", "fails", "unclear", "drifted", "uncompared")
 
 
-def _change_values(change: Change) -> dict[str, object]:
+def _script_value(script: ScriptAgainst) -> dict[str, object]:
+    failure = script.failure
     return {
-        "kind": change.kind.value,
-        "path": change.span.path,
-        "line": change.span.line,
-        "column": change.span.column,
-        "recorded": change.recorded,
-        "printed": change.ran,
-        "relative_error": change.relative_error,
-        "digits": change.digits,
-    }
-
-
-def _failure_values(failure: Diagnostic) -> dict[str, object]:
-    return {
-        "rule": failure.rule,
-        "path": failure.span.path,
-        "line": failure.span.line,
-        "message": failure.message,
-        "said": failure.label,
+        **plain(script),
+        "by_mujoco": script.status in ("changed", "fails"),
+        "changes": [plain(change, ran="printed") for change in script.changes],
+        "failure": None if failure is None else {**plain(failure), "said": failure.label},
     }
 
 
@@ -128,7 +105,7 @@ def against_text(report: AgainstReport, style: Style, *, quiet: bool = False) ->
     ]
     lost = [model for model in report.models if model.error]
     lines += [
-        f"{style.paint('fails     ', _RED)} {visible(m.path)}:{m.line}"
+        f"{style.paint('fails     ', RED)} {visible(m.path)}:{m.line}"
         f"  no longer compiles: {visible(m.error)}"
         for m in lost
     ]
@@ -143,29 +120,28 @@ def _because(script: ScriptAgainst) -> str:
 
 
 def _verdict(script: ScriptAgainst, style: Style) -> str:
-    return style.paint(f"{script.status:<10}", _COLOURS.get(script.status, _YELLOW))
+    return style.paint(f"{script.status:<10}", _COLOURS.get(script.status, YELLOW))
 
 
 def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
     """A script that does something else there."""
     who = f"MuJoCo {other}"
     told = _because(script) or f"  by {who}"
-    lines = [f"{_verdict(script, style)} {style.paint(visible(script.path), _BOLD)}{told}"]
+    lines = [f"{_verdict(script, style)} {style.paint(visible(script.path), BOLD)}{told}"]
     if script.failure is not None:
         span, message = script.failure.span, script.failure.message
         said = f": {script.failure.label}" if script.failure.label else ""
         lines.append(visible(f"  {span.path}:{span.line}: {message}{said}"))
     named = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in named[:_NAMED]:
-        place = f"{change.span.path}:{change.span.line}:{change.span.column}"
-        lines.append(visible(f"  {place}: {_change(change, who)}"))
+        lines.append(visible(f"  {place(change.span)}: {_change(change, who)}"))
     if len(named) > _NAMED:
         lines.append(f"  and {plural(len(named) - _NAMED, 'more difference')}")
     before = "--- recorded" if script.changes else "--- here"
     for diff in script.diffs:
         rest = diff.split("\n")[2:]
         shown = visible_lines("\n".join((before, f"+++ {who}", *rest)))
-        lines += [style.paint(f"  {line}", _FAINT) for line in shown.split("\n")]
+        lines += [style.paint(f"  {line}", FAINT) for line in shown.split("\n")]
     return lines
 
 

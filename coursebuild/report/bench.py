@@ -10,7 +10,6 @@ Entry point: `bench_text(scenes, style)`.
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 
 from coursebuild.numerics.reports.bench import (
@@ -31,12 +30,19 @@ from coursebuild.numerics.reports.points import (
     usual_setting,
 )
 from coursebuild.report.bench_columns import BETTER, FRONT, OWN, VISIBLE, columns
-from coursebuild.report.table import Column, table
-from coursebuild.report.text import Style, visible
+from coursebuild.report.terminal import (
+    BOLD,
+    FAINT,
+    GREEN,
+    RED,
+    YELLOW,
+    Column,
+    Style,
+    table,
+    visible,
+)
 
-_BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
 _INDENT = "  "
-_NARROWEST = 40
 _LEGEND = f"{OWN} the scene's own   {FRONT} on the Pareto front"
 _BETTER = f"   {BETTER} a better one"
 _SEEN = "visible: an error of 1 is just seen in a picture"
@@ -48,10 +54,10 @@ def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
 
 
 def _scene(scene: SceneReport, style: Style) -> str:
-    head = style.paint(visible(scene.model), _BOLD)
+    head = style.paint(visible(scene.model), BOLD)
     if scene.quick:
-        head += "  " + style.paint("quick: fewer settings, rough times", _YELLOW)
-    lines = [head, *_wrapped(_machine(scene.machine), style, _INDENT)]
+        head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
+    lines = [head, *style.wrap(_machine(scene.machine), _INDENT)]
     if not scene.scenarios:
         lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
     for scenario in scene.scenarios:
@@ -67,16 +73,14 @@ def _machine(machine: Machine) -> str:
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     title = f"  {visible(report.title)}" if report.title else ""
-    lines = [_INDENT + style.paint(visible(report.name), _BOLD) + title]
+    lines = [_INDENT + style.paint(visible(report.name), BOLD) + title]
     for text in (_times(report), *_usual(report), *_reference(report), *report.notes):
-        lines += _wrapped(text, style, 2 * _INDENT)
+        lines += style.wrap(text, 2 * _INDENT)
     lines.append("")
     lines += _rows(report, style)
-    colour = _GREEN if report.verdict.on_front and not report.verdict.noticeable else _YELLOW
+    colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
-        lines.append("")
-        told = _wrapped(report.verdict.text, style, 2 * _INDENT)
-        lines += [style.paint(line, colour) for line in told]
+        lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
     for part in (_orders(report.orders), _stable(report, style)):
         if part:
             lines += ["", *part]
@@ -112,19 +116,6 @@ def _reference(report: ScenarioReport) -> list[str]:
     return said
 
 
-def _wrapped(text: str, style: Style, indent: str) -> list[str]:
-    """A paragraph; it is no wider than the terminal where its words allow it."""
-    width = max(style.width, _NARROWEST)
-    return textwrap.wrap(
-        visible(text),
-        width,
-        initial_indent=indent,
-        subsequent_indent=indent + _INDENT,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
 # --- the table
 
 
@@ -133,16 +124,16 @@ def _rows(report: ScenarioReport, style: Style) -> list[str]:
     if not rows:
         return [f"{2 * _INDENT}no setting was measured"]
     lines = table(columns(report), max(style.width, 60) - 4)
-    painted = [style.paint(lines[0], _FAINT)]
+    painted = [style.paint(lines[0], FAINT)]
     for row, line in zip(rows, lines[1:], strict=True):
-        code = _BOLD if row.own else _RED if row.status in ("diverged", "reset") else ""
-        code = code or (_YELLOW if row.status != "ok" else _GREEN if row.front else "")
-        painted.append(style.paint(line, code) if code else line)
+        code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
+        code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
+        painted.append(style.paint(line, code))
     legend = _LEGEND + (_BETTER if any(BETTER in line for line in lines) else "")
     below = [legend, _SEEN] if VISIBLE in lines[0] else [legend]
     return [
         f"{2 * _INDENT}{line}".rstrip()
-        for line in (*painted, *(style.paint(text, _FAINT) for text in below))
+        for line in (*painted, *(style.paint(text, FAINT) for text in below))
     ]
 
 
@@ -159,9 +150,9 @@ def _orders(orders: Sequence[OrderRow]) -> list[str]:
         return tuple("" if value is None else f"{value:.2f}" for value in found)
 
     parts = ("position", "attitude", "velocity")
-    columns = [Column("order of", tuple(one.integrator for one in shown), 0, left=True)]
-    columns += [Column(part, cells(part), 0) for part in parts]
-    return [f"{2 * _INDENT}{line}".rstrip() for line in table(columns, 10_000)]
+    columns = [Column("order of", tuple(one.integrator for one in shown), left=True)]
+    columns += [Column(part, cells(part)) for part in parts]
+    return [f"{2 * _INDENT}{line}".rstrip() for line in table(columns)]
 
 
 def _stable(report: ScenarioReport, style: Style) -> list[str]:
@@ -169,18 +160,18 @@ def _stable(report: ScenarioReport, style: Style) -> list[str]:
     if not rows:
         return []
     columns = [
-        Column("largest stable", tuple(one.integrator for one in rows), 0, left=True),
-        Column("timestep", tuple(_largest(one) for one in rows), 0, left=True),
+        Column("largest stable", tuple(one.integrator for one in rows), left=True),
+        Column("timestep", tuple(_largest(one) for one in rows), left=True),
     ]
-    lines = [f"{2 * _INDENT}{line}".rstrip() for line in table(columns, 10_000)]
+    lines = [f"{2 * _INDENT}{line}".rstrip() for line in table(columns)]
     lost = [visible(one.integrator) for one in rows if not one.monotone]
     if lost:
         text = f"not monotone, stable again beyond: {', '.join(lost)}"
-        lines.append(2 * _INDENT + style.paint(text, _RED))
+        lines.append(2 * _INDENT + style.paint(text, RED))
     if is_cut_short(report) and any(one.largest is None for one in rows):
         longest = seconds_text(report.duration / FEWEST_STEPS)
         text = f"longer ones than {longest} were not tried: {FEWEST_STEPS} are the whole scenario"
-        lines.append(2 * _INDENT + style.paint(text, _FAINT))
+        lines.append(2 * _INDENT + style.paint(text, FAINT))
     return lines
 
 
@@ -207,8 +198,8 @@ def _lost(report: ScenarioReport, style: Style) -> list[str]:
     if softened:
         what = "refsafe softens constraints, which makes another model"
         told.append(f"{what}: {_named(softened, usual)}")
-    lines = [line for text in told for line in _wrapped(text, style, 2 * _INDENT)]
-    return ["", *(style.paint(line, _YELLOW) for line in lines)] if lines else []
+    lines = [line for text in told for line in style.wrap(text, 2 * _INDENT, YELLOW)]
+    return ["", *lines] if lines else []
 
 
 def _named(rows: Sequence[WorkPrecisionRow], usual: Setting | None) -> str:

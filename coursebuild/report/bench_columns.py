@@ -17,7 +17,7 @@ from coursebuild.numerics.reports.points import (
     telling,
     usual_setting,
 )
-from coursebuild.report.table import Column
+from coursebuild.report.terminal import Column
 
 OWN, FRONT, BETTER = ">", "*", "→"
 """The scene's own setting, on the Pareto front, and before the number of a better row."""

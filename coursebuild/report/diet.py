@@ -1,6 +1,6 @@
-"""The scene diet as text for people and as JSON.
+"""The scene diet as text for people.
 
-Entry points: `diet_text(reports, style)`, `diet_report`, `diet_values` (JSON).
+Entry points: `diet_text(reports, style)`; `diet_values(reports)`, for JSON.
 
 A finding is told with its label, what it saves, where it is, and the change itself; what was tried
 and is needed is told in a line.
@@ -8,20 +8,13 @@ and is needed is told in a line.
 
 from __future__ import annotations
 
-import json
-import textwrap
 from collections.abc import Sequence
 
-import msgspec
-
-from coursebuild.diagnostics import Diagnostic
 from coursebuild.numerics.reports.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
-from coursebuild.numerics.reports.records import Failure
-from coursebuild.report.checked import failure_text
-from coursebuild.report.text import Style, diagnostic_text, visible
+from coursebuild.report.plain import plain
+from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 from coursebuild.report.values import plural
 
-_BOLD, _RED, _YELLOW, _GREEN, _FAINT = "1", "1;31", "1;33", "32", "2"
 _NAMES = 6
 """Names that a message lists."""
 _EDITS = 6
@@ -34,76 +27,40 @@ _JUDGED = (
 )
 
 
-def diet_report(
-    reports: Sequence[DietReport],
-    diagnostics: Sequence[Diagnostic],
-    failures: Sequence[Failure],
-    remarks: Sequence[str],
-    style: Style,
-) -> str:
-    """As text: what is wrong first, then what was found."""
-    parts = [diagnostic_text(one, style) + "\n" for one in diagnostics]
-    parts += [failure_text(one, style) for one in failures]
-    if reports:
-        parts.append(diet_text(reports, style))
-    if remarks:
-        parts.append("".join(visible(one) + "\n" for one in remarks))
-    return "\n".join(parts) or "there is no model to look at\n"
-
-
-def diet_values(
-    reports: Sequence[DietReport],
-    diagnostics: Sequence[Diagnostic],
-    failures: Sequence[Failure],
-    remarks: Sequence[str],
-) -> str:
-    """As one JSON object."""
-    value = {
-        "models": [msgspec.to_builtins(one) | {"ok": one.ok} for one in reports],
-        "diagnostics": [
-            {
-                "rule": one.rule,
-                "message": one.message,
-                "path": one.span.path,
-                "line": one.span.line,
-                "column": one.span.column,
-                "help": one.help,
-            }
-            for one in diagnostics
-        ],
-        "failures": [msgspec.to_builtins(one) for one in failures],
-        "remarks": list(remarks),
-    }
-    return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"
+def diet_values(reports: Sequence[DietReport]) -> dict[str, object]:
+    """Everything that was found, and for each model whether nothing is left to be done."""
+    return {"models": [plain(one) | {"ok": one.ok} for one in reports]}
 
 
 def diet_text(reports: Sequence[DietReport], style: Style) -> str:
-    """Every model with its findings, a blank line between."""
-    judged = "".join(line + "\n" for line in _painted(_JUDGED, style, "", _FAINT))
+    """Every model with its findings, a blank line between; empty where there is none."""
+    if not reports:
+        return ""
+    judged = "".join(line + "\n" for line in style.wrap(_JUDGED, "", FAINT))
     return "\n".join([*(_model(one, style) for one in reports), judged])
 
 
 def _model(report: DietReport, style: Style) -> str:
-    lines = [style.paint(visible(report.model), _BOLD) + _quick(report, style)]
+    lines = [style.paint(visible(report.model), BOLD) + _quick(report, style)]
     tried = [one.name for one in report.scenarios if one.status == "ok"]
-    lines += _wrapped(f"in {_listed(tried)}" if tried else "in no scenario", style, "  ")
+    lines += style.wrap(f"in {_listed(tried)}" if tried else "in no scenario", "  ")
     for one in report.scenarios:
         if one.status != "ok":
             why = "; ".join(one.reasons)
             told = f"scenario {one.name}: {one.status}: {why}; nothing is claimed from it"
-            lines += _painted(told, style, "  ", _RED)
+            lines += style.wrap(told, "  ", RED)
     for finding in report.findings:
         lines += ["", *_finding(finding, style)]
     for stale in report.stale:
         place = f"{stale.path}:{stale.line}:{stale.column}"
         told = f"`{stale.finding}` keeps nothing any more: take the entry out ({place})"
-        lines += ["", *_painted(told, style, "  ", _RED)]
+        lines += ["", *style.wrap(told, "  ", RED)]
     lines += ["", *_summary(report, style)]
     return "\n".join(lines) + "\n"
 
 
 def _quick(report: DietReport, style: Style) -> str:
-    return "  " + style.paint("quick: short runs, rough times", _YELLOW) if report.quick else ""
+    return "  " + style.paint("quick: short runs, rough times", YELLOW) if report.quick else ""
 
 
 def _summary(report: DietReport, style: Style) -> list[str]:
@@ -114,21 +71,21 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         said = plural(len(open_ones), "finding") + " not explained"
         if fixable:
             said += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
-        lines += _painted(said, style, "  ", _RED)
-        lines += _faint(_keep(report, open_ones), style)
+        lines += style.wrap(said, "  ", RED)
+        lines += style.wrap(_keep(report, open_ones), "  ", FAINT)
     else:
-        lines.append("  " + style.paint("nothing in it is in vain", _GREEN))
+        lines.append("  " + style.paint("nothing in it is in vain", GREEN))
     if report.slim is not None and len(open_ones) > 1:
-        lines += _wrapped(f"without all of them: {_saving(report.slim)}", style, "  ")
+        lines += style.wrap(f"without all of them: {_saving(report.slim)}", "  ")
     if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(open_ones):
-        lines += _wrapped(f"after --fix: {_saving(report.fixed)}", style, "  ")
+        lines += style.wrap(f"after --fix: {_saving(report.fixed)}", "  ")
     by_reason: dict[str, list[str]] = {}
     for one in report.tried:
         by_reason.setdefault(one.reason, []).append(one.kind)
     for reason, kinds in by_reason.items():
         shown = _listed(list(dict.fromkeys(kinds)))
         told = f"not found, because {reason}" if reason else "tried and needed"
-        lines += _faint(f"{told}: {shown}", style)
+        lines += style.wrap(f"{told}: {shown}", "  ", FAINT)
     return lines
 
 
@@ -145,30 +102,31 @@ def _keep(report: DietReport, found: Sequence[Finding]) -> str:
 
 
 def _finding(one: Finding, style: Style) -> list[str]:
-    colour = _FAINT if one.kept else _RED if one.counts else _YELLOW
-    lines = _wrapped(f"{style.paint(one.kind, colour)}: {visible(one.message)}", style, "  ")
+    colour = FAINT if one.kept else RED if one.counts else YELLOW
+    lines = style.wrap(f"{one.kind}: {one.message}", "  ")
+    lines[0] = lines[0].replace(one.kind, style.paint(one.kind, colour), 1)
     label = one.label
     if one.label != IDENTICAL and one.difference:
         label += f" ({one.difference:.1e})"
-    lines += _wrapped(f"{label}; {_saving(one.saving)}", style, "    ")
+    lines += style.wrap(f"{label}; {_saving(one.saving)}", "    ")
     if one.proof:
-        lines += _wrapped(f"because {one.proof}", style, "    ")
+        lines += style.wrap(f"because {one.proof}", "    ")
     if one.kept:
-        return [*lines, *_wrapped(f"kept: {one.kept}", style, "    ")]
+        return [*lines, *style.wrap(f"kept: {one.kept}", "    ")]
     for edit in one.edits[:_EDITS]:
         lines += _edit(edit, style)
     if len(one.edits) > _EDITS:
         lines.append(f"    … and {len(one.edits) - _EDITS} more changes")
     if one.doubt:
-        lines += _wrapped(f"no fault, as {one.doubt}", style, "    ")
+        lines += style.wrap(f"no fault, as {one.doubt}", "    ")
     elif one.unfixed and one.counts:
-        lines += _wrapped(f"not for --fix: {one.unfixed}", style, "    ")
+        lines += style.wrap(f"not for --fix: {one.unfixed}", "    ")
     return lines
 
 
 def _edit(edit: TextEdit, style: Style) -> list[str]:
     lines = [f"    {visible(edit.path)}:{edit.line}:{edit.column}"]
-    for mark, text, colour in (("-", edit.old, _RED), ("+", edit.new, _GREEN)):
+    for mark, text, colour in (("-", edit.old, RED), ("+", edit.new, GREEN)):
         shown = [line for line in text.splitlines() if line.strip()]
         for line in shown[:_LINES]:
             lines.append("    " + style.paint(f"{mark} {visible(line.strip())}", colour))
@@ -193,22 +151,3 @@ def _listed(names: Sequence[str]) -> str:
     shown = ", ".join(names[:_NAMES])
     more = len(names) - _NAMES
     return shown + (f" and {more} more" if more > 0 else "")
-
-
-def _faint(text: str, style: Style) -> list[str]:
-    return _painted(text, style, "  ", _FAINT)
-
-
-def _painted(text: str, style: Style, indent: str, colour: str) -> list[str]:
-    return [style.paint(line, colour) for line in _wrapped(visible(text), style, indent)]
-
-
-def _wrapped(text: str, style: Style, indent: str) -> list[str]:
-    return textwrap.wrap(
-        text,
-        max(style.width, 40),
-        initial_indent=indent,
-        subsequent_indent=indent + "  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )

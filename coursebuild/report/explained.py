@@ -1,22 +1,19 @@
-"""Why something would run again, or not, and what depends on it: values, and as text and JSON.
+"""Why something would run again, or not, and what depends on it: values, and as text.
 
-Entry points: `Explanation`, `explained_text`, `explained_json`.
+Entry points: `Explanation`, `explained_text`.
 """
 
 from __future__ import annotations
 
-import json
 import time
 from typing import Literal
 
-import msgspec
 from msgspec import Struct
 
-from coursebuild.report.text import Style, visible
+from coursebuild.report.terminal import BOLD, FAINT, GREEN, YELLOW, Style, visible
 from coursebuild.report.values import plural
 
 State = Literal["remembered", "would run", "norun"]
-_GREEN, _YELLOW, _FAINT, _BOLD = "32", "1;33", "2", "1"
 
 
 class Explained(Struct, frozen=True):
@@ -56,12 +53,6 @@ class Explanation(Struct, frozen=True):
     """Files of the lessons and pages that show it, link to it or quote its output."""
 
 
-def explained_json(explanation: Explanation) -> str:
-    """As one JSON object."""
-    value = msgspec.to_builtins(explanation)
-    return json.dumps(value, ensure_ascii=True, indent=2) + "\n"
-
-
 def explained_text(explanation: Explanation, style: Style) -> str:
     """As text for people."""
     e = explanation
@@ -69,7 +60,7 @@ def explained_text(explanation: Explanation, style: Style) -> str:
     if e.kind in ("script", "lab"):
         parts += ["\n".join(_whole(one, style)) for one in e.own]
     else:
-        parts.append(style.paint(_head(e), _BOLD))
+        parts.append(style.paint(_head(e), BOLD))
         parts += ["\n".join(_brief(one, style)) for one in e.own]
     if e.files:
         parts.append(_block("consists also of", e.files))
@@ -106,19 +97,19 @@ def _block(head: str, lines: tuple[str, ...]) -> str:
 def _verdict(one: Explained, style: Style) -> str:
     match one.state:
         case "remembered":
-            return style.paint("is remembered", _GREEN)
+            return style.paint("is remembered", GREEN)
         case "norun":
             return "is never run: its lesson says `norun`"
         case "would run":
             again = " again" if one.made is not None else ""
             verb = "run" if one.kind == "script" else "be tried"
-            return style.paint(f"would {verb}{again}", _YELLOW)
+            return style.paint(f"would {verb}{again}", YELLOW)
 
 
 def _whole(one: Explained, style: Style) -> list[str]:
-    lines = [f"{style.paint(visible(one.name), _BOLD)} {_verdict(one, style)}"]
+    lines = [f"{style.paint(visible(one.name), BOLD)} {_verdict(one, style)}"]
     lines += [f"  because {visible(reason)}" for reason in one.reasons]
-    lines.append(style.paint(f"  {_last(one)}", _FAINT))
+    lines.append(style.paint(f"  {_last(one)}", FAINT))
     if one.depends:
         lines += ["", "its last result depends on:"]
         lines += [f"  {visible(line)}" for line in one.depends]

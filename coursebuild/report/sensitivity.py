@@ -1,15 +1,18 @@
 """How sensitive the outputs of scripts are to their initial states, as text and as plain values.
 
-Entry points: `sensitivity_text(found, paint)`, `sensitivity_value(found)`.
+Entry points: `sensitivity_text(found, style)`, `sensitivity_value(found)`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, assert_never
 
 from coursebuild.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
+from coursebuild.report.plain import plain
+from coursebuild.report.terminal import FAINT, GREEN, YELLOW, Style
+from coursebuild.report.text import place
 from coursebuild.report.values import plural
 
 _WHY = {
@@ -20,30 +23,27 @@ _WHY = {
     Standing.FAILED: "it does not run to its end when its initial states are moved",
 }
 
-Paint = Callable[[str, str], str]
-"""A text in a colour."""
 
-
-def sensitivity_text(found: Sequence[Sensitivity], paint: Paint) -> str:
+def sensitivity_text(found: Sequence[Sensitivity], style: Style) -> str:
     """A line for each script, and one for each number of which not all digits hold."""
     lines = [f"digits that hold when initial states are moved by {PERTURBATION:.0e} (relative):"]
     for one in found:
-        lines += _script(one, paint)
+        lines += _script(one, style)
     return "".join(line + "\n" for line in lines)
 
 
-def _script(one: Sensitivity, paint: Paint) -> list[str]:
+def _script(one: Sensitivity, style: Style) -> list[str]:
     if one.standing is not Standing.MEASURED:
-        return [f"{paint('not asked', '2')} {one.path}  {_WHY[one.standing]}"]
+        return [f"{style.paint('not asked', FAINT)} {one.path}  {_WHY[one.standing]}"]
     whole = one.numbers - len(one.doubts)
     verdict = "chaotic" if one.chaotic else "some" if one.doubts or one.flips else "all"
-    colour = "32" if verdict == "all" else "1;33"
+    colour = GREEN if verdict == "all" else YELLOW
     numbers = plural(one.numbers, "number")
     said = f"{whole} of {numbers}" if whole < one.numbers else numbers
     parts = [f"{said} in full"]
     if one.amplification is not None:
         parts.append(f"states end {_times(one.amplification)} times as far apart as they began")
-    head = f"{paint(f'{verdict:<9}', colour)} {one.path}  {', '.join(parts)}"
+    head = f"{style.paint(f'{verdict:<9}', colour)} {one.path}  {', '.join(parts)}"
     rows: list[Doubt | Flip] = [*one.doubts, *one.flips]
     rows.sort(key=lambda row: (row.span.path, row.span.start))
     return [head, *(f"  {_row(row)}" for row in rows)]
@@ -56,7 +56,6 @@ def _times(size: float) -> str:
 
 
 def _row(row: Doubt | Flip) -> str:
-    place = f"{row.span.path}:{row.span.line}:{row.span.column}"
     match row:
         case Doubt():
             what = f"{row.printed}  {row.trusted} of {plural(row.digits, 'digit')}"
@@ -66,7 +65,7 @@ def _row(row: Doubt | Flip) -> str:
             what = _flip(row)
         case _:
             assert_never(row)
-    return f"{place}  {what}" + ("" if row.compared else "  (allowed for)")
+    return f"{place(row.span)}  {what}" + ("" if row.compared else "  (allowed for)")
 
 
 def _flip(row: Flip) -> str:
@@ -80,43 +79,14 @@ def sensitivity_value(found: Sequence[Sensitivity]) -> list[dict[str, Any]]:
     """The same as values of JSON; an amplification without bounds is `null`."""
     return [
         {
-            "path": one.path,
-            "lesson": one.lesson,
-            "status": one.standing.value,
-            "numbers": one.numbers,
+            **plain(one, standing="status"),
             "chaotic": one.chaotic,
-            "amplification": (
-                one.amplification
-                if one.amplification is not None and math.isfinite(one.amplification)
-                else None
-            ),
-            "doubts": [
-                {
-                    **_place(doubt),
-                    "printed": doubt.printed,
-                    "digits": doubt.digits,
-                    "trusted": doubt.trusted,
-                    "least": doubt.least,
-                    "most": doubt.most,
-                    "instead": doubt.instead,
-                    "compared": doubt.compared,
-                }
-                for doubt in one.doubts
-            ],
-            "flips": [
-                {
-                    **_place(flip),
-                    "printed": flip.printed,
-                    "other": flip.other,
-                    "compared": flip.compared,
-                }
-                for flip in one.flips
-            ],
+            "doubts": [_row_value(doubt) for doubt in one.doubts],
+            "flips": [_row_value(flip) for flip in one.flips],
         }
         for one in found
     ]
 
 
-def _place(row: Doubt | Flip) -> dict[str, Any]:
-    span = row.span
-    return {"file": span.path, "line": span.line, "column": span.column}
+def _row_value(row: Doubt | Flip) -> dict[str, Any]:
+    return {"file": row.span.path, **plain(row)}

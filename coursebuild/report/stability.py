@@ -1,27 +1,17 @@
-"""What was measured on the hard cases, as a table for people and as JSON.
+"""What was measured on the hard cases, as tables for people.
 
-Entry points: `stability_text(reports, style)`, `stability_json(reports)`.
+Entry point: `stability_text(reports, style)`.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 
-import msgspec
-
 from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, FigureLine, ReferenceLine
-from coursebuild.report.text import Style
+from coursebuild.report.terminal import BOLD, RED, YELLOW, Column, Style, table
 
-_BOLD, _RED, _YELLOW = "1", "1;31", "1;33"
 _ORDERS = ("order of position", "order of attitude", "order of velocity")
 _BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step")
-
-
-def stability_json(reports: Sequence[CaseReport]) -> str:
-    """As one JSON array."""
-    value = [msgspec.to_builtins(report) for report in reports]
-    return json.dumps(value, ensure_ascii=True, indent=2, allow_nan=False) + "\n"
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
@@ -30,7 +20,7 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
 
 
 def _case(report: CaseReport, style: Style) -> str:
-    head = style.paint(f"{report.name}", _BOLD) + f"  case {report.case}: {report.title}"
+    head = style.paint(f"{report.name}", BOLD) + f"  case {report.case}: {report.title}"
     lines = [head]
     if report.reference is not None:
         lines += [f"  {line}" for line in _reference(report.reference)]
@@ -59,7 +49,7 @@ def _case(report: CaseReport, style: Style) -> str:
     for line in lost:
         why = "; ".join(line.reasons)
         told = f"  {line.integrator} at {line.timestep:g} s: {line.status}: {why}"
-        lines.append(style.paint(told, _YELLOW))
+        lines.append(style.paint(told, YELLOW))
     return "\n".join(lines) + "\n"
 
 
@@ -82,7 +72,7 @@ def _boundary(line: BoundaryLine) -> tuple[str, ...]:
 
 def _islands(line: BoundaryLine, style: Style) -> str:
     shown = ", ".join(f"{h:.4g}" for h in line.islands)
-    return style.paint(f"{line.integrator} is not monotone: stable again at {shown} s", _RED)
+    return style.paint(f"{line.integrator} is not monotone: stable again at {shown} s", RED)
 
 
 def _largest(line: BoundaryLine) -> str:
@@ -120,13 +110,6 @@ def _merged(rows: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...]
 
 
 def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Rows under their titles, in columns; columns without a cell are left out."""
-    shown = [i for i in range(len(titles)) if any(row[i] for row in rows)]
-    head = tuple(titles[i] for i in shown)
-    body = [(*(row[i] for i in shown), row[-1]) for row in rows]
-    widths = [max(len(row[i]) for row in (head, *body)) for i in range(len(head))]
-    return [
-        "  "
-        + "  ".join((*(c.ljust(w) for c, w in zip(row, widths, strict=False)), *row[len(head) :]))
-        for row in (head, *body)
-    ]
+    """Rows under their titles, in columns."""
+    columns = zip((*titles, ""), zip(*rows, strict=True), strict=True)
+    return [f"  {line}" for line in table([Column(t, cells, left=True) for t, cells in columns])]

@@ -25,7 +25,8 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import lab_lines
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import lab_files
-from coursebuild.report.text import Style, lab_line
+from coursebuild.report import Style
+from coursebuild.report.text import lab_line
 from coursebuild.results import LabResult
 from support.lab_values import BALL, OpenEngines, make_lab
 

@@ -112,7 +112,7 @@ def test_json_report_of_drift(make: Make) -> None:
     assert (drift["end_line"], drift["end_column"]) == (line, 11)
     assert drift["message"] and drift["help"] and isinstance(drift["notes"], list)
     ran, skipped = found["scripts"]
-    assert list(ran) == ["path", "lesson", "status", "seconds", "cached"]
+    assert list(ran) == ["path", "lesson", "status", "seconds", "cached", "missing"]
     assert (ran["path"], ran["lesson"], ran["status"]) == ("examples/one.py", "1.1", "drift")
     assert ran["seconds"] > 0 and ran["cached"] is False
     assert skipped["status"] == "skipped"

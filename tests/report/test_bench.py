@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,16 +13,15 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.numerics.reports.bench import SceneCard, Verdict, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import SceneCard, SceneReport, Verdict, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.points import seconds_text, setting_text
 from coursebuild.numerics.reports.records import Failure
 from coursebuild.report import Style
 from coursebuild.report.bench import bench_text
-from coursebuild.report.bench_json import COLUMNS, bench_json
-from coursebuild.report.checked import checked_text, failure_text
-from coursebuild.report.measured import bench_report, cases_values
-from coursebuild.report.table import Column, cells_of, table
+from coursebuild.report.bench_json import bench_values
+from coursebuild.report.measuring import checked_text, failure_text, measured_json, measured_text
+from coursebuild.report.terminal import Column, cells, table
 from coursebuild.source import Source
 from support.bench_reports import awkward, lost, row, scenario, scene, setting, swing
 
@@ -31,13 +31,13 @@ EXPECTED = Path(__file__).parent
 def test_text_at_80_columns() -> None:
     text = bench_text([scene(awkward(), quick=True)], Style(width=80))
     assert text == (EXPECTED / "bench-80.txt").read_text("utf-8")
-    assert all(cells_of(line) <= 80 for line in text.splitlines())
+    assert all(cells(line) <= 80 for line in text.splitlines())
 
 
 def test_text_at_160_columns() -> None:
     text = bench_text([scene(awkward(), quick=True)], Style(width=160))
     assert text == (EXPECTED / "bench-160.txt").read_text("utf-8")
-    assert all(cells_of(line) <= 160 for line in text.splitlines())
+    assert all(cells(line) <= 160 for line in text.splitlines())
 
 
 def test_where_the_duration_ended_the_search_for_stable_timesteps() -> None:
@@ -100,7 +100,7 @@ def test_where_nothing_was_measured() -> None:
     assert text.endswith(
         "A Processor @ 2 GHz\n  nothing can move in it, so that nothing was measured\n"
     )
-    assert bench_report([], (), (), (), (), Style()) == "there is no model to measure\n"
+    assert measured_text(bench_text([], Style()), Style()) == ""
 
 
 def test_where_every_run_was_lost_the_reasons_are_told() -> None:
@@ -188,13 +188,17 @@ KINDS: dict[str, tuple[type, ...]] = {
 }
 
 
+def bench_json(scenes: Sequence[SceneReport]) -> str:
+    return measured_json(bench_values(scenes))
+
+
 def rows_of(text: str) -> list[dict[str, object]]:
     found = json.loads(text, parse_constant=lambda name: (_ for _ in ()).throw(ValueError(name)))
     assert list(found) == [
         *("rows", "scenarios", "scenes", "diagnostics", "failures", "checked", "remarks")
     ]
     for one in found["rows"]:
-        assert tuple(one) == COLUMNS
+        assert list(one) == list(found["rows"][0])
         for name, value in one.items():
             kinds = KINDS.get(name, NUMBER)
             assert isinstance(value, kinds), name
@@ -262,12 +266,12 @@ def test_json_says_what_is_wrong() -> None:
     span = Source("models/arm.xml", "<mujoco/>").span(0, 3)
     departure = Departure("swing", "RK4 at 1 ms", "error of position", "1", "2", "± 5 %")
     found = json.loads(
-        bench_json(
-            [],
-            [diagnose("model-error", span, "the model `arm` does not compile: no")],
-            [Failure("a", "b")],
-            [Checked("arm", "x.json", (departure,), ("c",))],
-            ["d"],
+        measured_json(
+            bench_values([]),
+            diagnostics=[diagnose("model-error", span, "the model `arm` does not compile: no")],
+            failures=[Failure("a", "b")],
+            checked=[Checked("arm", "x.json", (departure,), ("c",))],
+            remarks=["d"],
         )
     )
     assert found["diagnostics"][0]["message"] == "the model `arm` does not compile: no"
@@ -275,7 +279,6 @@ def test_json_says_what_is_wrong() -> None:
     assert found["failures"] == [{"message": "a", "help": "b"}]
     assert found["checked"][0]["departures"][0]["measured"] == "2"
     assert found["remarks"] == ["d"]
-    assert json.loads(cases_values((), (), (), (), recorded=False)) == []
 
 
 @given(value=st.floats())

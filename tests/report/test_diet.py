@@ -21,8 +21,9 @@ from coursebuild.numerics.reports.diet import (
     Tried,
 )
 from coursebuild.numerics.reports.records import Failure, decode_diet, encode_diet
-from coursebuild.report.diet import diet_report, diet_text, diet_values
-from coursebuild.report.text import Style
+from coursebuild.report import Style
+from coursebuild.report.diet import diet_text, diet_values
+from coursebuild.report.measuring import measured_json, measured_text
 
 PLACE = Place("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
@@ -165,7 +166,9 @@ def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
 
 
 def test_json_and_record_hold_everything() -> None:
-    value = json.loads(diet_values([REPORT], [], [Failure("no", "yes")], ["said"]))
+    value = json.loads(
+        measured_json(diet_values([REPORT]), failures=[Failure("no", "yes")], remarks=["said"])
+    )
     assert value["models"][0]["findings"][0]["edits"][0]["old"] == EDIT.old
     assert value["failures"] == [{"message": "no", "help": "yes"}] and value["remarks"] == ["said"]
     assert value["models"][0]["ok"] is False
@@ -174,6 +177,7 @@ def test_json_and_record_hold_everything() -> None:
 
 
 def test_a_report_on_no_model() -> None:
-    assert diet_report([], [], [], [], Style()) == "there is no model to look at\n"
-    failed = diet_report([], [], [Failure("models/a.xml was changed in the meantime")], [], Style())
+    assert diet_text([], Style()) == ""
+    failure = Failure("models/a.xml was changed in the meantime")
+    failed = measured_text("", Style(), failures=[failure])
     assert failed == "error: models/a.xml was changed in the meantime\n"

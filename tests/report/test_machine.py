@@ -73,6 +73,7 @@ def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
         "status": "timeout",
         "seconds": 60.0,
         "cached": False,
+        "missing": [],
     }
     assert value["labs"][0] == {
         "name": "1.1-lab-1",

@@ -13,7 +13,8 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
 )
 from coursebuild.report import Style
-from coursebuild.report.stability import stability_json, stability_text
+from coursebuild.report.plain import json_text
+from coursebuild.report.stability import stability_text
 
 TRIED = (1e-3, 10.0)
 
@@ -88,7 +89,7 @@ def test_colour_marks_what_is_not_well() -> None:
 
 
 def test_json_has_every_column_and_no_number_that_is_none() -> None:
-    (found,) = json.loads(stability_json([REPORT, REPORT]))[:1]
+    (found,) = json.loads(json_text([REPORT, REPORT]))[:1]
     assert found["boundaries"][3]["largest"] is None
     assert found["boundaries"][2]["islands"] == [0.4, 0.5]
     assert found["errors"][1]["position"] == [0.1, 0.01]

@@ -24,10 +24,10 @@ from coursebuild.pipeline.check import check
 from coursebuild.pipeline.packages import export
 from coursebuild.pipeline.update import update
 from coursebuild.report import Style, diagnostic_text
-from coursebuild.report.catalogue import Example, ExampleFile, catalogue_page
 from coursebuild.rules import RULES
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts
+from support.rule_catalogue import Example, ExampleFile, catalogue_page
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "tests/fixtures/rules"
