@@ -15,7 +15,7 @@ from coursebuild.cli.output import CLEAN, WRONG, style_of, write
 if TYPE_CHECKING:
     from coursebuild.pipeline.bench import Benched
     from coursebuild.pipeline.options import Options
-    from coursebuild.pipeline.recorded_cases import Cases
+    from coursebuild.pipeline.stability import Cases
 
 _RECORDED = ("failures", "checked", "remarks")
 """What commands say of recorded reports."""
@@ -82,7 +82,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
 
 def _cases(options: Options, arguments: argparse.Namespace) -> Cases:
-    from coursebuild.pipeline.recorded_cases import Cases, check_stability, record_stability
+    from coursebuild.pipeline.stability import Cases, check_stability, record_stability
     from coursebuild.pipeline.stability import stability as measured
 
     names = tuple(arguments.problems)

@@ -3,45 +3,43 @@
 Entry point: `measure_scene(model, declared, quick=…, clock=…, said=…)`.
 
 1. A first run in small steps says what acts in a scenario and how far it can be told (`pilot`).
-2. The reference is made, and made again in another way (`knowing`).
-3. Every setting is run and compared (`rows`), then timed beside the model's own (`costs`).
+2. The reference is made, and made again in another way (`references`).
+3. Every setting is run and compared (`rows`), then timed beside the model's own (`timing`).
 4. Orders are fitted, stability limits looked for, the front drawn (`front`).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from coursebuild.model.scenarios import Declarations
-from coursebuild.numerics.costs import Cost, costs, subnormal
-from coursebuild.numerics.engine import refsafe_from, varied
+from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import Placed, Point, front, verdict, words
-from coursebuild.numerics.grid import apply, own_setting, settings
-from coursebuild.numerics.knowing import Known
-from coursebuild.numerics.limits import stable
-from coursebuild.numerics.measure import HIGHEST, LOWEST, Error, Errors, order
-from coursebuild.numerics.pilot import Pilot, pilot
-from coursebuild.numerics.problem import STANDARD, Integrator
+from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
+from coursebuild.numerics.pilot import pilot
+from coursebuild.numerics.problem import STANDARD
+from coursebuild.numerics.references import conserved, energy_beyond, references
 from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,
-    Setting,
     StableRow,
     Verdict,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.rotation import angle_between
-from coursebuild.numerics.rows import Measured, figure_name, measured
+from coursebuild.numerics.rows import Basis, Measured, measured
 from coursebuild.numerics.scene import Scene, scenes
-from coursebuild.numerics.stability import attempted
-from coursebuild.numerics.timing import Clock
-from coursebuild.numerics.truth import Cone, conserved, energy_beyond, references
+from coursebuild.numerics.settings import own_setting, settings, stable
+from coursebuild.numerics.timing import Clock, Cost, costs, subnormal
+from coursebuild.numerics.visible import quantity_name
+from mjcourse.spatial import angular_distance
+
+_STRAIGHT = 0.75
+"""The difference of slopes on the way from which on errors follow no one power of the timestep."""
 
 
 def measure_scene(
@@ -82,30 +80,24 @@ def measure_scenario(
     said(f"{scene.name}: a first run")
     first = pilot(model, scene)
     said(f"{scene.name}: the reference")
-    by_cone = references(model, scene, first, quick=quick)
-    own = own_setting(model, scene, first)
-    chosen = settings(model, scene, first, quick=quick)
-    known = by_cone[own.cone].known
-    invariant = conserved(model, scene, first, known)
+    cones = references(model, first, quick=quick)
+    own = own_setting(model, first)
+    known = cones[own.cone].known
+    invariant, beyond = conserved(model, first, known), energy_beyond(model, first, known)
+    basis = Basis(model, first, own, cones, invariant, beyond)
     found = []
-    for setting in chosen:
+    for setting in settings(model, first, quick=quick):
         said(f"{scene.name}: {words(setting)}")
-        cone = by_cone[setting.cone]
-        found.append(measured(model, scene, first, cone.known, invariant, setting, cone.sticks))
+        found.append(measured(basis, setting))
     taken: list[Cost | None] = [None] * len(found)
     if clock is not None:
         said(f"{scene.name}: times")
-        taken = _times(model, scene, first, found, chosen.index(own), clock, quick)
+        taken = _times(basis, found, clock, quick)
     said(f"{scene.name}: stable timesteps")
-    largest = stable(model, scene, first, quick=quick)
-    beyond = energy_beyond(model, scene, first, known)
-    points = [_point(row, cost, by_cone) for row, cost in zip(found, taken, strict=True)]
+    largest = stable(model, first, quick=quick)
+    points = [_point(one.row, cost) for one, cost in zip(found, taken, strict=True)]
     placed = front(points)
-    comparable = found[chosen.index(own)].judgement.ok
-    rows = tuple(
-        _row(model, scene, first, row, cost, place, by_cone, own, beyond, comparable)
-        for row, cost, place in zip(found, taken, placed, strict=True)
-    )
+    comparable = any(one.ok for one in found if one.row.own)
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -120,29 +112,28 @@ def measure_scenario(
         agreement=known.agreement,
         lyapunov=first.lyapunov,
         smooth=first.smooth,
-        notes=_notes(model, scene, first, known, largest),
-        figure=figure_name(model, scene),
-        rows=rows,
-        orders=_orders(found, known, own, _extents(known)) if first.smooth else (),
+        notes=_notes(basis, largest),
+        figure=quantity_name(model, scene),
+        rows=tuple(
+            _placed_row(one.row, cost, place, scene.scenario.duration, comparable=comparable)
+            for one, cost, place in zip(found, taken, placed, strict=True)
+        ),
+        orders=_orders(basis, found) if first.smooth else (),
         stable=largest,
-        verdict=_verdict(chosen, points, placed, found, chosen.index(own), by_cone),
+        verdict=_verdict(basis, found, points, placed),
     )
 
 
-# ------------------------------------------------------------------------------------------ words
-
-
-def _notes(
-    model: Any, scene: Scene, first: Pilot, known: Known, largest: Sequence[StableRow]
-) -> tuple[str, ...]:
+def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
     """What to know when reading the figures."""
+    model, first, known = basis.model, basis.first, basis.known
     notes = [known.note]
     if first.jumps:
         reasons = ", ".join(first.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
-    if known.horizon < scene.scenario.duration * (1 - 1e-9):
+    if known.horizon < first.scene.scenario.duration * (1 - 1e-9):
         notes.append(f"errors count until {known.horizon:.6g} s: the motion is not known beyond")
-    if subnormal(model, scene, first):
+    if subnormal(model, first):
         notes.append("the state holds subnormal numbers, with which processors are slow")
     soft = refsafe_from(model) if first.constrained else math.inf
     if any((one.searched[1] if one.largest is None else one.largest) > soft for one in largest):
@@ -151,178 +142,90 @@ def _notes(
 
 
 def _verdict(
-    chosen: Sequence[Setting],
+    basis: Basis,
+    found: Sequence[Measured],
     points: Sequence[Point | None],
     placed: Sequence[Placed],
-    found: Sequence[Measured],
-    own: int,
-    by_cone: dict[str, Cone],
 ) -> Verdict:
-    """On the scene's own setting, number `own`."""
-    mine = found[own]
-    model_error = by_cone[mine.setting.cone].seen
-    noticeable = True if model_error >= 1 and mine.judgement.ok else mine.noticeable
-    seen = None if mine.seen is None or noticeable is None else mine.seen + model_error
+    """On the scene's own setting."""
+    own = next(number for number, one in enumerate(found) if one.row.own)
+    mine, cone = found[own], basis.cones[basis.own.cone]
+    noticeable = True if cone.seen >= 1 and mine.ok else mine.noticeable
     unseen = [
         (point.cost, number)
-        for number, (point, row) in enumerate(zip(points, found, strict=True))
-        if point is not None and row.seen is not None
-        if row.seen + by_cone[row.setting.cone].seen < 1
+        for number, (point, one) in enumerate(zip(points, found, strict=True))
+        if point is not None and one.row.seen is not None and one.row.seen < 1
     ]
-    hopeless = all(row.noticeable for row in found if row.judgement.ok)
     return verdict(
-        chosen,
+        [one.row.setting for one in found],
         points,
         placed,
         own,
-        seen,
-        mine.judgement.reasons,
+        None if noticeable is None else mine.row.seen,
+        mine.row.reasons,
         min(unseen)[1] if unseen else None,
-        hopeless=hopeless,
+        hopeless=all(one.noticeable for one in found if one.ok),
     )
 
 
 # ------------------------------------------------------------------------------------------- rows
 
 
-def _times(
-    model: Any,
-    scene: Scene,
-    first: Pilot,
-    found: Sequence[Measured],
-    own: int,
-    clock: Clock,
-    quick: bool,
-) -> list[Cost | None]:
+def _times(basis: Basis, found: Sequence[Measured], clock: Clock, quick: bool) -> list[Cost | None]:
     """What the usable settings cost; where the scene's own is not, relative to the first."""
-    usable = [index for index, row in enumerate(found) if row.judgement.ok]
+    usable = [index for index, one in enumerate(found) if one.ok]
     taken: list[Cost | None] = [None] * len(found)
     if not usable:
         return taken
-    chosen = [found[index].setting for index in usable]
-    beside = usable.index(own) if own in usable else 0
-    spent = costs(model, scene, first, chosen, beside, clock, quick=quick)
+    chosen = [found[index].row.setting for index in usable]
+    own = next((n for n, index in enumerate(usable) if found[index].row.own), 0)
+    spent = costs(basis.model, basis.first, chosen, own, clock, quick=quick)
     for index, cost in zip(usable, spent, strict=True):
         taken[index] = cost
     return taken
 
 
-def _point(row: Measured, cost: Cost | None, by_cone: dict[str, Cone]) -> Point | None:
+def _point(row: WorkPrecisionRow, cost: Cost | None) -> Point | None:
     if cost is None or row.seen is None:
         return None
-    if row.figure is not None:
-        return Point(cost.ratio, row.figure.largest)
-    return Point(cost.ratio, row.seen + by_cone[row.setting.cone].seen)
+    return Point(cost.ratio, row.seen if row.figure is None else row.figure[0])
 
 
-def _row(
-    model: Any,
-    scene: Scene,
-    first: Pilot,
-    row: Measured,
-    cost: Cost | None,
-    place: Placed,
-    by_cone: dict[str, Cone],
-    own: Setting,
-    beyond: float | None,
-    comparable: bool,
+def _placed_row(
+    row: WorkPrecisionRow, cost: Cost | None, place: Placed, duration: float, *, comparable: bool
 ) -> WorkPrecisionRow:
-    seconds = None if cost is None else cost.step * 1e-9 * row.steps
-    mean, errors = row.mean_energy, row.errors or Errors(None, None, None)
-    return WorkPrecisionRow(
-        setting=row.setting,
-        status=row.judgement.status.value,
-        reasons=row.judgement.reasons,
-        position=_both(errors.position),
-        attitude=_both(errors.attitude),
-        velocity=_both(errors.velocity),
-        figure=_both(row.figure),
-        seen=None if row.seen is None else row.seen + by_cone[row.setting.cone].seen,
-        energy_drift=row.energy_drift,
-        momentum_drift=row.momentum_drift,
-        mean_energy=None if mean is None or beyond is None else mean / beyond - 1,
-        penetration=row.penetration,
-        slip=row.slip,
-        model_error=by_cone[row.setting.cone].model_error,
-        refsafe=row.refsafe,
-        steps=row.steps,
-        cost=None if cost is None or not comparable else cost.ratio,
-        cost_uncertainty=None if cost is None or not comparable else cost.uncertainty,
-        realtime=None if not seconds else scene.scenario.duration / seconds,
-        spread=None if cost is None else cost.spread,
-        growth=None if row.judgement.ok else _growth(model, scene, first, row),
-        own=row.setting == own,
-        front=place.front,
-        dominated_by=place.dominated_by,
+    """A row with its cost; `comparable`: whether the scene's own setting has one."""
+    row = replace(row, front=place.front, dominated_by=place.dominated_by)
+    if cost is None:
+        return row
+    seconds = cost.step * 1e-9 * row.steps
+    return replace(
+        row,
+        cost=cost.ratio if comparable else None,
+        cost_uncertainty=cost.uncertainty if comparable else None,
+        realtime=duration / seconds if seconds else None,
+        spread=cost.spread,
     )
 
 
-def _both(error: Error | None) -> tuple[float, float] | None:
-    return None if error is None else (error.largest, error.end)
-
-
-def _growth(model: Any, scene: Scene, first: Pilot, row: Measured) -> float | None:
-    one = varied(model, Integrator(row.setting.integrator), row.setting.timestep)
-    apply(one, row.setting)
-    try:
-        growth = attempted(first.setup, one, row.steps).growth
-    except mujoco.FatalError:
-        return None
-    return growth if math.isfinite(growth) and growth > 1 else None
-
-
-def _extents(known: Known) -> tuple[float, float, float]:
-    """How much positions, attitudes and velocities change: an error as large is no small one."""
+def _orders(basis: Basis, found: Sequence[Measured]) -> tuple[OrderRow, ...]:
+    own, known = basis.own, basis.known
     motion = known.motion
-    turned = angle_between(motion.attitude[:1], motion.attitude)
-    return (
+    turned = angular_distance(motion.attitude[:1], motion.attitude)
+    extent = Sizes(
         float(np.linalg.norm(np.ptp(motion.position, axis=0))),
         float(turned.max(initial=0.0)),
         float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
     )
-
-
-def _orders(
-    found: Sequence[Measured], known: Known, own: Setting, extents: tuple[float, float, float]
-) -> tuple[OrderRow, ...]:
-    place, turn, speed = extents
     rows = []
     for integrator in STANDARD:
-        mine = [
-            row
-            for row in found
-            if row.setting.integrator == integrator.value
-            and (row.setting.solver, row.setting.iterations) == (own.solver, own.iterations)
-            and row.setting.cone == own.cone
+        runs = [
+            (row.setting.timestep, Errors(row.position, row.attitude, row.velocity))
+            for row in (one.row for one in found)
+            if replace(row.setting, timestep=own.timestep)
+            == replace(own, integrator=integrator.value)
         ]
         rows.append(
-            OrderRow(
-                integrator.value,
-                _order(mine, "position", known.floor.position, place),
-                _order(mine, "attitude", known.floor.attitude, turn),
-                _order(mine, "velocity", known.floor.velocity, speed),
-            )
+            fitted_orders(integrator.value, runs, known.floor, extent=extent, bent=_STRAIGHT)
         )
     return tuple(rows)
-
-
-def _order(rows: Sequence[Measured], part: str, floor: float, extent: float) -> float | None:
-    pairs = [
-        (row.setting.timestep, getattr(row.errors, part).largest)
-        for row in rows
-        if row.errors is not None and getattr(row.errors, part) is not None
-    ]
-    pairs = sorted((step, error) for step, error in pairs if error < HIGHEST * min(1, extent))
-    fit = order([step for step, _ in pairs], [error for _, error in pairs], floor)
-    if fit is None:
-        return None
-    slopes = [
-        math.log(more / less) / math.log(longer / shorter)
-        for (shorter, less), (longer, more) in itertools.pairwise(pairs)
-        if less > LOWEST * floor
-    ]
-    return fit.value if max(slopes) - min(slopes) < _STRAIGHT else None
-
-
-_STRAIGHT = 0.75
-"""The difference of slopes on the way from which on errors follow no one power of the timestep."""

@@ -1,6 +1,6 @@
 """Whether a simulation went well: divergence never passes as success.
 
-Entry points: `Peaks`, `Observation`, `observe`, `judge`.
+Entry points: `judge(model, data, elapsed, seen, bounds)`, `peaks`.
 
 1. MuJoCo resets a state that has become huge or no number, and carries on: a run that blew up can
    end in its initial state, with no error at all. Only the warning counters and the clock tell.
@@ -21,11 +21,11 @@ from msgspec import Struct
 
 from coursebuild.numerics.problem import Array
 
-BAD = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-)
+_BAD = {
+    mujoco.mjtWarning.mjWARN_BADQPOS: "positions",
+    mujoco.mjtWarning.mjWARN_BADQVEL: "velocities",
+    mujoco.mjtWarning.mjWARN_BADQACC: "accelerations",
+}
 """The warnings of a simulation that is lost."""
 
 
@@ -41,26 +41,6 @@ class Status(enum.Enum):
     """MuJoCo put the state back to its beginning on the way: the end says nothing."""
 
 
-class Observation(Struct, frozen=True):
-    """What was seen of a run."""
-
-    warnings: tuple[int, int, int]
-    """How often MuJoCo warned of bad positions, velocities and accelerations."""
-    clock: float
-    """`mjData.time` at the end, s."""
-    elapsed: float
-    """Steps done times the timestep, and the time at the beginning, s."""
-    timestep: float
-    finite: bool
-    """Whether all positions and velocities are numbers."""
-    position: float
-    """Largest |qpos| seen, relative to the largest that can be."""
-    velocity: float
-    """The same of |qvel|."""
-    penetration: float = 0.0
-    """Deepest contact seen, relative to the deepest that is no fault."""
-
-
 class Judgement(Struct, frozen=True):
     """How a run went, and what shows it, in words."""
 
@@ -71,35 +51,6 @@ class Judgement(Struct, frozen=True):
     def ok(self) -> bool:
         """Whether the run may be used."""
         return self.status is Status.OK
-
-
-_SAID = ("positions", "velocities", "accelerations")
-
-
-def judge(seen: Observation) -> Judgement:
-    """The worst that an observation shows, with every reason for it."""
-    reasons: list[str] = []
-    found = [Status.OK]
-    if not seen.finite:
-        found.append(Status.DIVERGED)
-        reasons.append("the state is not finite")
-    for count, what in zip(seen.warnings, _SAID, strict=True):
-        if count:
-            found.append(Status.DIVERGED)
-            reasons.append(f"MuJoCo warned of bad {what}")
-    if not abs(seen.clock - seen.elapsed) <= seen.timestep / 2:
-        found.append(Status.RESET)
-        reasons.append(
-            f"the clock says {seen.clock:.6g} s after {seen.elapsed:.6g} s: the state was reset"
-        )
-    for size, what in ((seen.position, "positions"), (seen.velocity, "velocities")):
-        if seen.finite and not size <= 1.0:
-            found.append(Status.SLOW_GROWTH)
-            reasons.append(f"{what} reached {size:.3g} times what can be")
-    if not seen.penetration <= 1.0:
-        found.append(Status.DIVERGED)
-        reasons.append(f"bodies lie {seen.penetration:.3g} times as deep in each other as they may")
-    return Judgement(max(found, key=_WORSE.index), tuple(reasons))
 
 
 _WORSE = (Status.OK, Status.SLOW_GROWTH, Status.DIVERGED, Status.RESET)
@@ -124,7 +75,7 @@ class Peaks(Struct, frozen=True):
         return math.isfinite(self.position) and math.isfinite(self.velocity)
 
 
-NO_BOUNDS = Peaks(float("inf"), float("inf"), float("inf"))
+_NO_BOUNDS = Peaks(math.inf, math.inf, math.inf)
 
 
 def peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Peaks:
@@ -153,30 +104,36 @@ def _more(before: float, values: Array) -> float:
     return before if before >= now or math.isnan(before) else now
 
 
-def observe(
-    model: Any,
-    data: Any,
-    elapsed: float,
-    *,
-    seen: Peaks | None = None,
-    bounds: Peaks = NO_BOUNDS,
-) -> Observation:
-    """What is to be seen of a run when it has ended, after `elapsed` s.
+def judge(
+    model: Any, data: Any, elapsed: float, seen: Peaks | None = None, bounds: Peaks = _NO_BOUNDS
+) -> Judgement:
+    """The worst that a run shows when it has ended after `elapsed` s, with every reason for it.
 
     `seen` is the most that was seen on the way, `bounds` the most that can be.
     """
     most = peaks(data, Peaks() if seen is None else seen)
-    counts = [int(data.warning[int(kind)].number) for kind in BAD]
-    return Observation(
-        warnings=(counts[0], counts[1], counts[2]),
-        clock=float(data.time),
-        elapsed=elapsed,
-        timestep=float(model.opt.timestep),
-        finite=most.finite,
-        position=most.position / bounds.position,
-        velocity=most.velocity / bounds.velocity,
-        penetration=max(most.penetration / bounds.penetration, most.sunk),
-    )
+    shown: list[tuple[Status, str]] = []
+    if not most.finite:
+        shown.append((Status.DIVERGED, "the state is not finite"))
+    for kind, what in _BAD.items():
+        if data.warning[int(kind)].number:
+            shown.append((Status.DIVERGED, f"MuJoCo warned of bad {what}"))
+    if not abs(data.time - elapsed) <= model.opt.timestep / 2:
+        said = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
+        shown.append((Status.RESET, said))
+    for size, bound, what in (
+        (most.position, bounds.position, "positions"),
+        (most.velocity, bounds.velocity, "velocities"),
+    ):
+        if most.finite and not size <= bound:
+            said = f"{what} reached {size / bound:.3g} times what can be"
+            shown.append((Status.SLOW_GROWTH, said))
+    deep = max(most.penetration / bounds.penetration, most.sunk)
+    if not deep <= 1.0:
+        said = f"bodies lie {deep:.3g} times as deep in each other as they may"
+        shown.append((Status.DIVERGED, said))
+    worst = max((status for status, _ in shown), key=_WORSE.index, default=Status.OK)
+    return Judgement(worst, tuple(said for _, said in shown))
 
 
 def deepest_contact(data: Any) -> float:

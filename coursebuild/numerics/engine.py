@@ -1,6 +1,7 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `varied`, `simulate`, `advance`, `watched`, `refsafe_active`.
+Entry points: `compiled`, `varied`, `initial_data`, `simulate`, `advance`, `watched`, `motion_of`,
+`refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
@@ -22,8 +23,8 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.detector import Judgement, Peaks, deepest_contact, judge, observe, peaks
-from coursebuild.numerics.problem import Array, Integrator, Motion, Problem, Setup, whole_number
+from coursebuild.numerics.detector import Judgement, Peaks, deepest_contact, judge, peaks
+from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
 
 _CODE = {
     Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
@@ -33,8 +34,6 @@ _CODE = {
     Integrator.RK4: mujoco.mjtIntegrator.mjINT_RK4,
     Integrator.DISCRETE: mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
-
-
 _WATCHED = 8
 """Steps from one look at the state to the next."""
 
@@ -69,10 +68,9 @@ def choose(model: Any, integrator: Integrator, timestep: float) -> None:
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
-def advance(model: Any, data: Any, steps: int = 1) -> None:
-    """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
-    with silent():
-        mujoco.mj_step(model, data, steps)
+def integrator_of(model: Any) -> Integrator:
+    """The integrator that a model has."""
+    return next(one for one, code in _CODE.items() if int(code) == int(model.opt.integrator))
 
 
 class silent:  # noqa: N801 - used as a function, and quicker than a generator
@@ -82,10 +80,16 @@ class silent:  # noqa: N801 - used as a function, and quicker than a generator
 
     def __enter__(self) -> None:
         self.before = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(_ignore)
+        mujoco.set_mju_user_warning(lambda _: None)
 
     def __exit__(self, *_: object) -> None:
         mujoco.set_mju_user_warning(self.before)
+
+
+def advance(model: Any, data: Any, steps: int = 1) -> None:
+    """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
+    with silent():
+        mujoco.mj_step(model, data, steps)
 
 
 def watched(
@@ -105,17 +109,32 @@ def watched(
     return seen, done
 
 
-def bounds_of(problem: Setup) -> Peaks:
-    """The most that can be in a problem."""
-    return Peaks(problem.position_bound, problem.velocity_bound, problem.penetration_bound)
+def bounds_of(setup: Setup) -> Peaks:
+    """The most that can be in a run."""
+    return Peaks(setup.position_bound, setup.velocity_bound, setup.penetration_bound)
 
 
-def _ignore(_: str) -> None:
-    pass
+def initial_data(setup: Setup, model: Any) -> Any:
+    """`mjData` in the initial state of a scenario."""
+    data = mujoco.MjData(model)
+    scenario = setup.scenario
+    if scenario.keyframe >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, scenario.keyframe)
+        data.time = 0.0
+    if scenario.qpos:
+        data.qpos[:] = scenario.qpos
+    if scenario.qvel:
+        data.qvel[:] = scenario.qvel
+    if scenario.controls:
+        data.ctrl[:] = scenario.controls[0]
+    return data
 
 
-class Run(Struct, frozen=True):
-    """A simulation, looked at n times."""
+# ------------------------------------------------------------------------------------------ states
+
+
+class States(Struct, frozen=True):
+    """A motion in the engine's coordinates, at n times."""
 
     times: Array
     """(n,) s."""
@@ -123,6 +142,58 @@ class Run(Struct, frozen=True):
     """(n, nq)."""
     qvel: Array
     """(n, nv)."""
+    act: Array
+    """(n, na): activations of actuators."""
+
+    def head(self, count: int) -> States:
+        """Only the first."""
+        parts = (self.times, self.qpos, self.qvel, self.act)
+        return States(*(part[:count] for part in parts))
+
+
+def coordinates(model: Any) -> tuple[list[int], list[int]]:
+    """Where positions stand in `qpos`, and where quaternions begin."""
+    places: list[int] = []
+    turns: list[int] = []
+    for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
+        at = int(start)
+        match mujoco.mjtJoint(int(kind)):
+            case mujoco.mjtJoint.mjJNT_FREE:
+                places += [at, at + 1, at + 2]
+                turns.append(at + 3)
+            case mujoco.mjtJoint.mjJNT_BALL:
+                turns.append(at)
+            case _:
+                places.append(at)
+    return places, turns
+
+
+def motion_of(model: Any, states: States) -> Motion:
+    """States sorted into positions, attitudes and velocities."""
+    places, turns = coordinates(model)
+    attitude = np.empty((len(states.times), len(turns), 4))
+    for index, at in enumerate(turns):
+        attitude[:, index] = states.qpos[:, at : at + 4]
+    return Motion(states.times, states.qpos[:, places], attitude, states.qvel)
+
+
+def states_of(model: Any, motion: Motion, like: States) -> States:
+    """A motion in the engine's coordinates; activations as in a like motion."""
+    places, turns = coordinates(model)
+    qpos = like.qpos.copy()
+    qpos[:, places] = motion.position
+    for index, at in enumerate(turns):
+        qpos[:, at : at + 4] = motion.attitude[:, index]
+    return States(motion.times, qpos, motion.velocity, like.act)
+
+
+# ------------------------------------------------------------------------------------- simulations
+
+
+class Run(Struct, frozen=True):
+    """A simulation, looked at n times."""
+
+    states: States
     energy: Array
     """(n + 1, 2) J: potential and kinetic, first those of the beginning."""
     momentum: Array
@@ -130,52 +201,52 @@ class Run(Struct, frozen=True):
     penetration: float
     """Deepest contact at those times, m."""
     judgement: Judgement
-    act: Array
-    """(n, na): activations of actuators."""
 
 
-def simulate(problem: Problem, integrator: Integrator, timestep: float) -> Run:
-    """Run the problem's scenario.
-
-    Raises:
-        ValueError: the timestep (s) does not divide the interval of the looks.
-    """
-    return simulate_model(problem, compiled(problem.mjcf, integrator, timestep))
-
-
-def simulate_model(problem: Setup, model: Any, thickness: Array | None = None) -> Run:
-    """Run a scenario with a model whose options were set otherwise; `thickness` as for `peaks`.
+def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
+    """Run a scenario with a model, under the options that it has; `thickness` as for `peaks`.
 
     Raises:
         ValueError: its timestep does not divide the interval of the looks.
     """
-    scenario = problem.scenario
-    step = float(model.opt.timestep)
-    every = whole_number(scenario.sample, step, "the sampling interval", "the timestep")
-    times = scenario.times
-    data, other = begun(problem, model), begun(problem, model)
-    qpos = np.empty((len(times), model.nq))
-    qvel = np.empty((len(times), model.nv))
-    act = np.empty((len(times), model.na))
-    kept = [invariants(model, other, data.qpos, data.qvel)]
-    seen = Peaks(penetration=deepest_contact(other))
-    holds, steps = held(problem), 0
+    scenario, step = setup.scenario, float(model.opt.timestep)
+    every, times = scenario.steps(step), scenario.times
+    data, other = initial_data(setup, model), initial_data(setup, model)
+    qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
+    table = np.full((len(times) + 1, 5), np.nan)
+    table[0] = invariants(model, other, data.qpos, data.qvel)
+    seen, steps = Peaks(penetration=deepest_contact(other)), 0
     for index in range(len(times)):
         if scenario.controls:
-            data.ctrl[:] = scenario.controls[min(index // holds, len(scenario.controls) - 1)]
+            data.ctrl[:] = scenario.command(index)
         seen, done = watched(model, data, every, seen, thickness)
         steps += done
         if not seen.finite:
-            qpos[index:], qvel[index:], act[index:] = np.nan, np.nan, np.nan
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
-        kept.append(invariants(model, other, data.qpos, data.qvel))
+        table[index + 1] = invariants(model, other, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
         seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
-    judgement = judge(observe(model, data, steps * step, seen=seen, bounds=bounds_of(problem)))
-    kept += [np.full(5, np.nan)] * (len(times) + 1 - len(kept))
-    table = np.array(kept)
-    return Run(times, qpos, qvel, table[:, :2], table[:, 2:], seen.penetration, judgement, act)
+    judgement = judge(model, data, steps * step, seen, bounds_of(setup))
+    states = States(times, qpos, qvel, act)
+    return Run(states, table[:, :2], table[:, 2:], seen.penetration, judgement)
+
+
+def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
+    """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
+
+    `other` is data that nothing else uses.
+    """
+    other.qpos[:], other.qvel[:] = qpos, qvel
+    mujoco.mj_fwdPosition(model, other)
+    mujoco.mj_fwdVelocity(model, other)
+    mujoco.mj_energyPos(model, other)
+    mujoco.mj_energyVel(model, other)
+    mujoco.mj_subtreeVel(model, other)
+    return np.concatenate([other.energy, other.subtree_angmom[0]])
+
+
+# ----------------------------------------------------------------------------------------- refsafe
 
 
 def refsafe_active(model: Any) -> bool:
@@ -211,61 +282,3 @@ def refsafe_from(model: Any) -> float:
     )
     # A constant that is not positive is a stiffness, which is taken as it is.
     return float(np.min(constants[constants > 0], initial=math.inf)) / 2
-
-
-def begun(problem: Setup, model: Any) -> Any:
-    """`mjData` in the initial state of the problem's scenario."""
-    data = mujoco.MjData(model)
-    scenario = problem.scenario
-    if scenario.keyframe >= 0:
-        mujoco.mj_resetDataKeyframe(model, data, scenario.keyframe)
-        data.time = 0.0
-    if scenario.qpos:
-        data.qpos[:] = scenario.qpos
-    if scenario.qvel:
-        data.qvel[:] = scenario.qvel
-    if scenario.controls:
-        data.ctrl[:] = scenario.controls[0]
-    return data
-
-
-def held(problem: Setup) -> int:
-    """Looks for which a command holds."""
-    scenario = problem.scenario
-    if not scenario.hold:
-        return 1
-    return whole_number(scenario.hold, scenario.sample, "the hold", "the sampling interval")
-
-
-def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
-    """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
-
-    `other` is data that nothing else uses.
-    """
-    other.qpos[:], other.qvel[:] = qpos, qvel
-    mujoco.mj_fwdPosition(model, other)
-    mujoco.mj_fwdVelocity(model, other)
-    mujoco.mj_energyPos(model, other)
-    mujoco.mj_energyVel(model, other)
-    mujoco.mj_subtreeVel(model, other)
-    return np.concatenate([other.energy, other.subtree_angmom[0]])
-
-
-def motion_of(model: Any, times: Array, qpos: Array, qvel: Array) -> Motion:
-    """Coordinates (n, nq), (n, nv) sorted into positions, attitudes and velocities."""
-    place: list[int] = []
-    turns: list[int] = []
-    for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
-        at = int(start)
-        match mujoco.mjtJoint(int(kind)):
-            case mujoco.mjtJoint.mjJNT_FREE:
-                place += [at, at + 1, at + 2]
-                turns.append(at + 3)
-            case mujoco.mjtJoint.mjJNT_BALL:
-                turns.append(at)
-            case _:
-                place.append(at)
-    attitude = np.empty((len(times), len(turns), 4))
-    for index, at in enumerate(turns):
-        attitude[:, index] = qpos[:, at : at + 4]
-    return Motion(times, qpos[:, place], attitude, qvel)

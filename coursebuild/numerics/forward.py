@@ -1,7 +1,7 @@
 """A reference for smooth scenes: MuJoCo's accelerations, another integration.
 
 Entry points: `forward_motion(mjcf, scenario, times)`; `forward_states(model, setup, times, method)`
-for any model and method.
+for any model and method; `tends_to`, whether the engine in small steps does the same.
 
 `mj_forward` gives the acceleration of a state; the state is then integrated in positions, plain
 quaternions, velocities and activations, by Bulirsch–Stoer or another method. It shares the engine's
@@ -16,36 +16,36 @@ from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
-from msgspec import Struct
 
-from coursebuild.numerics.engine import begun, compiled, motion_of
-from coursebuild.numerics.extrapolation import NoConvergenceError, Rate, State, integrate
+from coursebuild.numerics.engine import (
+    States,
+    compiled,
+    coordinates,
+    initial_data,
+    motion_of,
+    simulate,
+    varied,
+)
+from coursebuild.numerics.integrate import (
+    NoConvergenceError,
+    Rate,
+    State,
+    bulirsch_stoer,
+    quaternion_rate,
+)
+from coursebuild.numerics.pilot import apart
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
+
+AGREED = 1e-6
+"""As near as the engine must come, in rad or relative to the extent, unless smaller steps bring it
+nearer."""
+NEARER = 0.75
+"""The part of a difference that half the timestep may leave: half in first order, and some room."""
+_PARTS = (2, 4, 8)
+"""Parts of the timestep that are tried: the longer ones may be too long for any order to show."""
 
 Method: TypeAlias = Callable[[Rate, State, Array], State]
 """A rate, a first state (d,) and rising times (n,) → the states (n, d)."""
-
-
-class States(Struct, frozen=True):
-    """A motion in the engine's coordinates."""
-
-    times: Array
-    """(n,) s."""
-    qpos: Array
-    """(n, nq)."""
-    qvel: Array
-    """(n, nv)."""
-    act: Array
-    """(n, na)."""
-
-
-class _Unbounded(Struct, frozen=True):
-    """A scenario of which nothing is judged."""
-
-    scenario: Scenario
-    position_bound: float = float("inf")
-    velocity_bound: float = float("inf")
-    penetration_bound: float = float("inf")
 
 
 def forward_motion(
@@ -60,10 +60,9 @@ def forward_motion(
     model = compiled(mjcf, Integrator.EULER, 1e-3)
 
     def method(rate: Rate, start: State, offsets: Array) -> State:
-        return integrate(rate, start, offsets, tolerance)
+        return bulirsch_stoer(rate, start, offsets, tolerance)
 
-    found = forward_states(model, _Unbounded(scenario), times, method)
-    return motion_of(model, times, found.qpos, found.qvel)
+    return motion_of(model, forward_states(model, Setup(scenario=scenario), times, method))
 
 
 def forward_states(
@@ -76,9 +75,9 @@ def forward_states(
     Raises:
         NoConvergenceError: the scene is not smooth, or it takes more evaluations.
     """
-    data = begun(setup, model)
+    data = initial_data(setup, model)
     state = np.concatenate([data.qpos, data.qvel, data.act])
-    rate = _limited(_rate(model, data), evaluations)
+    rate = _rate(model, data, evaluations)
     states = np.empty((len(times), len(state)))
     for begin, end, command in _holds(setup.scenario, float(times[-1])):
         if command:
@@ -90,22 +89,9 @@ def forward_states(
         state = part[-1]
     nq, nv = int(model.nq), int(model.nv)
     qpos = states[:, :nq].copy()
-    for at in quaternions(model):
+    for at in coordinates(model)[1]:
         qpos[:, at : at + 4] /= np.linalg.norm(qpos[:, at : at + 4], axis=1, keepdims=True)
     return States(times, qpos, states[:, nq : nq + nv].copy(), states[:, nq + nv :].copy())
-
-
-def _limited(rate: Rate, evaluations: float) -> Rate:
-    done = 0
-
-    def limited(state: State) -> State:
-        nonlocal done
-        done += 1
-        if done > evaluations:
-            raise NoConvergenceError(f"it takes more than {evaluations:g} evaluations")
-        return rate(state)
-
-    return limited
 
 
 def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[float, ...]]]:
@@ -121,27 +107,26 @@ def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[flo
     return found
 
 
-def quaternions(model: Any) -> list[int]:
-    """Where quaternions begin in `qpos`."""
-    found = []
-    for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
-        if kind == mujoco.mjtJoint.mjJNT_FREE:
-            found.append(int(start) + 3)
-        elif kind == mujoco.mjtJoint.mjJNT_BALL:
-            found.append(int(start))
-    return found
-
-
-def _rate(model: Any, data: Any) -> Any:
-    """d(qpos, qvel, act)/dt of a state (nq + nv + na,)."""
+def _rate(model: Any, data: Any, evaluations: float) -> Rate:
+    """d(qpos, qvel, act)/dt of a state (nq + nv + na,), for so many evaluations at most."""
     nq, end = int(model.nq), int(model.nq + model.nv)
-    joints = [
-        (mujoco.mjtJoint(int(kind)), int(q), int(v))
-        for kind, q, v in zip(model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True)
+    places, turns = coordinates(model)
+    balls = [int(kind) in _TURNING for kind in model.jnt_type]
+    # A free joint has three velocities of its place before those that turn it.
+    first = [
+        int(dof) + (3 if kind == mujoco.mjtJoint.mjJNT_FREE else 0)
+        for kind, dof, ball in zip(model.jnt_type, model.jnt_dofadr, balls, strict=True)
+        if ball
     ]
-    turns = quaternions(model)
+    spins = {dof + k for dof in first for k in range(3)}
+    moves = [dof for dof in range(int(model.nv)) if dof not in spins]
+    done = 0
 
     def rate(state: State) -> State:
+        nonlocal done
+        done += 1
+        if done > evaluations:
+            raise NoConvergenceError(f"it takes more than {evaluations:g} evaluations")
         slope = np.empty_like(state)
         qvel = state[nq:end]
         data.qpos[:] = state[:nq]
@@ -150,15 +135,9 @@ def _rate(model: Any, data: Any) -> Any:
         for at in turns:  # the engine normalizes some of them, in some places
             data.qpos[at : at + 4] /= np.linalg.norm(data.qpos[at : at + 4])
         mujoco.mj_forward(model, data)
-        for kind, q, v in joints:
-            match kind:
-                case mujoco.mjtJoint.mjJNT_FREE:
-                    slope[q : q + 3] = qvel[v : v + 3]
-                    slope[q + 3 : q + 7] = _turning(state[q + 3 : q + 7], qvel[v + 3 : v + 6])
-                case mujoco.mjtJoint.mjJNT_BALL:
-                    slope[q : q + 4] = _turning(state[q : q + 4], qvel[v : v + 3])
-                case _:
-                    slope[q] = qvel[v]
+        slope[places] = qvel[moves]
+        for at, dof in zip(turns, first, strict=True):
+            slope[at : at + 4] = quaternion_rate(state[at : at + 4], qvel[dof : dof + 3])
         slope[nq:end] = data.qacc
         slope[end:] = data.act_dot
         return slope
@@ -166,14 +145,47 @@ def _rate(model: Any, data: Any) -> Any:
     return rate
 
 
-def _turning(q: Array, omega: Array) -> Array:
-    q0, q1, q2, q3 = q.tolist()
-    w1, w2, w3 = omega.tolist()
-    return np.array(
-        [
-            (-q1 * w1 - q2 * w2 - q3 * w3) / 2,
-            (q0 * w1 + q2 * w3 - q3 * w2) / 2,
-            (q0 * w2 + q3 * w1 - q1 * w3) / 2,
-            (q0 * w3 + q1 * w2 - q2 * w1) / 2,
-        ]
-    )
+_TURNING = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
+
+
+# ------------------------------------------------------------- what the engine itself tends to
+
+
+def tends_to(model: Any, setup: Setup, states: States, step: float, parted: float) -> bool:
+    """Whether the engine comes nearer to these states, the smaller its steps are.
+
+    Two integrations over the same accelerations agree also where these are not the engine's own, as
+    of an activation that only a step clamps.
+
+    Args:
+        model: `mjModel`; it is not changed.
+        setup: the scenario, as long as the states.
+        states: at its samples.
+        step: s; the longest to try.
+        parted: the difference at which motions are compared, where it grows beyond: later they have
+            nothing in common, however small the steps.
+    """
+    before = _gaps(model, setup, states, step)
+    if before.max() <= AGREED:
+        return True
+    for part in _PARTS:
+        now = _gaps(model, setup, states, step / part)
+        beyond = np.flatnonzero(before > parted)
+        at = int(beyond[0]) if beyond.size else int(np.argmax(before))
+        if now[at] <= max(NEARER * before[at], AGREED):
+            return True
+        before = now
+    return False
+
+
+def _gaps(model: Any, setup: Setup, states: States, step: float) -> Array:
+    """How far the engine is from these states at every sample: (n,); see `apart`."""
+    for integrator in (Integrator.RK4, Integrator.IMPLICITFAST):
+        try:
+            found = simulate(setup, varied(model, integrator, step)).states
+        except mujoco.FatalError:  # it does not run with everything
+            continue
+        if np.isfinite(found.qpos).all():
+            pairs = zip(found.qpos, states.qpos, strict=True)
+            return np.array([apart(model, mine, theirs) for mine, theirs in pairs])
+    return np.full(len(states.times), np.inf)

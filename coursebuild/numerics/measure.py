@@ -1,142 +1,176 @@
-"""Errors of a problem over integrators and timesteps, and what they say.
+"""How far a motion is from its reference, what orders that shows, and what drifts.
 
-Entry points: `measure(problem, integrator, timestep)`, `errors`, `order`.
+Entry points: `errors`, `raised`, `order`, `fitted_orders`; `energy_drift`, `momentum_drift`.
 
-1. A run is judged first: the error of a run that was lost is not given.
-2. Errors of position, attitude and velocity stand apart, each at its largest and at the end.
-3. No error is given below ten times what the reference itself may be wrong by.
-4. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
+1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
+   of fourth order in velocity and of second in attitude.
+2. No error is given below ten times what the reference itself may be wrong by.
+3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
    rounding is measured, beyond 0.1 the asymptotic law does not hold yet.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Judgement
-from coursebuild.numerics.engine import Run, compiled, motion_of, refsafe_active, simulate
-from coursebuild.numerics.problem import STANDARD, Array, Integrator, Motion, Problem, Reference
-from coursebuild.numerics.rotation import angle_between
+from coursebuild.numerics.engine import Run
+from coursebuild.numerics.problem import Array, Motion, Reference
+from coursebuild.numerics.reports.bench import OrderRow
+from mjcourse.spatial import angular_distance
 
 FLOORS = 10.0
 """No error below so many floors of the reference is given."""
-LOWEST, HIGHEST = 100.0, 0.1
+_LOWEST, _HIGHEST = 100.0, 0.1
 """Where an order is fitted: over so many floors, and under so much."""
 
+Pair: TypeAlias = tuple[float, float]
+"""An error at its largest over the whole duration, and at its end."""
 
-class Error(Struct, frozen=True):
-    """The difference of two motions in one respect."""
 
-    largest: float
-    """Over the whole duration."""
-    end: float
-    """At its end."""
+class Sizes(Struct, frozen=True):
+    """A size for each of the parts of a motion."""
+
+    position: float
+    """m or rad."""
+    attitude: float
+    """rad."""
+    velocity: float
+    """m/s or rad/s."""
+
+    @property
+    def place(self) -> float:
+        """Of positions and attitudes together."""
+        return max(self.position, self.attitude)
+
+    @property
+    def largest(self) -> float:
+        """Of all of them."""
+        return max(self.position, self.attitude, self.velocity)
+
+
+ONES = Sizes(1.0, 1.0, 1.0)
 
 
 class Errors(Struct, frozen=True):
     """The difference of two motions; `None` for what they do not have."""
 
-    position: Error | None
+    position: Pair | None
     """m or rad: Euclidean norm over coordinates."""
-    attitude: Error | None
+    attitude: Pair | None
     """rad: the largest angle of any body."""
-    velocity: Error | None
+    velocity: Pair | None
     """m/s or rad/s: Euclidean norm."""
 
-
-class Measurement(Struct, frozen=True):
-    """One run, compared with its reference."""
-
-    problem: str
-    integrator: Integrator
-    timestep: float
-    """s."""
-    judgement: Judgement
-    errors: Errors | None
-    """`None` for a run that was lost, or a problem without reference."""
-    floor: float
-    """Errors smaller than this were raised to it: the reference is not known better."""
-    energy_drift: float | None
-    """Largest change of the whole energy with its sign, relative to the kinetic one it began with
-    (to its largest, where it began at rest)."""
-    momentum_drift: float | None
-    """Largest change of the angular momentum, relative to its size at the beginning."""
-    penetration: float
-    """Deepest contact, m."""
-    refsafe: bool
-    """Whether MuJoCo softened constraints for this timestep: what was measured is another model."""
-
-
-def measure(problem: Problem, integrator: Integrator, timestep: float) -> Measurement:
-    """Run a problem and compare it with its reference.
-
-    Raises:
-        ValueError: the timestep (s) does not divide the interval of the looks.
-    """
-    run = simulate(problem, integrator, timestep)
-    found, floor = None, 0.0
-    if problem.reference is not None:
-        floor = FLOORS * problem.reference.floor
-    if run.judgement.ok and problem.reference is not None:
-        model = compiled(problem.mjcf, integrator, timestep)
-        motion = motion_of(model, run.times, run.qpos, run.qvel)
-        exact = known(problem.reference, tuple(run.times.tolist()))
-        found = raised(errors(motion, exact), floor)
-    return Measurement(
-        problem.name,
-        integrator,
-        timestep,
-        run.judgement,
-        found,
-        floor,
-        energy_drift(run) if problem.energy_conserved else None,
-        momentum_drift(run) if problem.momentum_conserved else None,
-        run.penetration,
-        refsafe_active(compiled(problem.mjcf, integrator, timestep)),
-    )
+    @property
+    def largest(self) -> Sizes:
+        """The largest of each; 0 for what is not there."""
+        parts = (self.position, self.attitude, self.velocity)
+        return Sizes(*(0.0 if part is None else part[0] for part in parts))
 
 
 @lru_cache(maxsize=64)
-def known(reference: Reference, times: tuple[float, ...]) -> Motion:
+def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     """What a reference says at these times (s); computed once."""
     return reference.motion(np.array(times))
 
 
 def errors(motion: Motion, exact: Motion) -> Errors:
     """How far a motion is from another at the same times."""
-    turned = angle_between(exact.attitude, motion.attitude)
+    turned = angular_distance(exact.attitude, motion.attitude)
     return Errors(
-        _error(np.linalg.norm(motion.position - exact.position, axis=1), motion.position.size),
-        _error(np.max(turned, axis=1, initial=0.0), turned.size),
-        _error(np.linalg.norm(motion.velocity - exact.velocity, axis=1), motion.velocity.size),
+        _pair(np.linalg.norm(motion.position - exact.position, axis=1), motion.position.size),
+        _pair(np.max(turned, axis=1, initial=0.0), turned.size),
+        _pair(np.linalg.norm(motion.velocity - exact.velocity, axis=1), motion.velocity.size),
     )
 
 
-def _error(distances: Array, present: int) -> Error | None:
-    if not present:
+def _pair(distances: Array, present: int) -> Pair | None:
+    return (float(np.max(distances)), float(distances[-1])) if present else None
+
+
+def raised(found: Errors, floor: Sizes) -> Errors:
+    """Errors, none below ten floors."""
+
+    def up(pair: Pair | None, floor: float) -> Pair | None:
+        return pair and (max(pair[0], FLOORS * floor), max(pair[1], FLOORS * floor))
+
+    return Errors(
+        up(found.position, floor.position),
+        up(found.attitude, floor.attitude),
+        up(found.velocity, floor.velocity),
+    )
+
+
+# ------------------------------------------------------------------------------------------ orders
+
+
+def order(
+    timesteps: Sequence[float], found: Sequence[float], floor: float, *, bent: float = math.inf
+) -> float | None:
+    """Fit the order to errors found at timesteps (s); `None` where too few of them are usable.
+
+    Args:
+        timesteps: in any order.
+        found: errors there.
+        floor: what the reference may be wrong by, in the unit of the errors.
+        bent: how far slopes on the way may differ; beyond, errors follow no one power.
+    """
+    usable = [
+        (math.log(h), math.log(error))
+        for h, error in sorted(zip(timesteps, found, strict=True))
+        if max(_LOWEST * floor, 1e-300) < error < _HIGHEST
+    ]
+    if len(usable) < 3:
         return None
-    return Error(float(np.max(distances)), float(distances[-1]))
+    slopes = [(d - b) / (c - a) for (a, b), (c, d) in itertools.pairwise(usable)]
+    if max(slopes) - min(slopes) >= bent:
+        return None
+    x, y = np.array(usable).T
+    return float(np.polyfit(x, y, 1)[0])
 
 
-def raised(found: Errors, floor: float) -> Errors:
-    """Errors, none below the floor."""
+def fitted_orders(
+    integrator: str,
+    runs: Sequence[tuple[float, Errors | None]],
+    floor: Sizes,
+    *,
+    extent: Sizes = ONES,
+    bent: float = math.inf,
+) -> OrderRow:
+    """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
 
-    def up(one: Error | None) -> Error | None:
-        return one and Error(max(one.largest, floor), max(one.end, floor))
+    Args:
+        integrator: its name.
+        runs: timesteps and errors.
+        floor: what the reference may be wrong by.
+        extent: how much the motion changes: an error as large is no small one.
+        bent: see `order`.
+    """
 
-    return Errors(up(found.position), up(found.attitude), up(found.velocity))
+    def fitted(part: str) -> float | None:
+        most = _HIGHEST * min(1.0, getattr(extent, part))
+        pairs = [(h, getattr(one, part)) for h, one in runs if one is not None]
+        kept = [(h, pair[0]) for h, pair in pairs if pair is not None and pair[0] < most]
+        steps, largest = [h for h, _ in kept], [error for _, error in kept]
+        return order(steps, largest, getattr(floor, part), bent=bent)
+
+    return OrderRow(integrator, fitted("position"), fitted("attitude"), fitted("velocity"))
+
+
+# ------------------------------------------------------------------------------------------ drifts
 
 
 def energy_drift(run: Run, scale: float | None = None) -> float | None:
     """The largest change of potential and kinetic energy together, with its sign.
 
-    Relative to `scale`; without one to the kinetic energy at the beginning, or to its largest where
-    it begins at rest.
+    Relative to `scale`, J; without one to `energy_scale`.
     """
     whole = run.energy.sum(axis=1)
     if scale is None:
@@ -148,7 +182,7 @@ def energy_drift(run: Run, scale: float | None = None) -> float | None:
 
 
 def energy_scale(run: Run) -> float:
-    """What changes of energy are large against, J."""
+    """The kinetic energy at the beginning, or its largest where it begins at rest, J."""
     return float(run.energy[0, 1]) or float(np.max(run.energy[:, 1]))
 
 
@@ -158,65 +192,3 @@ def momentum_drift(run: Run) -> float | None:
     if not np.isfinite(run.momentum).all() or scale == 0:
         return None
     return float(np.max(np.linalg.norm(run.momentum - run.momentum[0], axis=1)) / scale)
-
-
-class Order(Struct, frozen=True):
-    """The slope of error against timestep, on logarithmic axes."""
-
-    value: float
-    points: int
-    """Timesteps that it was fitted to."""
-
-
-def order(timesteps: Sequence[float], found: Sequence[float], floor: float) -> Order | None:
-    """Fit the order to the errors found at these timesteps (s); `None` where too few are usable.
-
-    `floor` is what the reference may be wrong by, in the unit of the errors.
-    """
-    usable = [
-        (math.log(h), math.log(error))
-        for h, error in zip(timesteps, found, strict=True)
-        if max(LOWEST * floor, 1e-300) < error < HIGHEST
-    ]
-    if len(usable) < 3:
-        return None
-    x, y = np.array(usable).T
-    return Order(float(np.polyfit(x, y, 1)[0]), len(usable))
-
-
-class Orders(Struct, frozen=True):
-    """The orders of an integrator on a problem."""
-
-    position: Order | None
-    attitude: Order | None
-    velocity: Order | None
-
-
-def orders(problem: Problem, found: Sequence[Measurement]) -> Orders:
-    """Orders from measurements of one integrator at several timesteps; lost runs do not count.
-
-    None where the problem is not smooth: a slope would say nothing there.
-    """
-    if problem.reference is None or not problem.smooth:
-        return Orders(None, None, None)
-    floor = problem.reference.floor
-
-    def fitted(part: str) -> Order | None:
-        pairs = [
-            (one.timestep, getattr(one.errors, part).largest)
-            for one in found
-            if one.errors is not None and getattr(one.errors, part) is not None
-        ]
-        return order([h for h, _ in pairs], [error for _, error in pairs], floor)
-
-    return Orders(fitted("position"), fitted("attitude"), fitted("velocity"))
-
-
-def ladder(problem: Problem) -> dict[Integrator, tuple[Measurement, ...]]:
-    """The problem's timesteps under every integrator; nothing where it has none."""
-    if not problem.timesteps:
-        return {}
-    return {
-        integrator: tuple(measure(problem, integrator, h) for h in problem.timesteps)
-        for integrator in STANDARD
-    }

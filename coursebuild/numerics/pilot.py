@@ -20,8 +20,8 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.detector import Peaks, peaks
-from coursebuild.numerics.engine import advance, begun, held, varied
-from coursebuild.numerics.problem import Array, Integrator, Scenario, whole_number
+from coursebuild.numerics.engine import advance, initial_data, integrator_of, varied
+from coursebuild.numerics.problem import Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
 
 NUDGE = 1e-10
@@ -37,18 +37,12 @@ _SELDOM = 8
 """Steps from one look at how large the state is to the next."""
 
 
-class Bounded(Struct, frozen=True):
-    """A scenario, and the most that can be in it: a `Setup`."""
-
-    scenario: Scenario
-    position_bound: float
-    velocity_bound: float
-    penetration_bound: float = float("inf")
-
-
 class Pilot(Struct, frozen=True):
-    """What the first run says."""
+    """What the first run of a scene says."""
 
+    scene: Scene
+    setup: Setup
+    """The scenario, and the most that can be in it."""
     contact: bool
     """Whether anything touched."""
     constrained: bool
@@ -59,9 +53,6 @@ class Pilot(Struct, frozen=True):
     """s, a multiple of the sample; the duration where the twin stays near."""
     lyapunov: float | None
     """1/s; `None` where the twin stays near."""
-    setup: Bounded
-    deepest: float
-    """Deepest contact, m."""
 
     @property
     def smooth(self) -> bool:
@@ -75,24 +66,22 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     Raises:
         SceneError: it diverges even there.
     """
-    step = min(scene.timesteps)
-    own = varied(model, _own(model), step)
-    open_end = Bounded(scene.scenario, math.inf, math.inf)
-    data, twin = begun(open_end, own), begun(open_end, own)
+    step, scenario = min(scene.timesteps), scene.scenario
+    own = varied(model, integrator_of(model), step)
+    setup = Setup(scenario=scenario)
+    data, twin = initial_data(setup, own), initial_data(setup, own)
     _nudge(own, twin)
     look = _Look(own)
     seen = peaks(data, Peaks())
-    times = scene.scenario.times
-    every = whole_number(scene.scenario.sample, step, "the sampling interval", "the timestep")
-    holds, gaps = held(open_end), np.full(len(times), np.nan)
+    times, every = scenario.times, scenario.steps(step)
+    gaps = np.full(len(times), np.nan)
     for index in range(len(times)):
-        if scene.scenario.controls:
-            rows = scene.scenario.controls
-            data.ctrl[:] = twin.ctrl[:] = rows[min(index // holds, len(rows) - 1)]
-        for step_number in range(every):
+        if scenario.controls:
+            data.ctrl[:] = twin.ctrl[:] = scenario.command(index)
+        for number in range(every):
             advance(own, data)
             look(data)
-            if step_number % _SELDOM == 0 or step_number == every - 1:
+            if number % _SELDOM == 0 or number == every - 1:
                 seen = peaks(data, seen)
         if not seen.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
@@ -101,13 +90,13 @@ def pilot(model: Any, scene: Scene) -> Pilot:
             gaps[index] = apart(own, data.qpos, twin.qpos)
     horizon, lyapunov = _horizon(times, gaps)
     return Pilot(
+        scene=scene,
+        setup=_bounds(own, scenario, seen),
         contact=look.contact,
         constrained=look.constrained,
         jumps=look.jumps(own),
         horizon=horizon,
         lyapunov=lyapunov,
-        setup=_bounds(own, scene.scenario, seen),
-        deepest=seen.penetration,
     )
 
 
@@ -178,20 +167,6 @@ def _limited_activations(model: Any) -> tuple[Any, Array]:
     return np.array([number for number, _ in found], dtype=np.intp), limits
 
 
-def _own(model: Any) -> Integrator:
-    return OWN[int(model.opt.integrator)]
-
-
-OWN = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): Integrator.EULER,
-    int(mujoco.mjtIntegrator.mjINT_IMPLICIT): Integrator.IMPLICIT,
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): Integrator.IMPLICITFAST,
-    int(mujoco.mjtIntegrator.mjINT_RK4): Integrator.RK4,
-    int(mujoco.mjtIntegrator.mjINT_DISCRETE): Integrator.DISCRETE,
-}
-"""By MuJoCo's numbers."""
-
-
 def _nudge(model: Any, data: Any) -> None:
     """Push positions and velocities a little, in a direction that is always the same."""
     direction = np.random.default_rng(1).normal(size=(2, int(model.nv)))
@@ -218,14 +193,14 @@ def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
     return horizon, float(np.polyfit(x, y, 1)[0])
 
 
-def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Bounded:
+def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Setup:
     extent = float(model.stat.extent)
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
     # A hinge without limits may go round the other way.
     hinged = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
     round_and_round = 2 * seen.velocity * scenario.duration if hinged else 0.0
-    return Bounded(
-        scenario,
+    return Setup(
+        scenario=scenario,
         position_bound=2 * seen.position + ROOM * max(extent, 1.0) + round_and_round,
         velocity_bound=ROOM * max(seen.velocity, fall, 1e-3),
     )

@@ -1,14 +1,14 @@
 """What a hard case is: a model, what happens in it, and what exactly would happen.
 
-Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `Figure`, `Integrator`; `Setup`, what a
-run of it needs.
+Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `ScalarCheck`, `Integrator`; `Setup`,
+what a run needs beside the model.
 """
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -66,6 +66,27 @@ class Scenario(Struct, frozen=True):
         count = whole_number(self.duration, self.sample, "the duration", "the sampling interval")
         return np.asarray(np.arange(1, count + 1) * (self.duration / count), dtype=np.float64)
 
+    def steps(self, timestep: float) -> int:
+        """How many timesteps (s) go from one look to the next.
+
+        Raises:
+            ValueError: no whole number.
+        """
+        return whole_number(self.sample, timestep, "the sampling interval", "the timestep")
+
+    def command(self, look: int) -> tuple[float, ...]:
+        """What is commanded between a look (from 0) and the one before; empty where nothing is.
+
+        Raises:
+            ValueError: the hold is no multiple of `sample`.
+        """
+        if not self.controls:
+            return ()
+        looks = 1
+        if self.hold:
+            looks = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
+        return self.controls[min(look // looks, len(self.controls) - 1)]
+
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:
     """How many times `part` goes into `length`.
@@ -114,39 +135,31 @@ class Limit(Struct, frozen=True):
     source: str
 
 
-class Figure(Struct, frozen=True):
-    """A quantity of a hard case that is known exactly and can be measured."""
+class ScalarCheck(Struct, frozen=True):
+    """A quantity of a hard case that can be measured, and is known where theory says it."""
 
     name: str
     unit: str
     exact: Callable[[Integrator], float | None]
-    """What it is in theory, where theory says it for this integrator."""
+    """What it is in theory; `None` where theory does not say it for this integrator."""
     measure: Callable[[Integrator], float]
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
 
 
-class Setup(Protocol):
-    """What a run must know beside the model: a hard case, or a scenario of some model."""
+class Setup(Struct, frozen=True, kw_only=True):
+    """What a run must know beside the model: what happens, and what can be."""
 
-    @property
-    def scenario(self) -> Scenario:
-        """What happens."""
-
-    @property
-    def position_bound(self) -> float:
-        """Largest |qpos| that can be, in m or rad."""
-
-    @property
-    def velocity_bound(self) -> float:
-        """Largest |qvel| that can be, in m/s or rad/s."""
-
-    @property
-    def penetration_bound(self) -> float:
-        """Deepest contact that is no fault, m."""
+    scenario: Scenario
+    position_bound: float = float("inf")
+    """Largest |qpos| that can be, in m or rad; what is beyond grows that should not."""
+    velocity_bound: float = float("inf")
+    """Largest |qvel| that can be, in m/s or rad/s."""
+    penetration_bound: float = float("inf")
+    """Deepest contact that is no fault, m."""
 
 
-class Problem(Struct, frozen=True):
+class Problem(Setup, frozen=True, kw_only=True):
     """A hard case."""
 
     name: str
@@ -156,11 +169,6 @@ class Problem(Struct, frozen=True):
     """Its number on the list of hard cases."""
     mjcf: str
     """Minimal, without timestep and integrator."""
-    scenario: Scenario
-    position_bound: float
-    """Largest |qpos| that can be, in m or rad; what is beyond grows that should not."""
-    velocity_bound: float
-    """Largest |qvel| that can be, in m/s or rad/s."""
     reference: Reference | None = None
     second: Reference | None = None
     """Made in another way, to check the first."""
@@ -168,15 +176,13 @@ class Problem(Struct, frozen=True):
     """How well both agree over the duration, in m, rad, m/s and rad/s."""
     timesteps: tuple[float, ...] = ()
     """The ladder of timesteps for work against precision, s, falling."""
-    figures: tuple[Figure, ...] = ()
+    checks: tuple[ScalarCheck, ...] = ()
     limit: Callable[[Integrator], Limit | None] | None = None
     """Theory of the largest stable timestep; `None` where there is none to be had."""
     search: tuple[float, float] | None = None
     """Timesteps (s) between which the largest stable one is looked for."""
     steps: int = 10_000
     """Steps after which what grows must have shown itself."""
-    penetration_bound: float = float("inf")
-    """Deepest contact that is no fault, m."""
     smooth: bool = True
     """Whether errors follow a power of the timestep: not with contact, nor where the model's own
     error remains."""

@@ -1,7 +1,7 @@
-"""The largest stable timestep of a problem for each integrator, and how fast it grows beyond.
+"""The largest stable timestep for each integrator, and how fast a run grows beyond.
 
-Entry points: `boundary(problem, integrator)`, `survey(problem)`; `scan(attempt, search)` and
-`attempted(setup, model, steps)` for what is no hard case.
+Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)` and
+`attempted(setup, model, steps)`, for any scene.
 
 1. A grid of timesteps, even in the logarithm, is tried from end to end: stability need not be
    monotone, and a bisection alone would find some boundary, not the first.
@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Peaks, Status, judge, observe
-from coursebuild.numerics.engine import begun, bounds_of, compiled, watched
+from coursebuild.numerics.detector import Peaks, Status, judge
+from coursebuild.numerics.engine import bounds_of, compiled, initial_data, watched
 from coursebuild.numerics.problem import (
     INTEGRATORS,
     STANDARD,
@@ -32,6 +32,7 @@ from coursebuild.numerics.problem import (
     Scenario,
     Setup,
 )
+from coursebuild.numerics.reports.cases import BoundaryLine
 
 GRID = 12
 """Timesteps tried in a decade."""
@@ -56,50 +57,19 @@ class Trial(Struct, frozen=True):
         return self.status is Status.OK
 
 
-class Boundary(Struct, frozen=True):
-    """Where an integrator ceases to be stable."""
-
-    integrator: Integrator
-    largest: float
-    """The largest stable timestep below which all tried are stable, s; 0 where none is, infinite
-    where all tried are."""
-    monotone: bool
-    """Whether every timestep beyond is unstable."""
-    islands: tuple[float, ...]
-    """Timesteps beyond the first boundary that are stable all the same, s."""
-    beyond: Trial | None
-    """The first unstable one of the grid."""
-    theory: Limit | None
-    searched: tuple[float, float]
-    """Timesteps that were tried, from and to, s."""
-
-    @property
-    def difference(self) -> float | None:
-        """Measured against theory, relative; `None` where there is none or it is not finite."""
-        if self.theory is None or not 0 < self.theory.timestep < math.inf:
-            return None
-        if not 0 < self.largest < math.inf:
-            return math.inf
-        return self.largest / self.theory.timestep - 1
-
-
-def survey(problem: Problem) -> tuple[Boundary, ...]:
+def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     """The boundaries of all integrators for which they may differ.
 
     None where the problem names no timesteps to look between.
     """
     if problem.search is None:
         return ()
-    chosen = INTEGRATORS if _damped(problem) else STANDARD
-    return tuple(boundary(problem, integrator) for integrator in chosen)
+    # Only joints with damping know `eulerdamp`.
+    damped = bool(np.any(compiled(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
+    return tuple(boundary(problem, one) for one in (INTEGRATORS if damped else STANDARD))
 
 
-def _damped(problem: Problem) -> bool:
-    """Whether `eulerdamp` has anything to do: only joints with damping know it."""
-    return bool(np.any(compiled(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
-
-
-def boundary(problem: Problem, integrator: Integrator) -> Boundary:
+def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
     """Look for the largest stable timestep.
 
     Raises:
@@ -109,22 +79,38 @@ def boundary(problem: Problem, integrator: Integrator) -> Boundary:
         raise ValueError(f"{problem.name} has no range of timesteps to search")
     found = scan(lambda step: attempt(problem, integrator, step), problem.search)
     theory = None if problem.limit is None else problem.limit(integrator)
-    return Boundary(
-        integrator,
-        found.largest,
-        not found.islands,
-        found.islands,
-        found.beyond,
-        theory,
-        problem.search,
+    beyond = found.beyond
+    return BoundaryLine(
+        integrator=integrator.value,
+        largest=_finite(found.largest),
+        theory=None if theory is None else _finite(theory.timestep),
+        formula="" if theory is None else theory.source,
+        difference=_difference(found.largest, theory),
+        monotone=not found.islands,
+        islands=found.islands,
+        beyond="" if beyond is None else beyond.status.value,
+        growth=None if beyond is None else _finite(beyond.growth),
+        searched=problem.search,
     )
+
+
+def _difference(largest: float, theory: Limit | None) -> float | None:
+    """Measured against theory, relative; `None` where one of them is not finite, or 0."""
+    if theory is None or not (0 < theory.timestep < math.inf and 0 < largest < math.inf):
+        return None
+    return largest / theory.timestep - 1
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 class Scan(Struct, frozen=True):
     """Where timesteps cease to be stable."""
 
     largest: float
-    """s, as `Boundary.largest`."""
+    """The largest stable timestep below which all tried are stable, s; 0 where none is, infinite
+    where all tried are."""
     islands: tuple[float, ...]
     """Timesteps beyond that are stable all the same, s."""
     beyond: Trial | None
@@ -179,7 +165,7 @@ def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = No
     A command changes with the first step that begins after its time: the timestep need not divide
     the hold.
     """
-    data = begun(setup, model)
+    data = initial_data(setup, model)
     timestep = float(model.opt.timestep)
     chunk = max(1, steps // _LOOKS)
     sizes: list[float] = []
@@ -191,9 +177,10 @@ def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = No
             total += done
         if not seen.finite:
             break
-        sizes.append(_size(data))
+        with np.errstate(over="ignore"):
+            sizes.append(float(np.linalg.norm(data.qvel)))
     elapsed = total * timestep
-    judgement = judge(observe(model, data, elapsed, seen=seen, bounds=bounds_of(setup)))
+    judgement = judge(model, data, elapsed, seen, bounds_of(setup))
     return Trial(timestep, judgement.status, _growth(sizes, chunk))
 
 
@@ -213,12 +200,6 @@ def _command(scenario: Scenario, data: Any, time: float) -> None:
     if scenario.controls:
         index = int(time / scenario.hold + 1e-9) if scenario.hold else 0
         data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]
-
-
-def _size(data: object) -> float:
-    velocity: object = data.qvel  # type: ignore[attr-defined]
-    with np.errstate(over="ignore"):
-        return float(np.linalg.norm(np.asarray(velocity)))
 
 
 def _growth(sizes: list[float], chunk: int) -> float:

@@ -1,27 +1,42 @@
 """What steps cost, relative to each other, on a machine that does other things too.
 
-Entry point: `timed(jobs, own, clock)`.
+Entry points: `timed(jobs, own, clock)`; `costs(model, first, settings, …)`, of settings of a scene;
+`time_ratio(whole, changed, …)`, of two models that do the same.
 
-1. Candidates are timed in turns, each beside the scene's own setting and in alternating order, so
-   that what slows the machine for a while slows all.
-2. Of the times of each, the lowest tenth counts: it forgets those that were disturbed, and does not
+1. A scene is run once, and its full state is kept at a few times: steps are timed from there, since
+   what a step costs depends on what is going on (contacts, above all). A job is a batch of steps
+   from each of these states, repeated where steps are cheap. What it takes to begin anew is
+   measured by itself, and taken off.
+2. Candidates are timed in turns, each beside the scene's own and in alternating order, so that what
+   slows the machine for a while slows all.
+3. Of the times of each, the lowest tenth counts: it forgets those that were disturbed, and does not
    hang on a single lucky one. Rounds go on until all ratios are known well enough, or a cap is
    reached.
-3. The least time of all rounds is what an undisturbed machine takes; the median over it says how
+4. The least time of all rounds is what an undisturbed machine takes; the median over it says how
    much it was disturbed.
 
 The clock is an argument: processor time of the thread serves best, since it stands still while
-others run. Nothing is collected as garbage meanwhile, which is the caller's to see to.
+others run.
 """
 
 from __future__ import annotations
 
+import gc
 import math
 import statistics
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from functools import partial
+from typing import Any, TypeAlias
 
+import mujoco
+import numpy as np
 from msgspec import Struct
+
+from coursebuild.numerics.engine import advance, initial_data, integrator_of, silent, varied
+from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.problem import Array, Setup
+from coursebuild.numerics.reports.bench import Setting
+from coursebuild.numerics.settings import apply, with_setting
 
 Clock: TypeAlias = Callable[[], int]
 """Time so far, in ns."""
@@ -30,11 +45,21 @@ Job: TypeAlias = Callable[[], None]
 
 FEWEST, MOST = 24, 60
 """Rounds."""
-QUICK_MOST = 24
-ENOUGH = 0.005
+_QUICK_MOST = 24
+_ENOUGH = 0.005
 """Relative uncertainty of a ratio at which rounds end."""
 _PARTS = 4
 """Into so many parts the rounds are cut, to see how much ratios vary."""
+_MOMENTS = 6
+"""Times of a scenario from which steps are timed."""
+_FEWEST_STEPS, _MOST_STEPS, _COORDINATES = 8, 64, 1000
+"""Steps from each of them: fewer where there are many degrees of freedom."""
+_JOB = 1_000_000
+"""ns that a job takes at least."""
+_EMPTY = 20
+"""Times that beginning is repeated, to see what it takes."""
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that the next step depends on."""
 
 
 class Timing(Struct, frozen=True):
@@ -58,7 +83,7 @@ def timed(
     *,
     idle: Sequence[float] | None = None,
     most: int = MOST,
-    enough: float = ENOUGH,
+    enough: float = _ENOUGH,
 ) -> tuple[Timing, ...]:
     """Time jobs, of which number `own` is what others are compared with.
 
@@ -67,24 +92,37 @@ def timed(
     Returns:
         A timing for each job; the ratio of `own` is 1.
     """
-    for job in jobs:  # caches are warm, and memory is there
-        job()
-    aside = [0.0] * len(jobs) if idle is None else idle
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for job in jobs:  # caches are warm, and memory is there
+            job()
+        times = _rounds(jobs, own, clock, idle or [0.0] * len(jobs), most, enough)
+    finally:
+        if collecting:
+            gc.enable()
+    return tuple(_timing(mine, times[own], exact=index == own) for index, mine in enumerate(times))
+
+
+def _rounds(
+    jobs: Sequence[Job],
+    own: int,
+    clock: Clock,
+    idle: Sequence[float],
+    most: int,
+    enough: float,
+) -> list[list[float]]:
     times: list[list[float]] = [[] for _ in jobs]
     others = [index for index in range(len(jobs)) if index != own]
-
-    def take(index: int) -> None:
-        times[index].append(max(0.0, _once(jobs[index], clock) - aside[index]))
-
     for turn in range(most):
         for place, index in enumerate(others or [own]):
             for one in (own, index) if (turn + place) % 2 else (index, own):
-                take(one)
+                times[one].append(max(0.0, _once(jobs[one], clock) - idle[one]))
         if turn + 1 >= FEWEST and all(
             _uncertainty(times[index], times[own]) <= enough for index in others
         ):
             break
-    return tuple(_timing(mine, times[own], exact=index == own) for index, mine in enumerate(times))
+    return times
 
 
 def _once(job: Job, clock: Clock) -> int:
@@ -132,3 +170,158 @@ def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:
 def _cut(times: Sequence[float]) -> list[Sequence[float]]:
     size = len(times) // _PARTS
     return [times[at : at + size] for at in range(0, size * _PARTS, size)]
+
+
+# --------------------------------------------------------------------------------- jobs that step
+
+
+class Cost(Struct, frozen=True):
+    """What a setting costs."""
+
+    ratio: float
+    """Time for the scenario, relative to the own setting's."""
+    uncertainty: float
+    """Of the ratio, relative."""
+    step: float
+    """Least time for a step, ns."""
+    spread: float
+    """Median over least of the repeated times."""
+
+
+def costs(
+    model: Any,
+    first: Pilot,
+    chosen: Sequence[Setting],
+    own: int,
+    clock: Clock,
+    *,
+    quick: bool = False,
+) -> tuple[Cost, ...]:
+    """The costs of settings, of which number `own` is the scene's own."""
+    one = with_setting(model, chosen[own])
+    data = initial_data(first.setup, one)
+    states = moments(one, data, first.setup)
+    jobs, steps, repeats = [], [], []
+    with silent():
+        for setting in chosen:
+            count = _steps(model, first, setting)
+            made = partial(_job, one, data, states, count, setting=setting)
+            job, times = _lasting(made, clock)
+            jobs.append(job)
+            steps.append(count * times * len(states))
+            repeats.append(times)
+        begin = _beginning(_job(one, data, states, 0, _EMPTY, chosen[own]), clock)
+        idle = [begin * times for times in repeats]
+        found = timed(jobs, own, clock, idle=idle, most=_QUICK_MOST if quick else MOST)
+    ours = chosen[own].timestep * steps[own]
+    return tuple(
+        # A job's time, over the time that it simulates.
+        Cost(
+            timing.ratio / (count * setting.timestep / ours),
+            timing.uncertainty,
+            timing.least / count,
+            timing.spread,
+        )
+        for timing, setting, count in zip(found, chosen, steps, strict=True)
+    )
+
+
+def subnormal(model: Any, first: Pilot) -> bool:
+    """Whether the state holds numbers so small that processors compute with them slowly."""
+    one = varied(model, integrator_of(model), first.scene.own)
+    small = np.abs(np.concatenate(moments(one, initial_data(first.setup, one), first.setup)))
+    return bool(np.any((small > 0) & (small < np.finfo(np.float64).tiny)))
+
+
+def moments(model: Any, data: Any, setup: Setup) -> tuple[Array, ...]:
+    """Full states of the engine at a few times of a scenario, from the beginning on."""
+    scenario = setup.scenario
+    every, looks = scenario.steps(float(model.opt.timestep)), len(scenario.times)
+    wanted = {round(part * looks / _MOMENTS) for part in range(_MOMENTS)}
+    found = []
+    for index in range(looks):
+        if scenario.controls:
+            data.ctrl[:] = scenario.command(index)
+        if index in wanted:
+            found.append(full_state(model, data))
+        advance(model, data, every)
+    return tuple(found)
+
+
+def full_state(model: Any, data: Any) -> Array:
+    """What `STATE` says, as it is now."""
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
+
+
+class Stepped(Struct, frozen=True, eq=False):
+    """A model whose steps are timed, from some of its states."""
+
+    model: Any
+    data: Any
+    states: Sequence[Array]
+
+
+def time_ratio(whole: Stepped, changed: Stepped, clock: Clock, *, quick: bool) -> Timing | None:
+    """Time of a model over that of a changed one that does the same; `None` if it cannot be told.
+
+    Their states belong together, one by one.
+    """
+    if not whole.states:
+        return None
+    steps = min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(whole.model.nv))))
+
+    def job(one: Stepped, times: int, count: int = steps) -> Job:
+        return _job(one.model, one.data, one.states, count, times)
+
+    with silent():
+        _, times = _lasting(lambda times: job(changed, times), clock)
+        jobs = [job(one, times) for one in (whole, changed)]
+        idle = [_beginning(job(one, _EMPTY, 0), clock) * times for one in (whole, changed)]
+        most = _QUICK_MOST if quick else MOST
+        found, own = timed(jobs, 1, clock, idle=idle, most=most)
+    return found if found.least > 0 and own.least > 0 else None
+
+
+def _lasting(made: Callable[[int], Job], clock: Clock) -> tuple[Job, int]:
+    """A job that takes about as long as it should, and how often it repeats what it does."""
+    times = 1
+    while True:
+        job = made(times)
+        if _once(job, clock) >= _JOB or times >= 1 << 12:
+            return job, times
+        times *= 2
+
+
+def _steps(model: Any, first: Pilot, setting: Setting) -> int:
+    """Steps from each moment: over the same time with every timestep, as far as that is little."""
+    most = min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
+    span = min(most * first.scene.own, first.scene.scenario.duration / _MOMENTS)
+    return max(1, min(round(span / setting.timestep), most))
+
+
+def _job(
+    model: Any,
+    data: Any,
+    states: Sequence[Array],
+    steps: int,
+    times: int,
+    setting: Setting | None = None,
+) -> Job:
+    """So many steps from each of the states, and all of that so many times."""
+
+    def job() -> None:
+        if setting is not None:
+            apply(model, setting)
+        for _ in range(times):
+            for state in states:
+                mujoco.mj_setState(model, data, state, STATE)
+                mujoco.mj_step(model, data, steps)
+
+    return job
+
+
+def _beginning(job: Job, clock: Clock) -> float:
+    """What it takes to begin at all states, without any step, ns."""
+    return min(_once(job, clock) for _ in range(7)) / _EMPTY

@@ -34,9 +34,10 @@ def with_card(root: Path, scene: Scene, report: SceneReport) -> SceneReport:
     """
     import mujoco
 
+    from coursebuild.numerics.contacts import touched_pairs
     from coursebuild.numerics.engine import silent
+    from coursebuild.numerics.pruning.reachability import possible_pairs
     from coursebuild.numerics.scene import scenes
-    from coursebuild.numerics.touching import possible_pairs, touched_pairs
 
     source = scene.model.source
     with silent():  # what it warns of, it would write into the working directory

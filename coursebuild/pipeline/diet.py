@@ -38,8 +38,8 @@ from coursebuild.pipeline.reports import write_record
 from coursebuild.pipeline.scenes import Scene, find_scenes
 
 if TYPE_CHECKING:
+    from coursebuild.numerics.pruning.ablation import Survey
     from coursebuild.numerics.pruning.model_text import ModelText
-    from coursebuild.numerics.pruning.survey import Survey
 
 _KIND = "diet"
 _CODE = ("numerics", "pipeline/diet.py", "pipeline/diet_model.py")

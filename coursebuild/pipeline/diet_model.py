@@ -28,9 +28,9 @@ from coursebuild.pipeline.scenes import Scene, scene_digest
 from coursebuild.source import Source, Span
 
 if TYPE_CHECKING:
+    from coursebuild.numerics.pruning.ablation import Survey
     from coursebuild.numerics.pruning.model_text import ModelText
     from coursebuild.numerics.pruning.readers import Readers
-    from coursebuild.numerics.pruning.survey import Survey
 
 _TEXT = ".coursebuild-text.xml"
 """No file has this name: MuJoCo takes the text in its place."""
@@ -91,10 +91,10 @@ class DietModel:
         """
         import mujoco
 
+        from coursebuild.numerics.pruning.ablation import Order, survey
         from coursebuild.numerics.pruning.cases import cases
         from coursebuild.numerics.pruning.markup import MarkupError
         from coursebuild.numerics.pruning.model_text import ModelTextError, open_model
-        from coursebuild.numerics.pruning.survey import Order, survey
         from coursebuild.numerics.scene import SceneError
 
         source = self.scene.model.source
@@ -108,7 +108,7 @@ class DietModel:
                 self.keeps,
                 self.locked,
                 _numbered(declared),
-                time.thread_time,
+                time.thread_time_ns,
                 quick,
                 tell,
             )

@@ -2,15 +2,13 @@
 
 Entry points: `scenarios_of(root, scene)`, `measured(loaded, …)`.
 
-1. The clock is the processor time of this thread: it stands still while others run. Nothing is
-   collected as garbage while it counts.
+1. The clock is the processor time of this thread: it stands still while others run.
 2. MuJoCo's warnings are not printed: it would also write them into the working directory, which is
    the author's.
 """
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -56,8 +54,6 @@ def measured(
     loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
 ) -> ScenarioReport | Diagnostic:
     """Measure a scenario, by its number; or why it cannot be."""
-    collecting = gc.isenabled()
-    gc.disable()
     try:
         with silent():
             return measure_scenario(
@@ -71,9 +67,6 @@ def measured(
         return _told(loaded.scene, error)
     except mujoco.FatalError as error:
         return _refused(loaded.scene, error)
-    finally:
-        if collecting:
-            gc.enable()
 
 
 def _told(scene: Scene, error: SceneError) -> Diagnostic:

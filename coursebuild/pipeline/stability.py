@@ -1,37 +1,41 @@
 """`coursebuild stability`: measure MuJoCo on the hard cases, beside what theory says.
 
-Entry point: `stability(options, names)`; `recorded_cases` holds it against what is recorded.
+Entry points: `stability(options, names)`; `record_stability`, `check_stability`.
 
 1. Names mean problems, or families of them: `damped-spring` is all of its damping ratios.
 2. What was measured is kept under the engine's version, the kind of machine and the code that
-   measures; what is kept is not measured again.
+   measures; what is kept is not measured again, but where it is held against a record.
+3. All cases are recorded in one file. Where some are named, recording them leaves the others as
+   they are, and checking them says nothing of the others.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
 import time
 
 import msgspec
+from msgspec import Struct
 
 from coursebuild.diagnostics import nearest
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.numerics.reports.cases import (
-    BoundaryLine,
-    CaseReport,
-    ErrorLine,
-    FigureLine,
-    OrderLine,
-    ReferenceLine,
+from coursebuild.model.scenarios import Bands
+from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.departures import Checked, case_departures
+from coursebuild.numerics.reports.records import (
+    STABILITY_PATH,
+    Failure,
+    decode_stability,
+    encode_stability,
 )
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reports import command, read_record, write_record
 
 _KIND = "stability"
-_CODE = ("numerics", "pipeline/stability.py")
+_CODE = ("numerics",)
 """What measures and says what was measured."""
 
 
@@ -45,7 +49,8 @@ def stability(
     Raises:
         UsageError: no problem is called so.
     """
-    from coursebuild.numerics.problems import problem_names
+    from coursebuild.numerics.cases import measure_case
+    from coursebuild.numerics.problems import problem_named, problem_names
 
     chosen = _chosen(names, problem_names())
     progress = Progress(quiet=options.quiet)
@@ -62,7 +67,7 @@ def stability(
             else:
                 progress.started(name)
                 began = time.monotonic()
-                report = _measured(name)
+                report = measure_case(problem_named(name))
                 options.store.keep(_KIND, key, msgspec.json.encode(report))
                 progress.finished(name, "measured", time.monotonic() - began)
             reports.append(report)
@@ -97,95 +102,68 @@ def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
     return [one for one in known if one in wanted]
 
 
-def _measured(name: str) -> CaseReport:
-    """Everything that there is to measure on a problem."""
-    from coursebuild.numerics import stability as limits
-    from coursebuild.numerics.measure import Error, Errors, ladder, orders
-    from coursebuild.numerics.problems import agreement, problem_named
-
-    problem = problem_named(name)
-    reference = None
-    if problem.reference is not None:
-        first, second = problem.reference, problem.second
-        reference = ReferenceLine(
-            first.kind,
-            first.source,
-            first.floor,
-            "" if second is None else second.source,
-            agreement(problem),
-        )
-
-    def both(error: Error | None) -> tuple[float, float] | None:
-        return None if error is None else (error.largest, error.end)
-
-    found = ladder(problem)
-    nothing = Errors(None, None, None)
-    error_lines = [
-        ErrorLine(
-            one.integrator.value,
-            one.timestep,
-            one.judgement.status.value,
-            one.judgement.reasons,
-            both((one.errors or nothing).position),
-            both((one.errors or nothing).attitude),
-            both((one.errors or nothing).velocity),
-            _finite(one.energy_drift),
-            _finite(one.momentum_drift),
-            one.penetration,
-            one.refsafe,
-        )
-        for rows in found.values()
-        for one in rows
-    ]
-    order_lines = []
-    for integrator, rows in found.items():
-        fit = orders(problem, rows)
-        parts = [None if one is None else one.value for one in (fit.position, fit.attitude)]
-        last = None if fit.velocity is None else fit.velocity.value
-        order_lines.append(OrderLine(integrator.value, parts[0], parts[1], last))
-    return CaseReport(
-        name=problem.name,
-        title=problem.title,
-        case=problem.case,
-        engine=engine_version(),
-        note=problem.note,
-        reference=reference,
-        boundaries=tuple(_boundary(one) for one in limits.survey(problem)),
-        figures=tuple(
-            FigureLine(
-                figure.name,
-                figure.unit,
-                integrator.value,
-                _finite(figure.measure(integrator)),
-                _finite(figure.exact(integrator)),
-                figure.source,
-            )
-            for figure in problem.figures
-            for integrator in figure.integrators
-        ),
-        orders=tuple(order_lines),
-        errors=tuple(error_lines),
-    )
+# ------------------------------------------------------------------------------------- the record
 
 
-def _boundary(one: object) -> BoundaryLine:
-    from coursebuild.numerics.stability import Boundary
+class Cases(Struct, frozen=True):
+    """What a run found."""
 
-    assert isinstance(one, Boundary)
-    theory = one.theory
-    return BoundaryLine(
-        one.integrator.value,
-        _finite(one.largest),
-        None if theory is None else _finite(theory.timestep),
-        "" if theory is None else theory.source,
-        _finite(one.difference),
-        one.monotone,
-        one.islands,
-        "" if one.beyond is None else one.beyond.status.value,
-        None if one.beyond is None else _finite(one.beyond.growth),
-        one.searched,
-    )
+    cases: tuple[CaseReport, ...]
+    """Those that were measured."""
+    checked: tuple[Checked, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether all is as it was recorded, or could be recorded."""
+        return not self.failures and not any(one.departures for one in self.checked)
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
+def record_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
+    """Measure the cases that the names mean, and write them into the course; all without names.
+
+    Raises:
+        UsageError: no case is called so.
+    """
+    from coursebuild.numerics.problems import problem_names
+
+    measured = stability(options, names)
+    known = frozenset(problem_names())
+    others: list[CaseReport] = []
+    if names and (options.root / STABILITY_PATH).exists():
+        found, failure = _recorded(options)
+        if failure is not None:
+            return Cases(measured, failures=(failure,))
+        new = {case.name for case in measured}
+        others = [case for case in found or () if case.name in known - new]
+    said = write_record(options.root, STABILITY_PATH, encode_stability([*others, *measured]))
+    if isinstance(said, Failure):
+        return Cases(measured, failures=(said,))
+    return Cases(measured, remarks=(said,))
+
+
+def check_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
+    """Measure again, and hold it against what is recorded.
+
+    Nothing is measured where there is no record to hold it against.
+
+    Raises:
+        UsageError: no case is called so.
+    """
+    recorded, failure = _recorded(options)
+    if recorded is None:
+        return Cases((), failures=() if failure is None else (failure,))
+    measured = stability(options, names, again=True)
+    new = {case.name for case in measured}
+    old = [case for case in recorded if not names or case.name in new]
+    engines = sorted({case.engine for case in old} - {case.engine for case in measured})
+    here = ", ".join(sorted({case.engine for case in measured}))
+    remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in engines)
+    departures = case_departures(old, measured, Bands())
+    return Cases(measured, (Checked("stability", STABILITY_PATH, departures, remarks),))
+
+
+def _recorded(options: Options) -> tuple[tuple[CaseReport, ...] | None, Failure | None]:
+    make = command("stability", (), "--record")
+    return read_record(options.root, STABILITY_PATH, decode_stability, make)

@@ -1,125 +1,270 @@
-"""Every hard case has two references that agree, and a model that MuJoCo takes."""
+"""References of scenes, and how well they are known."""
 
 from __future__ import annotations
 
-import decimal
-import re
-from collections.abc import Iterable
-from decimal import Decimal
-from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from coursebuild.numerics.engine import compiled, motion_of
-from coursebuild.numerics.extrapolation import State, integrate
-from coursebuild.numerics.problem import Integrator
-from coursebuild.numerics.problems import agreement, all_problems, problem_named, problem_names
-from coursebuild.numerics.problems import tumbling_box as box
+from coursebuild.numerics.engine import States
+from coursebuild.numerics.forward import forward_states, tends_to
+from coursebuild.numerics.integrate import NoConvergenceError, bulirsch_stoer
+from coursebuild.numerics.pilot import pilot
+from coursebuild.numerics.problem import Scenario, Setup
+from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.references import Known, know
+from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.source import Source
+from coursebuild.syntax.scenarios import parse_declarations
+from coursebuild.vocabulary import CLOSED_FORMS
 
-WORSE = {
-    "chain-heavy-tip": 1e-8,  # its mass matrix has a condition of 1e6 and swings at 1e4 rad/s
-    "distant-body": 1.3e-6,  # ten times the distance of neighbouring numbers there
-}
-LONG = (
-    *("double-pendulum", "chain-balls", "chain-hinges", "chain-heavy-tip"),
-    *("newtons-cradle", "newtons-cradle-touching", "elastic-impact"),
+pytestmark = pytest.mark.site
+
+PENDULUM = """\
+<mujoco>
+  <option timestep="0.002">{option}</option>
+  <worldbody>
+    <geom type="plane" size="3 3 1" pos="0 0 {floor}"/>
+    <body>
+      <joint axis="0 1 0" {joint}/>
+      <geom type="sphere" size="0.02" mass="1" pos="0 0 -1"/>
+    </body>
+  </worldbody>
+  <actuator><general joint="{acts}" {actuator}/></actuator>
+  <keyframe><key name="level" qpos="1.5707963267948966"/></keyframe>
+</mujoco>
+"""
+
+
+def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str = "") -> Any:
+    text = PENDULUM.format(
+        joint=f'name="pin" {joint}', floor=floor, acts="pin", actuator=actuator, option=option
+    )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> Known:
+    parsed = parse_declarations(Source("models/m.toml", "[[scenario]]\n" + text))
+    assert parsed.value is not None, parsed.diagnostics
+    (scene,) = scenes(model, parsed.value, quick=True)
+    return know(model, pilot(model, scene), quick=True)
+
+
+def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
+    closed = [p.name for p in all_problems() if p.reference and p.reference.kind == "closed"]
+    assert list(CLOSED_FORMS) == closed
+
+
+# ------------------------------------------------------------------------------------- references
+
+
+def test_a_smooth_scene_is_integrated_twice() -> None:
+    found = known(pendulum("damping='0.3'"))
+    assert (found.kind, found.note) == ("ode", "")
+    assert found.source == "Bulirsch–Stoer over mj_forward"
+    assert found.second == "Gauss's collocation of order 12 over mj_forward"
+    assert found.agreement < 1e-12
+    assert found.horizon == 0.5
+
+
+@pytest.mark.parametrize(
+    ("model", "why"),
+    [
+        (pendulum(floor=-0.5), "contact"),
+        (pendulum("range='60 120' limited='true'"), "a limit that is reached"),
+        (pendulum("frictionloss='0.2'"), "dry friction"),
+    ],
+    ids=["contact", "limit", "friction"],
 )
-"""Those of which a reference is integrated with many digits or in many small steps."""
+def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: str) -> None:
+    (scene,) = scenes(model, None, quick=True)
+    first = pilot(model, scene)
+    assert first.jumps == (why,)
+    found = know(model, first, quick=True)
+    assert found.kind == "self"
+    step = min(scene.timesteps) / 8
+    assert found.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
+    assert found.second == f"the same under Euler at {2 * step:g} s"
+    assert found.floor.place > 1e-7, "it is not called better known than it is"
 
 
-def apart(names: Iterable[str]) -> list[str]:
-    """What to say of each case whose references differ by more than is said of it."""
-    found = []
-    for problem in map(problem_named, names):
-        allowed, measured = WORSE.get(problem.name, 1e-10), agreement(problem)
-        if measured is None or not measured <= problem.agreement <= allowed:
-            found.append(f"{problem.name}: {measured}, said {problem.agreement}, over {allowed}")
-    return found
+FULL = 'dyntype="integrator" gainprm="2" actlimited="true" actrange="-{most} {most}"'
+"""An activation that a constant command fills until it is full."""
 
 
-def test_all_thirteen_cases_are_there() -> None:
-    assert {problem.case for problem in all_problems()} == set(range(1, 14))
-    assert len(set(problem_names())) == len(all_problems())
-    assert problem_named("tumbling-box").case == 1
+def test_an_activation_at_its_limit_is_a_jump() -> None:
+    # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    first = pilot(model, scene)
+    assert first.jumps == ("an activation at its limit",)
+    found = know(model, first, quick=True)
+    assert found.kind == "self"
+    model.opt.timestep = 1e-4
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 20_000)
+    assert data.act[0] == 0.3
+    assert found.states.act[-1, 0] == 0.3
+    assert found.motion.position[-1, 0] == pytest.approx(data.qpos[0], abs=1e-3)
+    wide = pendulum("damping='1'", actuator=FULL.format(most=9))
+    wide.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(wide, None, quick=True)
+    assert pilot(wide, scene).jumps == ()
 
 
-def test_both_references_agree() -> None:
-    assert apart(name for name in problem_names() if name not in LONG) == []
+def test_an_integration_of_other_accelerations_is_no_reference() -> None:
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, None, quick=True)
+    unseen = replace(pilot(model, scene), jumps=())  # as of something that is not looked for
+    found = know(model, unseen, quick=True)
+    assert found.kind == "self"
+    assert found.note == "no integration: the engine in small steps tends elsewhere"
 
 
-@pytest.mark.site
-def test_both_references_of_long_integrations_agree() -> None:
-    assert apart(LONG) == []
+def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
+    text = 'dyntype="filterexact" dynprm="0.1" gainprm="2"'
+    early = pendulum(actuator=f'{text} actearly="true"')
+    late = pendulum(actuator=text)
+    for model in (early, late):
+        model.key_ctrl[0, 0] = 1.0
+    first, second = known(early), known(late)
+    assert (first.kind, second.kind) == ("ode", "ode")
+    assert np.array_equal(first.states.qpos, second.states.qpos)
 
 
-def test_the_reference_begins_where_the_scenario_does() -> None:
-    for problem in all_problems():
-        assert problem.reference is not None
-        scenario = problem.scenario
-        model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
-        qpos = np.array([scenario.qpos or model.qpos0], dtype=float)
-        qvel = np.array([scenario.qvel or [0.0] * model.nv], dtype=float)
-        begun = motion_of(model, np.zeros(1), qpos, qvel)
-        soon = problem.reference.motion(np.array([1e-9, 2e-9]))
-        assert soon.position.shape[1:] == begun.position.shape[1:], problem.name
-        for found, expected, rtol, atol in (
-            (soon.position, begun.position, 1e-12, 1e-5),
-            (np.abs(soon.attitude), np.abs(begun.attitude), 0, 1e-5),
-            (soon.velocity, begun.velocity, 1e-6, 1e-4),
-        ):
-            name = problem.name
-            np.testing.assert_allclose(found[0], expected[0], rtol=rtol, atol=atol, err_msg=name)
+def test_a_limit_that_is_not_reached_changes_nothing() -> None:
+    model = pendulum("range='-170 170' limited='true'")
+    (scene,) = scenes(model, None, quick=True)
+    assert pilot(model, scene).smooth
 
 
-def test_timesteps_divide_the_looks_and_models_say_neither_timestep_nor_integrator() -> None:
-    for problem in all_problems():
-        looks = len(problem.scenario.times)
-        assert looks * problem.scenario.sample == pytest.approx(problem.scenario.duration)
-        for timestep in problem.timesteps:
-            count = problem.scenario.sample / timestep
-            assert count == pytest.approx(round(count), rel=1e-9), problem.name
-        assert not re.search("timestep|integrator", problem.mjcf), problem.name
+def test_commands_and_activations_are_integrated() -> None:
+    """A filter of first order on a motor: what a formula says, with commands held."""
+    act = 'dyntype="filter" dynprm="0.2" gainprm="3"'
+    model = pendulum("", actuator=act, option='<flag gravity="disable"/>')
+    text = 'name = "a"\ncontrols = [[1], [-1]]\nhold = 0.2\nsample = 0.1\nduration = 0.4\n'
+    found = known(model, text)
+    times = found.states.times
+    rising = 1 - np.exp(-times / 0.2)
+    then = -1 + (1 + 1 - np.exp(-1.0)) * np.exp(-(times - 0.2) / 0.2)
+    exact = np.where(times <= 0.2 + 1e-9, rising, then)
+    assert found.kind == "ode"
+    assert np.max(np.abs(found.states.act[:, 0] - exact)) < 1e-12
 
 
-def test_the_boxs_closed_form_conserves_energy_and_momentum() -> None:
-    inertia = box.moments()
-    for nudge in box.NUDGES:
-        form = box.Tumbling(nudge, box.SPIN)
-        omega = form.omega(np.linspace(0.1, 6 * form.flip_interval, 400))
-        energy, momentum = omega**2 @ inertia, np.linalg.norm(omega * inertia, axis=1)
-        start = np.array([nudge, box.SPIN, 0.0])
-        assert np.max(np.abs(energy / (start**2 @ inertia) - 1)) < 1e-13, nudge
-        assert np.max(np.abs(momentum / np.linalg.norm(start * inertia) - 1)) < 1e-13, nudge
+def test_an_integration_that_takes_too_long_ends() -> None:
+    model = pendulum()
+    setup = Setup(scenario=Scenario(0.5, 0.1, (1.0,)))
+    with pytest.raises(NoConvergenceError, match="more than 20 evaluations"):
+        forward_states(model, setup, setup.scenario.times, bulirsch_stoer, evaluations=20)
 
 
-@pytest.mark.site
-def test_the_boxs_closed_form_agrees_with_thirty_digits() -> None:
-    for nudge in box.NUDGES:
-        form = box.Tumbling(nudge, box.SPIN)
-        times = np.array([0.5, 1.0, 1.5, 2.0, 2.2]) * form.first_crossing
-        exact = turned_with_thirty_digits(nudge, times)
-        assert np.max(np.abs(form.omega(times) - exact)) < 1e-10, nudge
-        assert abs(exact[1, 1]) < 1e-10, nudge  # the first crossing
+def test_an_author_may_choose() -> None:
+    text = 'name = "a"\nkeyframe = 0\nduration = 0.1\nreference = '
+    assert known(pendulum(), text + '"self"').kind == "self"
+    with pytest.raises(SceneError) as caught:
+        known(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
+    assert caught.value.message == "no integration can be the reference: there is contact"
 
 
-def turned_with_thirty_digits(nudge: float, times: np.ndarray) -> np.ndarray:
-    """Euler's equations of the box, integrated in decimal numbers."""
-    with decimal.localcontext(decimal.Context(prec=30)):
-        i1, i2, i3 = (Decimal(moment) for moment in box.moments().tolist())
-        ratios = ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)
-
-        def rate(w: State) -> State:
-            products = (w[1] * w[2], w[2] * w[0], w[0] * w[1])
-            return np.array([r * p for r, p in zip(ratios, products, strict=True)], dtype=object)
-
-        start = np.array([Decimal(nudge), Decimal(box.SPIN), Decimal(0)], dtype=object)
-        return integrate(rate, start, times, 1e-24, columns=12).astype(float)
+# ----------------------------------------------------------------------------------- closed forms
 
 
-def test_problems_are_small_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)  # where MuJoCo would write what it warns of
-    for problem in all_problems():
-        assert compiled(problem.mjcf, Integrator.RK4, 1e-3).nbody <= 12
-        assert "file=" not in problem.mjcf
-    assert list(tmp_path.iterdir()) == []
+SPRING = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <body>
+      <joint type="slide" axis="1 0 0" stiffness="{stiffness}" damping="2"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def spring(stiffness: float) -> Any:
+    return mujoco.MjModel.from_xml_string(SPRING.format(stiffness=stiffness))
+
+
+def test_a_closed_form_comes_first_and_is_checked() -> None:
+    text = (
+        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
+    )
+    found = known(spring(100), text)
+    assert found.kind == "closed"
+    assert found.second == "Bulirsch–Stoer over mj_forward"
+    assert found.agreement < 1e-11
+
+
+def test_a_closed_form_of_something_else_is_refused() -> None:
+    text = (
+        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
+    )
+    with pytest.raises(SceneError) as caught:
+        known(spring(101), text)
+    message = "the closed form of `damped-spring-0.1` is not this scene's motion"
+    assert caught.value.message == message
+    assert caught.value.span is not None
+    assert caught.value.span.text == '"closed:damped-spring-0.1"'
+    with pytest.raises(SceneError, match="begins otherwise than the hard case"):
+        known(spring(100), text.replace("[5]", "[5.1]"))
+    with pytest.raises(SceneError, match="other joints than the hard case"):
+        known(pendulum(), text.replace("damped-spring-0.1", "coin"))
+
+
+# ----------------------------------------------------------------------- what the engine tends to
+
+
+def arm(damping: float, more: str = "") -> Any:
+    return mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody><body><joint axis='0 1 0' damping='{damping}' {more}/>"
+        "<geom size='0.05' mass='1' pos='1 0 0'/></body></worldbody></mujoco>"
+    )
+
+
+def tends(model: Any, other: Any, step: float = 0.004) -> bool:
+    """Whether one model in small steps does what another's accelerations say."""
+    setup = Setup(scenario=Scenario(2.0, 0.1))
+    states: States = forward_states(
+        other, setup, setup.scenario.times, lambda r, y, t: bulirsch_stoer(r, y, t, 1e-12)
+    )
+    return tends_to(model, setup, states, step, 0.01)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.02, 0.001])
+def test_an_engine_tends_to_its_own_accelerations(step: float) -> None:
+    assert tends(arm(0.1), arm(0.1), step)
+
+
+@pytest.mark.parametrize("damping", [0.1001, 0.11, 0.5])
+def test_it_does_not_tend_to_others(damping: float) -> None:
+    assert not tends(arm(damping), arm(0.1))
+
+
+def test_where_no_long_step_is_stable() -> None:
+    stiff = "stiffness='40000' springref='3'"
+    assert tends(arm(1, stiff), arm(1, stiff), 0.02)
+
+
+def test_beyond_lyapunovs_horizon_nothing_is_compared() -> None:
+    link = "<body pos='0 0 -1'>{}<joint axis='0 1 0'/><geom type='capsule' size='0.03' {}/></body>"
+    shape = "fromto='0 0 0 0 0 -1'"
+    chain = link.format("{}", shape).replace("{}", "", 1)
+    mjcf = (
+        "<mujoco><option><flag contact='disable'/></option><worldbody><body>"
+        f"<joint axis='0 1 0' ref='0'/><geom type='capsule' size='0.03' {shape}/>{chain}</body>"
+        "</worldbody></mujoco>"
+    )
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    setup = Setup(scenario=Scenario(12.0, 0.05, qpos=(2.6, 1.2)))
+    states = forward_states(
+        model, setup, setup.scenario.times, lambda r, y, t: bulirsch_stoer(r, y, t, 1e-12)
+    )
+    assert tends_to(model, setup, states, 0.005, 0.01)

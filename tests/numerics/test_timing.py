@@ -8,11 +8,10 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
-from coursebuild.numerics.costs import costs
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.reports.bench import Setting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Job, timed
+from coursebuild.numerics.timing import FEWEST, Job, Stepped, costs, full_state, time_ratio, timed
 
 
 class Machine:
@@ -134,7 +133,7 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
     chosen = [
         Setting(name, h, "", 0, "") for name in ("RK4", "Euler") for h in (0.008, 0.004, 0.001)
     ]
-    found = costs(model, scene, first, chosen, 4, machine.clock)
+    found = costs(model, first, chosen, 4, machine.clock)
     expected = [price * 0.004 / h for price in (13 / 3, 1.0) for h in (0.008, 0.004, 0.001)]
     assert [one.ratio for one in found] == pytest.approx(expected, rel=1e-4)
     assert [one.step for one in found] == pytest.approx([1300] * 3 + [300] * 3, rel=1e-4)
@@ -154,5 +153,28 @@ def test_the_clock_is_told_of_no_step_beyond_the_scenario(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(mujoco, "mj_step", step)
     chosen = [Setting("Euler", h, "", 0, "") for h in (0.016, 0.004)]
-    costs(model, scene, first, chosen, 1, machine.clock, quick=True)
+    costs(model, first, chosen, 1, machine.clock, quick=True)
     assert 0.9 * scene.scenario.duration < latest[0] <= scene.scenario.duration * 1.05
+
+
+def test_a_model_beside_a_changed_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a clock that goes by the steps made, three times as fast for one model."""
+    models = [mujoco.MjModel.from_xml_string(SPRING) for _ in range(2)]
+    whole, changed = (
+        Stepped(model, data, [full_state(model, data)])
+        for model, data in ((model, mujoco.MjData(model)) for model in models)
+    )
+    machine, noise = Machine(), random.Random(0)
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        machine.now += nstep * (3e5 if model is models[0] else 1e5) * noise.uniform(1.0, 1.02)
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    found = time_ratio(whole, changed, machine.clock, quick=False)
+    assert found is not None and found.ratio == pytest.approx(3.0, rel=0.02)
+    equal = time_ratio(whole, whole, machine.clock, quick=True)
+    assert equal is not None and equal.ratio == pytest.approx(1.0, abs=0.03)
+    assert time_ratio(whole, changed, lambda: 0, quick=True) is None
+    assert (
+        time_ratio(Stepped(models[0], whole.data, []), changed, machine.clock, quick=True) is None
+    )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 
+from coursebuild.numerics.reports.bench import OrderRow
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
     FigureLine,
-    OrderLine,
     ReferenceLine,
 )
 from coursebuild.report import Style
@@ -51,7 +51,7 @@ REPORT = CaseReport(
         FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),
         FigureLine("growth", "m", "RK4", None, None, "a law"),
     ),
-    orders=(OrderLine("Euler", 1.0, None, 0.998), OrderLine("RK4", None, None, None)),
+    orders=(OrderRow("Euler", 1.0, None, 0.998), OrderRow("RK4", None, None, None)),
     errors=(
         ErrorLine("RK4", 0.5, "diverged", ("one", "two"), None, None, None, None, None, 0.0, True),
         ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),

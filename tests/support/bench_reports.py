@@ -20,7 +20,6 @@ from coursebuild.numerics.reports.cases import (
     CaseReport,
     ErrorLine,
     FigureLine,
-    OrderLine,
     ReferenceLine,
 )
 
@@ -35,7 +34,7 @@ CASE = CaseReport(
     reference=ReferenceLine("closed", "a textbook", 1e-13, "", None),
     boundaries=(BoundaryLine("Euler", 0.2, 0.2, "hω = 2", 0.0, True, (), "", None, (1e-3, 1.0)),),
     figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
-    orders=(OrderLine("Euler", 1.0, None, None),),
+    orders=(OrderRow("Euler", 1.0, None, None),),
     errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
 )
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))

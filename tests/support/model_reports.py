@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import SceneCard, SceneReport
+from coursebuild.numerics.reports.bench import OrderRow, SceneCard, SceneReport
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
     FigureLine,
-    OrderLine,
     ReferenceLine,
 )
 from coursebuild.numerics.reports.diet import (
@@ -96,7 +95,7 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
             FigureLine("energy", "", "RK4", -4.1e-10, 0.0, ""),
             FigureLine("energy", "", "Euler", None, None, ""),
         ),
-        "orders": (OrderLine("Euler", 1.0, None, None), OrderLine("discrete", None, None, None)),
+        "orders": (OrderRow("Euler", 1.0, None, None), OrderRow("discrete", None, None, None)),
         "errors": (
             ErrorLine(
                 "Euler", 0.01, "ok", (), (1.5e-3, 1e-3), None, (2e-3, 1e-3), None, None, 0.0, False

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import mujoco
 
 from coursebuild.model.scenarios import Declarations
+from coursebuild.numerics.pruning.ablation import Order, Survey, survey
 from coursebuild.numerics.pruning.cases import cases
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import Reader, Readers
-from coursebuild.numerics.pruning.survey import Order, Survey, survey
 from coursebuild.numerics.reports.diet import Finding
 
 PATH = "models/a.xml"
@@ -47,7 +47,7 @@ def tried(
 ) -> tuple[ModelText, Survey]:
     """The model, and what was found in it; `lesson` is what the course says of it."""
     model = opened(text if isinstance(text, Mapping) else {PATH: text})
-    ticks = itertools.count()
+    ticks = itertools.count(0, 2_000_000)
     order = Order(
         model,
         cases(model.model, declared, quick=quick),
@@ -55,7 +55,7 @@ def tried(
         keeps or {},
         locked or {},
         numbered,
-        lambda: float(next(ticks)),
+        lambda: next(ticks),
         quick,
         lambda _: None,
     )

@@ -1,13 +1,12 @@
 """The hard cases, one module each.
 
-Entry points: `all_problems()`, `problem_names()`, `problem_named(name)`, `agreement(problem)`.
+Entry points: `all_problems()`, `problem_names()`, `problem_named(name)`.
 """
 
 from __future__ import annotations
 
 from functools import cache
 
-from coursebuild.numerics.measure import errors, known
 from coursebuild.numerics.problem import Problem
 from coursebuild.numerics.problems import (
     chains,
@@ -62,17 +61,3 @@ def problem_named(name: str) -> Problem:
         KeyError: there is none.
     """
     return {problem.name: problem for problem in all_problems()}[name]
-
-
-def agreement(problem: Problem) -> float | None:
-    """The largest difference of the problem's two references over its duration.
-
-    In m, rad, m/s or rad/s, whichever is larger; `None` where it has not two.
-    """
-    if problem.reference is None or problem.second is None:
-        return None
-    times = problem.scenario.times
-    exact = known(problem.reference, tuple(times.tolist()))
-    found = errors(exact, problem.second.motion(times))
-    parts = (found.position, found.attitude, found.velocity)
-    return max(part.largest for part in parts if part is not None)

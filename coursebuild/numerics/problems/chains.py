@@ -17,11 +17,11 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.extrapolation import State, integrate
 from coursebuild.numerics.forward import forward_motion
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario
 from coursebuild.numerics.problems.common import NO_CONTACT, motion_without_attitude
-from coursebuild.numerics.rotation import conjugate, multiply, rate_of, rotate
+from mjcourse.spatial import quat_conj, quat_mul, quat_rotate
 
 GRAVITY = 9.81
 
@@ -88,7 +88,7 @@ def planar(chain: Chain, times: Array, tolerance: float) -> Motion:
         return np.concatenate([speed, np.linalg.solve(matrix, force)])
 
     start = np.concatenate([np.full(count, chain.bend), np.zeros(count)])
-    states = integrate(rate, start, times, tolerance)
+    states = bulirsch_stoer(rate, start, times, tolerance)
     place = np.diff(states[:, :count], axis=1, prepend=0.0)
     speed = np.diff(states[:, count:], axis=1, prepend=0.0)
     return motion_without_attitude(times, place, speed)
@@ -108,22 +108,23 @@ def spatial(chain: Chain, times: Array, tolerance: float) -> Motion:
         q = state[: 4 * count].reshape(count, 4)
         unit = q / np.linalg.norm(q, axis=1, keepdims=True)
         omega = state[4 * count :].reshape(count, 3)
-        arm = rotate(unit, np.broadcast_to(down, (count, 3)))
-        local = rotate(conjugate(unit), omega)
+        arm = quat_rotate(unit, np.broadcast_to(down, (count, 3)))
+        local = quat_rotate(quat_conj(unit), omega)
         alpha = _spatial_accelerations(chain, masses, arm, omega)
-        return np.concatenate([rate_of(q, local).ravel(), alpha.ravel()])
+        turning = quat_mul(q, np.insert(local, 0, 0.0, axis=1)) / 2
+        return np.concatenate([turning.ravel(), alpha.ravel()])
 
     turned = np.array([math.cos(chain.bend / 2), 0.0, math.sin(chain.bend / 2), 0.0])
-    first = rotate(turned, np.array([0.5, 0.0, chain.spin]))
+    first = quat_rotate(turned, np.array([0.5, 0.0, chain.spin]))
     start = np.concatenate([np.tile(turned, count), np.tile(first, count)])
-    states = integrate(rate, start, times, tolerance)
+    states = bulirsch_stoer(rate, start, times, tolerance)
     q = states[:, : 4 * count].reshape(len(times), count, 4)
     q = q / np.linalg.norm(q, axis=2, keepdims=True)
     omega = states[:, 4 * count :].reshape(len(times), count, 3)
     attitude, speed = q.copy(), omega.copy()
-    attitude[:, 1:] = multiply(conjugate(q[:, :-1]), q[:, 1:])
+    attitude[:, 1:] = quat_mul(quat_conj(q[:, :-1]), q[:, 1:])
     speed[:, 1:] -= omega[:, :-1]
-    velocity = rotate(conjugate(q), speed).reshape(len(times), 3 * count)
+    velocity = quat_rotate(quat_conj(q), speed).reshape(len(times), 3 * count)
     return Motion(times, np.empty((len(times), 0)), attitude, velocity)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.integrate import State, bulirsch_stoer, quaternion_rate
 from coursebuild.numerics.problem import Array, Motion
 
 NO_CONTACT = '<flag contact="disable"/>'
@@ -30,18 +30,8 @@ def free_body_rate(inertia: Array) -> Callable[[State], State]:
 
     def rate(state: State) -> State:
         w1, w2, w3 = state[4:].tolist()
-        q0, q1, q2, q3 = state[:4].tolist()
-        return np.array(
-            [
-                (-q1 * w1 - q2 * w2 - q3 * w3) / 2,
-                (q0 * w1 + q2 * w3 - q3 * w2) / 2,
-                (q0 * w2 + q3 * w1 - q1 * w3) / 2,
-                (q0 * w3 + q1 * w2 - q2 * w1) / 2,
-                (i2 - i3) / i1 * w2 * w3,
-                (i3 - i1) / i2 * w3 * w1,
-                (i1 - i2) / i3 * w1 * w2,
-            ]
-        )
+        euler = (i2 - i3) / i1 * w2 * w3, (i3 - i1) / i2 * w3 * w1, (i1 - i2) / i3 * w1 * w2
+        return np.concatenate([quaternion_rate(state[:4], state[4:]), euler])
 
     return rate
 
@@ -52,7 +42,7 @@ def free_body_motion(inertia: Array, omega: Array, times: Array) -> Motion:
     At the beginning its axes are the world's.
     """
     start = np.concatenate([[1.0, 0.0, 0.0, 0.0], omega])
-    states = integrate(free_body_rate(inertia), start, times)
+    states = bulirsch_stoer(free_body_rate(inertia), start, times)
     attitude = states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True)
     still = np.zeros((len(times), 3))
     return Motion(times, still, attitude[:, None], np.concatenate([still, states[:, 4:]], axis=1))

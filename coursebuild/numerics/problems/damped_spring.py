@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -79,7 +79,7 @@ def integrated(ratio: float, rate: float, x0: float, v0: float, times: Array) ->
         x, v = state.tolist()
         return np.array([v, -2 * ratio * rate * v - rate**2 * x])
 
-    states = integrate(slope, np.array([x0, v0]), times)
+    states = bulirsch_stoer(slope, np.array([x0, v0]), times)
     return motion_without_attitude(times, states[:, :1], states[:, 1:])
 
 

@@ -19,16 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled, simulate
-from coursebuild.numerics.extrapolation import State, integrate
-from coursebuild.numerics.measure import known
+from coursebuild.numerics.engine import advance, compiled, initial_data, simulate
+from coursebuild.numerics.integrate import State, bulirsch_stoer
+from coursebuild.numerics.measure import reference_motion
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import NO_CONTACT, motion_without_attitude
@@ -72,7 +72,7 @@ def exact(times: Array) -> Motion:
             return np.array([w1, w2, -s1 * w1, c1 * w1, -s2 * w2, c2 * w2, a1, a2], dtype=object)
 
         zero = Decimal(0)
-        states = integrate(rate, _begin(zero, zero), times, 1e-28, columns=12)
+        states = bulirsch_stoer(rate, _begin(zero, zero), times, 1e-28, columns=12)
         return _motion(times, states[:, 0], states[:, 1], states[:, 6], states[:, 7])
 
 
@@ -100,7 +100,7 @@ def hamiltonian(times: Array) -> Motion:
             return np.array([w1, w2, -s1 * w1, c1 * w1, -s2 * w2, c2 * w2, f1, f2], dtype=object)
 
         zero = Decimal(0)
-        states = integrate(rate, _begin(zero, zero), times, 1e-30, columns=14)
+        states = bulirsch_stoer(rate, _begin(zero, zero), times, 1e-30, columns=14)
         c = states[:, 2] * states[:, 4] + states[:, 3] * states[:, 5]
         w1, w2 = velocities(c, states[:, 6], states[:, 7])
         return _motion(times, states[:, 0], states[:, 1], w1, w2)
@@ -137,18 +137,18 @@ def _motion(times: Array, first: State, second: State, w1: State, w2: State) -> 
 def horizon(integrator: Integrator, timestep: float = 1e-3) -> float:
     """When the error of the angles first passes 0.1 rad, s."""
     one = problem()
-    run = simulate(one, integrator, timestep)
-    truth = known(REFERENCE, tuple(run.times.tolist()))
-    error = np.linalg.norm(run.qpos - truth.position, axis=1)
+    found = simulate(one, compiled(MJCF, integrator, timestep)).states
+    truth = reference_motion(REFERENCE, tuple(found.times.tolist()))
+    error = np.linalg.norm(found.qpos - truth.position, axis=1)
     beyond = np.flatnonzero(~(error < _HORIZON_ERROR))
-    return float(run.times[beyond[0]]) if len(beyond) else math.inf
+    return float(found.times[beyond[0]]) if len(beyond) else math.inf
 
 
 def lyapunov(integrator: Integrator, timestep: float = 1e-3, duration: float = 200.0) -> float:
     """The largest Lyapunov exponent, 1/s: two runs, brought near to each other again and again."""
     one = problem()
     model = compiled(MJCF, integrator, timestep)
-    data, near = begun(one, model), begun(one, model)
+    data, near = initial_data(one, model), initial_data(one, model)
     distance, every, total = 1e-8, round(0.5 / timestep), 0.0
     near.qpos[0] += distance
     parts = round(duration / 0.5)
@@ -181,15 +181,15 @@ def problem() -> Problem:
         second=Reference(
             "ode", "Hamilton's equations, Bulirsch–Stoer with 45 digits", hamiltonian, floor=1e-13
         ),
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "horizon: when the error at 1 ms passes 0.1 rad",
                 "s",
                 _unknown,
                 horizon,
                 "against the reference with 40 digits",
             ),
-            Figure(
+            ScalarCheck(
                 "Lyapunov exponent, over 200 s at 1 ms",
                 "1/s",
                 _unknown,

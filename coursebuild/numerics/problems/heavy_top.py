@@ -14,11 +14,15 @@ import math
 import numpy as np
 
 from coursebuild.numerics.elliptic import jacobi
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.integrate import (
+    State,
+    bulirsch_stoer,
+    cumulative_integral,
+    quaternion_rate,
+)
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario
 from coursebuild.numerics.problems.common import NO_CONTACT
-from coursebuild.numerics.quadrature import cumulative
-from coursebuild.numerics.rotation import from_axis_angle, multiply
+from mjcourse.spatial import axis_angle_to_quat, quat_mul
 
 GRAVITY, MASS, HEIGHT = 9.81, 0.5, 0.06
 """m/s², kg, and m from the pivot to the centre of mass."""
@@ -74,14 +78,14 @@ def motion(times: Array) -> Motion:
     sine = np.sqrt(1 - u * u)
     tilt = np.arctan2(sine, u)
     around = _precession_rate(times)
-    precession = cumulative(_precession_rate, times, 0.3 / _RATE)
-    own = SPIN * times - cumulative(
+    precession = cumulative_integral(_precession_rate, times, 0.3 / _RATE)
+    own = SPIN * times - cumulative_integral(
         lambda at: _precession_rate(at) * (_U0 - _fall(at)[0]), times, 0.3 / _RATE
     )
     z, y = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
-    attitude = multiply(
-        multiply(from_axis_angle(z, precession), from_axis_angle(y, tilt)),
-        from_axis_angle(z, own),
+    attitude = quat_mul(
+        quat_mul(axis_angle_to_quat(z, precession), axis_angle_to_quat(y, tilt)),
+        axis_angle_to_quat(z, own),
     )
     nod = sinking / sine
     omega = np.stack(
@@ -103,20 +107,15 @@ def integrated(times: Array) -> Motion:
         q0, q1, q2, q3, w1, w2, w3 = state.tolist()
         # The vertical in the body's frame: the third row of the rotation matrix.
         vx, vy = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1)
-        return np.array(
-            [
-                (-q1 * w1 - q2 * w2 - q3 * w3) / 2,
-                (q0 * w1 + q2 * w3 - q3 * w2) / 2,
-                (q0 * w2 + q3 * w1 - q1 * w3) / 2,
-                (q0 * w3 + q1 * w2 - q2 * w1) / 2,
-                ((TRANSVERSE - AXIAL) * w2 * w3 + load * vy) / TRANSVERSE,
-                ((AXIAL - TRANSVERSE) * w3 * w1 - load * vx) / TRANSVERSE,
-                0.0,
-            ]
+        euler = (
+            ((TRANSVERSE - AXIAL) * w2 * w3 + load * vy) / TRANSVERSE,
+            ((AXIAL - TRANSVERSE) * w3 * w1 - load * vx) / TRANSVERSE,
+            0.0,
         )
+        return np.concatenate([quaternion_rate(state[:4], state[4:]), euler])
 
     start = np.array([math.cos(TILT / 2), 0, math.sin(TILT / 2), 0, 0, 0, SPIN])
-    states = integrate(rate, start, times)
+    states = bulirsch_stoer(rate, start, times)
     attitude = states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True)
     return Motion(times, np.empty((len(times), 0)), attitude[:, None], states[:, 4:])
 

@@ -15,15 +15,15 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import NO_GRAVITY, motion_without_attitude
@@ -108,13 +108,13 @@ def bounce_integrated(times: Array) -> Motion:
     low, high = 0.5 / RATE, 6.0 / RATE  # the depth is positive, then negative
     for _ in range(60):
         middle = (low + high) / 2
-        deep = integrate(rate, start, np.array([middle]), first=1e-4)[0, 0] > 0
+        deep = bulirsch_stoer(rate, start, np.array([middle]), first=1e-4)[0, 0] > 0
         low, high = (middle, high) if deep else (low, middle)
-    away = float(integrate(rate, start, np.array([low]), first=1e-4)[0, 1])
+    away = float(bulirsch_stoer(rate, start, np.array([low]), first=1e-4)[0, 1])
     place, speed = SPEED * times, np.full_like(times, SPEED)
     touching = (times > begin) & (times <= begin + low)
     if touching.any():
-        states = integrate(rate, start, times[touching] - begin, first=1e-4)
+        states = bulirsch_stoer(rate, start, times[touching] - begin, first=1e-4)
         place[touching], speed[touching] = GAP + states[:, 0], states[:, 1]
     after = times > begin + low
     place[after] = GAP + away * (times[after] - begin - low)
@@ -162,7 +162,7 @@ def cradle_integrated(times: Array) -> Motion:
         low, high = 0.5 / RATE, 6.0 / RATE
         for _ in range(60):
             middle = (low + high) / 2
-            x, y = integrate(pair, state, np.array([middle]), first=1e-4)[0, :2]
+            x, y = bulirsch_stoer(pair, state, np.array([middle]), first=1e-4)[0, :2]
             low, high = (middle, high) if x - y > GAP else (low, middle)
         return low
 
@@ -176,7 +176,7 @@ def cradle_integrated(times: Array) -> Motion:
         ends = meets + parted(start)
         here = (times > meets) & (times <= ends)
         at = np.append(times[here] - meets, ends - meets)
-        states = integrate(pair, start, at, first=1e-4)
+        states = bulirsch_stoer(pair, start, at, first=1e-4)
         place[here], speed[here] = x, v
         place[here, ball : ball + 2] = states[:-1, :2]
         speed[here, ball : ball + 2] = states[:-1, 2:]
@@ -207,7 +207,7 @@ def _back(integrator: Integrator, length: float, phase: float) -> float:
     """The restitution where a contact lasts `length` steps and begins at `phase` of one."""
     timestep = CONTACT / length
     model = compiled(BOUNCE, integrator, timestep)
-    data = begun(problems()[0], model)
+    data = initial_data(problems()[0], model)
     data.qpos[0] = GAP - SPEED * timestep * (2 + phase)
     advance(model, data, 3 * math.ceil(length) + 8)
     return -float(data.qvel[0]) / SPEED
@@ -218,14 +218,14 @@ def passed_on(integrator: Integrator, steps: int) -> float:
     one = problems()[1]
     timestep = CONTACT / steps
     model = compiled(CRADLE, integrator, timestep)
-    data = begun(one, model)
+    data = initial_data(one, model)
     advance(model, data, round(0.13 / timestep))
     return float(data.qvel[2])
 
 
-def _restitutions() -> tuple[Figure, ...]:
+def _restitutions() -> tuple[ScalarCheck, ...]:
     return tuple(
-        Figure(
+        ScalarCheck(
             f"restitution, {steps} to {steps + 1} steps in a contact, at worst",
             "",
             lambda _: 1.0,
@@ -254,7 +254,7 @@ def problems() -> tuple[Problem, ...]:
                 "ode", "Bulirsch–Stoer until the force ends", bounce_integrated, floor=1e-12
             ),
             timesteps=tuple(0.01 / n for n in (16, 32, 64, 128, 256, 512)),
-            figures=_restitutions(),
+            checks=_restitutions(),
             smooth=False,
             note="an impact begins within a step: no order is to be expected",
         ),
@@ -273,8 +273,8 @@ def problems() -> tuple[Problem, ...]:
                 "ode", "from contact to contact, Bulirsch–Stoer", cradle_integrated, floor=1e-12
             ),
             timesteps=tuple(0.01 / n for n in (16, 32, 64, 128, 256, 512)),
-            figures=(
-                Figure(
+            checks=(
+                ScalarCheck(
                     "velocity of the last ball, 20 steps in a contact",
                     "m/s",
                     lambda _: SPEED,

@@ -16,15 +16,15 @@ from typing import Literal
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 
@@ -62,7 +62,7 @@ def mjcf(shape: str, slope: float, across: bool, cone: Cone, friction: float) ->
 def acceleration(text: str, integrator: Integrator) -> float:
     """Along the slope, m/s²: from 0.5 s, when the contact has settled, to 1 s, at 1 ms."""
     model = compiled(text, integrator, _STEP)
-    data = begun(_sliding("elliptic", False), model)
+    data = initial_data(_sliding("elliptic", False), model)
     advance(model, data, round(0.5 / _STEP))
     before = math.hypot(data.qvel[0], data.qvel[1])
     advance(model, data, round(0.5 / _STEP))
@@ -72,7 +72,7 @@ def acceleration(text: str, integrator: Integrator) -> float:
 def creep(text: str, integrator: Integrator) -> float:
     """The velocity at which a block slips that should stick, m/s: after two seconds at 1 ms."""
     model = compiled(text, integrator, _STEP)
-    data = begun(_sliding("elliptic", False), model)
+    data = initial_data(_sliding("elliptic", False), model)
     advance(model, data, round(2.0 / _STEP))
     return math.hypot(data.qvel[0], data.qvel[1])
 
@@ -107,7 +107,7 @@ def _integrated(force: float, inertia: float, turn: float, across: bool, times: 
         speed = root * math.sqrt(2 / inertia)
         return np.array([speed, force * math.sqrt(2 / inertia) / 2])
 
-    states = integrate(rate, np.zeros(2), times)
+    states = bulirsch_stoer(rate, np.zeros(2), times)
     return _as_motion(states[:, 0], states[:, 1] * math.sqrt(2 / inertia), turn, across)
 
 
@@ -162,8 +162,8 @@ def _sliding(cone: Cone, across: bool) -> Problem:
         reference=reference,
         second=second,
         timesteps=_LADDER,
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "acceleration when sliding, from 0.5 s to 1 s at 1 ms",
                 "m/s²",
                 lambda _: pull,
@@ -178,10 +178,10 @@ def _sliding(cone: Cone, across: bool) -> Problem:
     )
 
 
-def _blunted(text: str) -> Figure:
+def _blunted(text: str) -> ScalarCheck:
     """Half-way between the axes |f₁| + |f₂| ≤ μ f leaves μ/√2."""
     pull = GRAVITY * (math.sin(SLIDING) - FRICTION / math.sqrt(2) * math.cos(SLIDING))
-    return Figure(
+    return ScalarCheck(
         "the same, against a pyramid's friction",
         "m/s²",
         lambda _: pull,
@@ -206,8 +206,8 @@ def _rolling(cone: Cone) -> Problem:
         reference=reference,
         second=second,
         timesteps=_LADDER,
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "acceleration when rolling, from 0.5 s to 1 s at 1 ms",
                 "m/s²",
                 lambda _: pull,
@@ -236,8 +236,8 @@ def _sticking(cone: Cone) -> Problem:
         reference=reference,
         second=second,
         timesteps=_LADDER,
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "creep after 2 s at 1 ms",
                 "m/s",
                 lambda _: 0.0,

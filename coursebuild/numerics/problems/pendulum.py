@@ -17,10 +17,10 @@ from typing import Literal
 import numpy as np
 
 from coursebuild.numerics.elliptic import jacobi
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario
 from coursebuild.numerics.problems.common import motion_without_attitude
-from coursebuild.numerics.rotation import from_axis_angle
+from mjcourse.spatial import axis_angle_to_quat
 
 GRAVITY, LENGTH, MASS, INERTIA = 9.81, 1.0, 1.0, 0.01
 """m/s², m, kg, and kg m² about the centre of mass."""
@@ -66,7 +66,7 @@ def integrated(begin: float, times: Array) -> tuple[Array, Array]:
     def rate(state: State) -> State:
         return np.array([state[1], -(RATE**2) * math.sin(state[0])])
 
-    states = integrate(rate, np.array([begin, 0.0]), times)
+    states = bulirsch_stoer(rate, np.array([begin, 0.0]), times)
     return states[:, 0], states[:, 1]
 
 
@@ -77,7 +77,7 @@ def _motion(
         angle, rate = form(begin, times)
         if kind == "hinge":
             return motion_without_attitude(times, angle[:, None], rate[:, None])
-        attitude = from_axis_angle(_AXIS, angle)[:, None]
+        attitude = axis_angle_to_quat(_AXIS, angle)[:, None]
         turning = rate[:, None] * _AXIS
         if kind == "ball":
             return Motion(times, np.empty((len(times), 0)), attitude, turning)

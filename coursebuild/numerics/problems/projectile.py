@@ -10,15 +10,15 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import NO_CONTACT
@@ -61,7 +61,7 @@ def integrated(times: Array) -> Motion:
     def rate(state: State) -> State:
         return np.concatenate([state[3:], [0.0, 0.0, -GRAVITY]])
 
-    states = integrate(rate, np.array([0.0, 0.0, 0.0, *LAUNCH]), times)
+    states = bulirsch_stoer(rate, np.array([0.0, 0.0, 0.0, *LAUNCH]), times)
     return _motion(times, states[:, :3], states[:, 3:])
 
 
@@ -69,7 +69,7 @@ def fall_error(integrator: Integrator) -> float:
     """Error of the height after a second at 10 ms, m: simulated less exact."""
     one = problem()
     model = compiled(MJCF, integrator, _STEP)
-    data = begun(one, model)
+    data = initial_data(one, model)
     advance(model, data, round(one.scenario.duration / _STEP))
     mujoco.mj_forward(model, data)
     exact = parabola(np.array([one.scenario.duration])).position[0, 2]
@@ -95,8 +95,8 @@ def problem() -> Problem:
         second=Reference("ode", "Bulirsch–Stoer", integrated, floor=1e-14),
         timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160)),
         energy_conserved=True,
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "error of the height after 1 s at 10 ms", "m", exact_error, fall_error, "−gTh/2"
             ),
         ),

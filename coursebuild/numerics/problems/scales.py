@@ -10,15 +10,15 @@ import math
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
@@ -28,7 +28,7 @@ from coursebuild.numerics.problems.common import (
     motion_without_attitude,
 )
 from coursebuild.numerics.problems.tops import FreeTop
-from coursebuild.numerics.rotation import from_axis_angle
+from mjcourse.spatial import axis_angle_to_quat
 
 EDGE, DENSITY = 1e-3, 1000.0
 """m and kg/m³."""
@@ -113,7 +113,7 @@ def steady(times: Array) -> Motion:
     omega = np.array(_TURN)
     rate = float(np.linalg.norm(omega))
     still = np.zeros((len(times), 3))
-    attitude = from_axis_angle(omega / rate, rate * times)
+    attitude = axis_angle_to_quat(omega / rate, rate * times)
     velocity = np.concatenate([still, still + omega], axis=1)
     return Motion(times, still, attitude[:, None], velocity)
 
@@ -129,7 +129,7 @@ def sunk(integrator: Integrator) -> float:
 def crawled(integrator: Integrator, timestep: float) -> float:
     """How far the distant body went in a second, m."""
     model = compiled(DISTANT, integrator, timestep)
-    data = begun(problems()[1], model)
+    data = initial_data(problems()[1], model)
     advance(model, data, round(1.0 / timestep))
     return float(data.qpos[0] - FAR)
 
@@ -144,7 +144,7 @@ def _line_integrated(times: Array) -> Motion:
     def rate(state: State) -> State:
         return np.array([state[1], 0.0])
 
-    states = integrate(rate, np.array([FAR, CRAWL]), times)
+    states = bulirsch_stoer(rate, np.array([FAR, CRAWL]), times)
     return motion_without_attitude(times, states[:, :1], states[:, 1:])
 
 
@@ -171,8 +171,8 @@ def _cube() -> Problem:
             floor=1e-13,
         ),
         timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "how deep it rests in the floor, in edges",
                 "",
                 lambda _: 0.0,
@@ -200,8 +200,8 @@ def _distant() -> Problem:
         second=Reference("ode", "Bulirsch–Stoer", _line_integrated, floor=spacing),
         agreement=10 * spacing,
         timesteps=tuple(0.1 / n for n in (10, 100, 1000)),
-        figures=tuple(
-            Figure(
+        checks=tuple(
+            ScalarCheck(
                 f"distance gone in 1 s at 1 mm/s, {timestep:g} s a step",
                 "m",
                 lambda _: CRAWL,
@@ -237,8 +237,8 @@ def _plate() -> Problem:
             floor=1e-13,
         ),
         timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "axial moment of the plate with four digits, after balanceinertia",
                 "kg m²",
                 lambda _: PLATE_MOMENTS[2],

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import motion_without_attitude
@@ -84,7 +84,7 @@ def _resting(found: Array, times: Array) -> Motion:
 def _measured(integrator: Integrator, ratio: float) -> float:
     one = _problem(ratio)
     model = compiled(one.mjcf, integrator, 1e-3)
-    data = begun(one, model)
+    data = initial_data(one, model)
     data.qpos[:] = 0
     advance(model, data, round(_SETTLED / 1e-3))
     # Not what the contacts say, which the collision of balls that passed each other would hide.
@@ -94,7 +94,7 @@ def _measured(integrator: Integrator, ratio: float) -> float:
 def _speed(integrator: Integrator, ratio: float) -> float:
     one = _problem(ratio)
     model = compiled(one.mjcf, integrator, 1e-3)
-    data = begun(one, model)
+    data = initial_data(one, model)
     data.qpos[:] = 0
     advance(model, data, round(_SETTLED / 1e-3))
     return float(np.max(np.abs(data.qvel)))
@@ -128,15 +128,15 @@ def _problem(ratio: float) -> Problem:
             floor=1e-15,
         ),
         timesteps=(2e-3, 1e-3, 5e-4),
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
                 "m",
                 lambda _: float(rest.sum()),
                 lambda integrator: _measured(integrator, ratio),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
-            Figure(
+            ScalarCheck(
                 "velocity that is left then",
                 "m/s",
                 lambda _: 0.0,

@@ -15,20 +15,20 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Limit,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import NO_CONTACT, NO_GRAVITY, free_body_motion
 from coursebuild.numerics.problems.damped_spring import rk4_factor
-from coursebuild.numerics.rotation import from_axis_angle, multiply
+from mjcourse.spatial import axis_angle_to_quat, quat_mul
 
 _STEPS = 200
 _AXIAL = np.array([0.0, 0.0, 1.0])
@@ -62,8 +62,8 @@ class FreeTop(Struct, frozen=True):
         omega = np.stack([x * cosine - y * sine, x * sine + y * cosine, np.full_like(turn, z)], 1)
         momentum = self.inertia * np.array(self.omega)
         size = float(np.linalg.norm(momentum))
-        about = from_axis_angle(momentum / size, size / self.transverse * times)
-        attitude = multiply(about, from_axis_angle(_AXIAL, -turn))
+        about = axis_angle_to_quat(momentum / size, size / self.transverse * times)
+        attitude = quat_mul(about, axis_angle_to_quat(_AXIAL, -turn))
         still = np.zeros((len(times), 3))
         return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))
 
@@ -121,7 +121,7 @@ def measured_growth(name: str, integrator: Integrator, z: float) -> float:
     """The mean growth over some steps, by which the first and the last velocity differ."""
     top = TOPS[name]
     model = compiled(mjcf(top), integrator, z / abs(top.rate))
-    data = begun(_problem(name, top), model)
+    data = initial_data(_problem(name, top), model)
     first = math.hypot(data.qvel[3], data.qvel[4])
     advance(model, data, _STEPS)
     return float((math.hypot(data.qvel[3], data.qvel[4]) / first) ** (1 / _STEPS))
@@ -132,8 +132,8 @@ def problems() -> tuple[Problem, ...]:
     return tuple(_problem(name, top) for name, top in TOPS.items())
 
 
-def _figure(name: str, z: float) -> Figure:
-    return Figure(
+def _figure(name: str, z: float) -> ScalarCheck:
+    return ScalarCheck(
         f"growth of the transverse velocity in a step, hΩ = {z:g}",
         "",
         lambda integrator: transverse_growth(integrator, z),
@@ -159,7 +159,7 @@ def _problem(name: str, top: FreeTop) -> Problem:
             floor=1e-12,
         ),
         timesteps=tuple(0.05 / n for n in (40, 80, 160, 320, 640, 1280)),
-        figures=tuple(_figure(name, z) for z in (0.03, 0.1, 0.3)),
+        checks=tuple(_figure(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
         search=(1e-2 / abs(top.rate), 1e1 / abs(top.rate)),
         energy_conserved=True,

@@ -21,15 +21,15 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, begun, compiled
-from coursebuild.numerics.extrapolation import State, integrate
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import motion_without_attitude
@@ -78,7 +78,7 @@ def integrated(times: Array) -> Motion:
     place[flying, 0], speed[flying, 0] = SPEED * times[flying], SPEED
     if flying.all():
         return motion_without_attitude(times, place, speed)
-    states = integrate(_rate, start, times[~flying] - begin, 1e-14, columns=4, first=1e-6)
+    states = bulirsch_stoer(_rate, start, times[~flying] - begin, 1e-14, columns=4, first=1e-6)
     place[~flying], speed[~flying] = states[:, :3], states[:, 3:]
     return motion_without_attitude(times, place, speed)
 
@@ -162,13 +162,13 @@ def last_velocity(integrator: Integrator, ball: int, steps: int = 80) -> float:
     one = problem()
     timestep = CONTACT / steps
     model = compiled(one.mjcf, integrator, timestep)
-    data = begun(one, model)
+    data = initial_data(one, model)
     advance(model, data, round(one.scenario.duration / timestep))
     return float(data.qvel[ball])
 
 
-def _figure(ball: int, name: str) -> Figure:
-    return Figure(
+def _figure(ball: int, name: str) -> ScalarCheck:
+    return ScalarCheck(
         f"velocity of the {name} ball, 80 steps in a contact",
         "m/s",
         lambda _: float(integrated(np.array([0.06])).velocity[0, ball]),
@@ -194,7 +194,7 @@ def problem() -> Problem:
             "closed", "from event to event, by eigenvectors", from_event_to_event, floor=1e-12
         ),
         timesteps=tuple(0.002 / n for n in (16, 32, 64, 128)),
-        figures=(_figure(0, "first"), _figure(1, "middle"), _figure(2, "last")),
+        checks=(_figure(0, "first"), _figure(1, "middle"), _figure(2, "last")),
         smooth=False,
         note="all contacts act at once: the last ball does not take over the whole velocity",
     )

@@ -16,19 +16,19 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.elliptic import complete_k, jacobi
-from coursebuild.numerics.engine import advance, begun, compiled
+from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     Array,
-    Figure,
     Integrator,
     Motion,
     Problem,
     Reference,
+    ScalarCheck,
     Scenario,
 )
 from coursebuild.numerics.problems.common import NO_CONTACT, NO_GRAVITY, free_body_motion
-from coursebuild.numerics.quadrature import cumulative
-from coursebuild.numerics.rotation import from_matrix
+from mjcourse.spatial import mat_to_quat
 
 HALF_SIZES = (0.1, 0.05, 0.02)
 MASS = 1.0
@@ -111,7 +111,7 @@ class Tumbling(Struct, frozen=True):
         angles = self._precession(times)
         start = self._frame(np.zeros(1), np.zeros(1))[0]
         matrices: Array = start.T @ self._frame(times, angles)
-        return from_matrix(matrices)
+        return mat_to_quat(matrices)
 
     def _frame(self, times: Array, angles: Array) -> Array:
         """Rotation matrices (n, 3, 3) from the body to a frame whose z is the angular momentum.
@@ -143,7 +143,7 @@ class Tumbling(Struct, frozen=True):
             found: Array = self.momentum * (second + third) / (i2 * second + i3 * third)
             return found
 
-        return cumulative(speed, times, 0.5 / self.rate)
+        return cumulative_integral(speed, times, 0.5 / self.rate)
 
     def motion(self, times: Array) -> Motion:
         """Everything, at the times (n,) in s."""
@@ -156,7 +156,7 @@ def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e
     """When a simulation first has ω₂ = 0, s: by Hermite's cubic within the step that crosses."""
     one = _begun_with(nudge)
     model = compiled(one.mjcf, integrator, timestep)
-    data = begun(one, model)
+    data = initial_data(one, model)
     mujoco.mj_forward(model, data)
     before, slope = float(data.qvel[4]), float(data.qacc[4])
     for step in range(round(4 * Tumbling(nudge, SPIN).first_crossing / timestep)):
@@ -188,7 +188,7 @@ def kinetic_drift(integrator: Integrator) -> float:
     """
     one = _begun_with(1e-3)
     model = compiled(one.mjcf, integrator, 2e-3)
-    data = begun(one, model)
+    data = initial_data(one, model)
     advance(model, data, 10_000)
     inertia = moments()
     final = float(inertia @ np.array(data.qvel[3:]) ** 2)
@@ -231,8 +231,8 @@ def problem() -> Problem:
             floor=1e-12,
         ),
         timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160, 320, 640)),
-        figures=(
-            Figure(
+        checks=(
+            ScalarCheck(
                 "change of the kinetic energy over 20 s at 2 ms",
                 "%",
                 lambda _: 0.0,
@@ -248,8 +248,8 @@ def problem() -> Problem:
     )
 
 
-def _flip(nudge: float) -> Figure:
-    return Figure(
+def _flip(nudge: float) -> ScalarCheck:
+    return ScalarCheck(
         f"flip interval after a nudge of {nudge:g} rad/s, at 2 ms",
         "s",
         lambda _: Tumbling(nudge, SPIN).flip_interval,

@@ -15,7 +15,7 @@ from itertools import islice
 from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
 from coursebuild.numerics.pruning.edits import set_attributes
 from coursebuild.numerics.pruning.markup import place_of
-from coursebuild.numerics.pruning.reach import Pair, each_pair, separate
+from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
 
 _OFF = (("contact", "disable"),)
 MOST_PAIRS = 100_000

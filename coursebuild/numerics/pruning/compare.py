@@ -20,9 +20,9 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Judgement, Peaks, judge, observe, peaks
-from coursebuild.numerics.engine import advance
-from coursebuild.numerics.pruning.cases import Case, begin, command
+from coursebuild.numerics.detector import Judgement, Peaks, judge, peaks
+from coursebuild.numerics.engine import advance, initial_data
+from coursebuild.numerics.pruning.cases import Case
 from coursebuild.numerics.pruning.mapping import Mapping, transfer
 from coursebuild.numerics.scene import thickness
 
@@ -72,18 +72,18 @@ def compare(base: Any, changed: Any, mapping: Mapping, cases: Sequence[Case]) ->
 
 
 def _both(base: Any, changed: Any, mapping: Mapping, case: Case) -> tuple[Any, Any]:
-    data = begin(base, case)
+    data = initial_data(case.setup, base)
     other = mujoco.MjData(changed)
     transfer(base, data, mapping, changed, other)
     return data, other
 
 
 def _command(case: Case, step: int, data: Any, other: Any, mapping: Mapping | None) -> None:
-    given = command(case, step)
-    if given is not None:
+    given = case.command(step)
+    if given:
         data.ctrl[:] = given
         if mapping is not None:
-            other.ctrl[:] = given[mapping.ctrl]
+            other.ctrl[:] = data.ctrl[mapping.ctrl]
 
 
 def _same_bits(base: Any, changed: Any, mapping: Mapping, case: Case) -> bool:
@@ -97,7 +97,7 @@ def _same_bits(base: Any, changed: Any, mapping: Mapping, case: Case) -> bool:
             return False
         if step % _CONTACTS == 0 and not _equal_contacts(base, data, changed, other, mapping):
             return False
-    return judge(observe(changed, other, end)).ok
+    return judge(changed, other, end).ok
 
 
 def _equal_bits(data: Any, other: Any, mapping: Mapping) -> bool:
@@ -149,7 +149,7 @@ def _shots(base: Any, changed: Any, mapping: Mapping, case: Case) -> float:
             worst = max(worst, _apart(data, other, mapping))
             if not math.isfinite(worst):
                 return math.inf
-    if not judge(observe(changed, other, float(other.time))).ok:
+    if not judge(changed, other, float(other.time)).ok:
         return math.inf
     return worst
 
@@ -188,7 +188,7 @@ class Seen(Struct, frozen=True, eq=False):
 def watch(model: Any, case: Case) -> Seen:
     """Run the whole model once."""
     quiet(model)
-    data = begin(model, case)
+    data = initial_data(case.setup, model)
     start, made = float(data.time), 0
     mujoco.mj_kinematics(model, data)
     low, high = data.xipos.copy(), data.xipos.copy()
@@ -210,5 +210,5 @@ def watch(model: Any, case: Case) -> Seen:
         if not seen.finite:
             break
     end = start + made * float(model.opt.timestep)
-    judgement = judge(observe(model, data, end, seen=seen))
+    judgement = judge(model, data, end, seen)
     return Seen(case, judgement, frozenset(touching), constrained, low, high, iterations)

@@ -109,7 +109,7 @@ def _driven(look: Look) -> set[int]:
     for key in range(model.nkey):
         found |= set(np.nonzero(model.key_ctrl[key])[0].tolist())
     for seen in look.seen:
-        for row in seen.case.controls:
+        for row in seen.case.scenario.controls:
             found |= set(np.nonzero(np.array(row))[0].tolist())
     return found
 

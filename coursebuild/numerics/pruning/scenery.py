@@ -23,7 +23,7 @@ import numpy as np
 
 from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item
 from coursebuild.numerics.pruning.markup import Element, place_of
-from coursebuild.numerics.pruning.reach import moving_ball
+from coursebuild.numerics.pruning.reachability import moving_ball
 from coursebuild.numerics.pruning.trees import Box, References, Trees, Vector
 
 REGIONS = 5.0

@@ -15,7 +15,7 @@ import mujoco
 
 from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
 from coursebuild.numerics.pruning.edits import set_attributes
-from coursebuild.numerics.pruning.reach import each_pair
+from coursebuild.numerics.pruning.reachability import each_pair
 
 _SOLVERS = {0: "PGS", 1: "CG", 2: "Newton"}
 _TOLERANCE = 1e-6

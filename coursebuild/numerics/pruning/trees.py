@@ -104,9 +104,9 @@ class Trees:
     def _thrown(self) -> set[int]:
         """Those that a scenario sets in motion."""
         found: set[int] = set()
-        for case in (seen.case for seen in self.look.seen):
+        for case in (seen.case.scenario for seen in self.look.seen):
             velocity = np.array(case.qvel)
-            if not case.qvel and case.keyframe is not None:
+            if not case.qvel and case.keyframe >= 0:
                 velocity = self.model.key_qvel[case.keyframe]
             found |= set(self.of_dof[np.nonzero(velocity)[0]].tolist())
         return found

@@ -6,20 +6,29 @@ Entry point: `Trials`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Any
 
 import mujoco
 from msgspec import Struct
 
+from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.pruning.candidates import Item, change
 from coursebuild.numerics.pruning.cases import Case
 from coursebuild.numerics.pruning.compare import Comparison, compare
 from coursebuild.numerics.pruning.edits import Edit
 from coursebuild.numerics.pruning.mapping import Mapping as Left
-from coursebuild.numerics.pruning.mapping import fits, mapping_without
+from coursebuild.numerics.pruning.mapping import fits, mapping_without, transfer
 from coursebuild.numerics.pruning.model_text import ModelText, saved
-from coursebuild.numerics.pruning.timing import Clock, Ratio, time_ratio
 from coursebuild.numerics.reports.diet import Saving
+from coursebuild.numerics.timing import (
+    STATE,
+    Clock,
+    Stepped,
+    full_state,
+    moments,
+    time_ratio,
+)
 
 
 class Trial(Struct, frozen=True, eq=False):
@@ -29,6 +38,20 @@ class Trial(Struct, frozen=True, eq=False):
     model: Any
     left: Left
     result: Comparison
+
+
+class Ratio(Struct, frozen=True):
+    """How much faster a model is than another."""
+
+    value: float
+    """Over 1 where it is faster."""
+    spread: float
+    """Its standard error, relative."""
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is another than 1 beyond what the measurement can tell."""
+        return abs(self.value - 1.0) > max(0.03, 2 * self.spread)
 
 
 class NotTriedError(Exception):
@@ -86,10 +109,25 @@ class Trials:
     def ratio(self, model: Any, left: Left) -> Ratio | None:
         """Time of the original over that of a changed model; `None` where it cannot be told."""
         whole = self.scene.model
+        data, other = mujoco.MjData(whole), mujoco.MjData(model)
+        states = []
         try:
-            return time_ratio(whole, model, left, self.cases, self.clock, quick=self.quick)
+            for state in self._states:
+                mujoco.mj_setState(whole, data, state, STATE)
+                transfer(whole, data, left, model, other)
+                states.append(full_state(model, other))
+            one, two = Stepped(whole, data, self._states), Stepped(model, other, states)
+            found = time_ratio(one, two, self.clock, quick=self.quick)
         except (ValueError, mujoco.FatalError):
             return None
+        return None if found is None else Ratio(found.ratio, found.uncertainty)
+
+    @cached_property
+    def _states(self) -> list[Any]:
+        """States of the original, from which steps are timed."""
+        model = self.scene.model
+        setups = [case.setup for case in self.cases]
+        return [s for one in setups for s in moments(model, initial_data(one, model), one)]
 
     def saving(self, trial: Trial, ratio: Ratio | None) -> Saving:
         """What a change saves, in time and bytes."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from coursebuild.numerics.reports.bench import OrderRow
+
 
 class BoundaryLine(Struct, frozen=True):
     """The largest stable timestep of an integrator."""
@@ -71,15 +73,6 @@ class ErrorLine(Struct, frozen=True):
     """Whether constraints were softened because the timestep is long: it is another model."""
 
 
-class OrderLine(Struct, frozen=True):
-    """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
-
-    integrator: str
-    position: float | None
-    attitude: float | None
-    velocity: float | None
-
-
 class ReferenceLine(Struct, frozen=True):
     """What the errors were measured against."""
 
@@ -105,5 +98,5 @@ class CaseReport(Struct, frozen=True):
     reference: ReferenceLine | None
     boundaries: tuple[BoundaryLine, ...]
     figures: tuple[FigureLine, ...]
-    orders: tuple[OrderLine, ...]
+    orders: tuple[OrderRow, ...]
     errors: tuple[ErrorLine, ...]

@@ -55,7 +55,7 @@ class Saving(Struct, frozen=True):
     time: float | None
     """Time of the model as it is over that of the changed one; `None` where it was not measured."""
     spread: float | None
-    """How far repeated ratios lie apart: half of their middle half, relative."""
+    """The standard error of the ratio, relative."""
     certain: bool
     """Whether the ratio is another than 1 beyond what can be told."""
     memory: int

@@ -10,17 +10,19 @@ import numpy as np
 import pytest
 
 from coursebuild.model.scenarios import Declarations
-from coursebuild.numerics.pruning.cases import Case, begin, cases, command
+from coursebuild.numerics.engine import initial_data
+from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pruning.cases import Case, cases
 from coursebuild.numerics.pruning.compare import TOLERANCE, compare, watch
 from coursebuild.numerics.pruning.mapping import Gone, Mapping, fits, mapping_without, transfer
-from coursebuild.numerics.pruning.timing import time_ratio
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
   </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
-CHAOS = Case("go", 0, (), (), 15_000, (), 0, False)
+CHAOS = Case("go", Scenario(30.0, 0.1, keyframe=0), 15_000)
+STILL = Scenario(1.0, 0.1)
 
 
 def double(mass: float = 1.0) -> Any:
@@ -38,7 +40,7 @@ def test_chaos_is_no_difference() -> None:
     assert not found.identical and found.equal and 0 < found.difference < 1e-11
     ends = []
     for model in (one, other):
-        data = begin(model, CHAOS)
+        data = initial_data(CHAOS.setup, model)
         mujoco.mj_step(model, data, CHAOS.steps)
         ends.append(data.qpos.copy())
     assert np.max(np.abs(ends[0] - ends[1])) > 1e-3
@@ -66,7 +68,7 @@ def test_contacts_count_though_nothing_moves() -> None:
     one = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     other = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     other.geom_contype[0] = other.geom_conaffinity[0] = 0
-    case = Case("rest", None, (), (), 1, (), 0, False)
+    case = Case("rest", STILL, 1)
     assert compare(one, one, same(one), [case]).identical
     found = compare(one, other, same(one), [case])
     assert not found.identical
@@ -76,10 +78,10 @@ def test_what_a_run_shows() -> None:
     text = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .3"><freejoint/>
       <geom size=".1"/></body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
-    seen = watch(model, Case("fall", None, (), (), 500, (), 0, False))
+    seen = watch(model, Case("fall", STILL, 500))
     assert seen.judgement.ok and seen.touching == {(0, 1)} and seen.constrained
     assert seen.high[1, 2] == pytest.approx(0.3) and seen.low[1, 2] < 0.11
-    seen = watch(model, Case("fall", None, (), (), 50, (), 0, False))
+    seen = watch(model, Case("fall", STILL, 50))
     assert not seen.touching and not seen.constrained
 
 
@@ -138,9 +140,9 @@ def test_scenarios_as_the_author_wrote_them() -> None:
 controls = [[1, 0, 0], [2, 0, 0]]\nqvel = [0, 0, 0, 0, 0, 0, 0, 0, 0, 5]\n"""
     (case,) = cases(model, declared(text), quick=False)
     assert (case.name, case.steps, case.hold, case.declared) == ("push", 500, 100, True)
-    given = {step: command(case, step) for step in range(case.steps)}
-    assert [(step, row[0]) for step, row in given.items() if row is not None] == [(0, 1), (100, 2)]
-    assert begin(model, case).qvel[-1] == 5
+    given = {step: case.command(step) for step in range(case.steps)}
+    assert [(step, row[0]) for step, row in given.items() if row] == [(0, 1), (100, 2)]
+    assert case.scenario.qvel[-1] == 5
     (short,) = cases(model, declared(text), quick=True)
     assert short.steps == 250
 
@@ -149,24 +151,4 @@ def test_scenarios_where_none_is_written() -> None:
     names = [case.name for case in cases(double(), None, quick=True)]
     assert names == ["keyframe-0"]
     (still,) = cases(mujoco.MjModel.from_xml_string("<mujoco/>"), None, quick=True)
-    assert still.keyframe is None
-
-
-def test_a_ratio_of_times(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a clock that goes by the steps made, three times as fast for one model, noise and all."""
-    one, other = double(), double(2.0)
-    now = 0.0
-    noise = np.random.default_rng(0)
-
-    def step(model: Any, data: Any, nstep: int = 1) -> None:
-        nonlocal now
-        now += nstep * (3e-6 if model is one else 1e-6) * noise.uniform(1.0, 1.02)
-
-    monkeypatch.setattr(mujoco, "mj_step", step)
-    ratio = time_ratio(one, other, same(one), [CHAOS], lambda: now, quick=False)
-    assert ratio is not None and ratio.certain
-    assert ratio.value == pytest.approx(3.0, rel=0.02) and ratio.spread < 0.02
-    equal = time_ratio(one, one, same(one), [CHAOS], lambda: now, quick=True)
-    assert equal is not None and not equal.certain
-    assert time_ratio(one, other, same(one), [CHAOS], lambda: 0.0, quick=True) is None
-    assert time_ratio(one, other, same(one), [], lambda: now, quick=True) is None
+    assert (still.scenario.keyframe, still.steps) == (-1, 10)

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from coursebuild.numerics.pruning.ablation import Survey
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError
-from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet import IDENTICAL
 from support.surveys import PATH, fixed, found, names, opened, tried
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.pruning.reach import possible_pairs, separate
+from coursebuild.numerics.pruning.reachability import possible_pairs, separate
 
 
 def compiled(body: str, *, option: str = "", rest: str = "", root: str = "") -> mujoco.MjModel:

@@ -29,8 +29,7 @@ from coursebuild.numerics.pruning.motion import idle
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.pruning.scenery import scenery
 from coursebuild.numerics.pruning.settings import settings
-from coursebuild.numerics.pruning.timing import Clock, Ratio
-from coursebuild.numerics.pruning.trials import NotTriedError, Trial, Trials
+from coursebuild.numerics.pruning.trials import NotTriedError, Ratio, Trial, Trials
 from coursebuild.numerics.pruning.unused import unused
 from coursebuild.numerics.reports.diet import (
     CHANGES,
@@ -43,6 +42,7 @@ from coursebuild.numerics.reports.diet import (
 )
 from coursebuild.numerics.reports.diet import Finding as Finding
 from coursebuild.numerics.reports.diet import Tried as Tried
+from coursebuild.numerics.timing import Clock
 
 NAMES = 6
 """Names that a message lists."""
@@ -117,8 +117,7 @@ class _Surveyor:
         good = tuple(one for one in self.seen if one.judgement.ok)
         declared = any(one.case.declared for one in self.seen)
         model = self.scene.model
-        used = {one.case.keyframe for one in self.seen} - {None}
-        keyframes = frozenset(k for k in used if k is not None)
+        keyframes = frozenset({one.case.scenario.keyframe for one in self.seen} - {-1})
         look = Look(
             self.scene,
             self.order.readers,

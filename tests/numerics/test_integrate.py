@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from coursebuild.numerics.extrapolation import NoConvergenceError, State, integrate
-from coursebuild.numerics.quadrature import cumulative
+from coursebuild.numerics.integrate import (
+    NoConvergenceError,
+    State,
+    bulirsch_stoer,
+    cumulative_integral,
+    gauss_collocation,
+)
+from coursebuild.numerics.problem import Array
 
 TIMES = np.linspace(0.25, 20.0, 80)
 
 
 def test_a_circle() -> None:
-    found = integrate(lambda y: np.array([y[1], -y[0]]), np.array([1.0, 0.0]), TIMES)
+    found = bulirsch_stoer(lambda y: np.array([y[1], -y[0]]), np.array([1.0, 0.0]), TIMES)
     assert np.max(np.abs(found - np.stack([np.cos(TIMES), -np.sin(TIMES)], axis=1))) < 5e-14
 
 
@@ -26,7 +32,7 @@ def test_an_orbit_of_high_eccentricity_agrees_with_another_method() -> None:
         return np.array([y[2], y[3], -y[0] / cube, -y[1] / cube])
 
     start = np.array([0.2, 0.0, 0.0, 3.0])  # e = 0.8
-    found = integrate(rate, start, TIMES)
+    found = bulirsch_stoer(rate, start, TIMES)
     other = solve_ivp(
         lambda _, y: rate(y),
         (0, 20),
@@ -45,20 +51,47 @@ def test_an_orbit_of_high_eccentricity_agrees_with_another_method() -> None:
 def test_decimal_numbers_have_the_digits_that_were_asked_for() -> None:
     with decimal.localcontext(decimal.Context(prec=40)):
         start = np.array([Decimal(1)], dtype=object)
-        found = integrate(lambda y: -y, start, np.array([1.0, 2.0]), 1e-30, columns=12)
+        found = bulirsch_stoer(lambda y: -y, start, np.array([1.0, 2.0]), 1e-30, columns=12)
         for row, time in zip(found, (1, 2), strict=True):
             assert abs(row[0] - Decimal(-time).exp()) < Decimal("1e-29")
 
 
 def test_a_solution_that_ends_is_not_passed() -> None:
-    found = integrate(lambda y: y * y, np.array([1.0]), np.array([0.5, 0.9]))
+    found = bulirsch_stoer(lambda y: y * y, np.array([1.0]), np.array([0.5, 0.9]))
     assert np.max(np.abs(found[:, 0] / [2.0, 10.0] - 1)) < 1e-13
     with pytest.raises(NoConvergenceError, match="no step is small enough at 1 s"):
-        integrate(lambda y: y * y, np.array([1.0]), np.array([2.0]))
+        bulirsch_stoer(lambda y: y * y, np.array([1.0]), np.array([2.0]))
 
 
 def test_quadrature_to_each_time() -> None:
     times = np.array([0.1, 0.5, 3.0, 3.5])
-    found = cumulative(lambda t: np.exp(-t) * np.sin(9 * t), times, 0.2)
+    found = cumulative_integral(lambda t: np.exp(-t) * np.sin(9 * t), times, 0.2)
     exact = (9 - np.exp(-times) * (np.sin(9 * times) + 9 * np.cos(9 * times))) / 82
     assert np.max(np.abs(found - exact)) < 1e-15
+
+
+# ------------------------------------------------------------------------------------ collocation
+
+
+def test_collocation_of_an_oscillator() -> None:
+    times = np.linspace(0.1, 10.0, 40)
+    found = gauss_collocation(lambda y: np.array([y[1], -9.0 * y[0]]), np.array([1.0, 0.0]), times)
+    exact = np.stack([np.cos(3 * times), -3 * np.sin(3 * times)], axis=1)
+    assert np.max(np.abs(found - exact)) < 1e-13
+
+
+def test_collocation_and_extrapolation_agree_on_kepler() -> None:
+    def rate(y: Array) -> Array:
+        cubed = np.hypot(y[0], y[1]) ** 3
+        return np.array([y[2], y[3], -y[0] / cubed, -y[1] / cubed])
+
+    start, times = np.array([0.4, 0.0, 0.0, 2.0]), np.linspace(0.5, 12.0, 24)
+    apart = gauss_collocation(rate, start, times) - bulirsch_stoer(rate, start, times)
+    assert np.max(np.abs(apart)) < 2e-11
+
+
+def test_collocation_says_where_it_does_not_settle() -> None:
+    with pytest.raises(NoConvergenceError):
+        gauss_collocation(
+            lambda y: np.array([1.0, np.sign(np.sin(50 * y[0]))]), np.zeros(2), np.array([1.0])
+        )

@@ -1,13 +1,18 @@
-"""Pairs of geoms that may touch, and those that do."""
+"""Pairs of geoms that may touch, those that do, and contacts that should stick and creep."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
+import numpy as np
 import pytest
 
+from coursebuild.numerics.contacts import slip, speeds_of, sticking, touched_pairs
+from coursebuild.numerics.engine import States
 from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.scene import Scene, scenes
-from coursebuild.numerics.touching import possible_pairs, touched_pairs
 
 BALLS = """
 <mujoco>
@@ -77,3 +82,49 @@ def test_a_run_that_is_lost_ends() -> None:
     (first, *_) = scenes(wild, None)
     lost = Scene("one", "one", start, (0.1,), 0.1, first.visible, None)
     assert touched_pairs(wild, [lost]) == frozenset()
+
+
+BALL = """\
+<mujoco>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body pos="0 0 0.0999"><freejoint/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def ball() -> tuple[Any, Scene]:
+    model = mujoco.MjModel.from_xml_string(BALL)
+    (scene,) = scenes(model, None)
+    return model, scene
+
+
+def moving(speed: list[float], spin: list[float]) -> States:
+    """A ball on a plane, at three times, with speeds along x and spins about y."""
+    times = np.array([0.1, 0.2, 0.3])
+    qpos = np.tile([0, 0, 0.0999, 1, 0, 0, 0], (3, 1)).astype(float)
+    qvel = np.zeros((3, 6))
+    qvel[:, 0], qvel[:, 4] = speed, spin
+    return States(times, qpos, qvel, np.empty((3, 0)))
+
+
+def test_speeds_are_those_of_the_point_that_touches() -> None:
+    model, scene = ball()
+    found = speeds_of(model, scene, moving([1, 1, 0], [0, 10, 10]))
+    assert [one[0, 1] for one in found] == pytest.approx([1, 0, 1], abs=1e-3)
+    lifted = moving([1, 1, 1], [0, 0, 0])
+    lifted.qpos[:, 2] = 0.5
+    assert speeds_of(model, scene, lifted) == [{}, {}, {}]
+
+
+def test_only_what_sticks_in_the_reference_creeps() -> None:
+    model, scene = ball()
+    rolls = sticking(model, scene, moving([1, 1, 1], [10, 10, 10]))
+    assert rolls == (frozenset({(0, 1)}),) * 3
+    slides = sticking(model, scene, moving([1, 0, 0], [0, 0, 0]))
+    assert slides == (frozenset(), frozenset(), frozenset({(0, 1)}))
+    creeping = moving([0.02, 0.03, 0.04], [0, 0, 0])
+    assert slip(model, scene, creeping, rolls) == pytest.approx(0.009)
+    assert slip(model, scene, creeping, slides) == pytest.approx(0.004)
+    assert slip(model, scene, creeping, (frozenset(),) * 3) == 0.0

@@ -1,6 +1,7 @@
-"""How far contacts creep that should stick.
+"""Which geoms touch in a scene, and how far contacts creep that should stick.
 
-Entry points: `sticking(model, scene, states)`, `slip(model, scene, states, sticks)`.
+Entry points: `touched_pairs(model, scenes)`; `sticking(model, scene, states)` and
+`slip(model, scene, states, sticks)`.
 
 1. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too.
@@ -11,15 +12,14 @@ Entry points: `sticking(model, scene, states)`, `slip(model, scene, states, stic
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import begun
-from coursebuild.numerics.forward import States
-from coursebuild.numerics.pilot import Bounded
-from coursebuild.numerics.problem import Array
+from coursebuild.numerics.engine import States, advance, initial_data
+from coursebuild.numerics.problem import Array, Setup
 from coursebuild.numerics.scene import Scene
 
 Pair: TypeAlias = tuple[int, int]
@@ -27,20 +27,48 @@ Pair: TypeAlias = tuple[int, int]
 Sticks: TypeAlias = tuple[frozenset[Pair], ...]
 """For every interval between two samples, and that before the first, the pairs that stick in it."""
 
-SLOW = 0.01
+_SLOW = 0.01
 """A point that sticks moves slower than this part of the speed of a fall through the model's
 extent."""
 _STILL = 1e-3
 """m/s, where nothing falls."""
 
 
+def touched_pairs(model: Any, scenes: Iterable[Scene]) -> frozenset[Pair]:
+    """Pairs of geoms with a contact that counts, in any scenario, with the model's own setting.
+
+    A run ends where it is lost: what touches after that says nothing.
+    """
+    found: set[Pair] = set()
+    for scene in scenes:
+        found |= _touched(model, scene)
+    return frozenset(found)
+
+
+def _touched(model: Any, scene: Scene) -> set[Pair]:
+    scenario = scene.scenario
+    data = initial_data(Setup(scenario=scenario), model)
+    found: set[Pair] = set()
+    for look in range(len(scenario.times)):
+        if scenario.controls:
+            data.ctrl[:] = scenario.command(look)
+        for _ in range(scenario.steps(scene.own)):
+            before = data.time
+            advance(model, data)
+            if not data.time > before:  # it was lost, and reset
+                return found
+            if data.ncon:
+                geoms = np.sort(data.contact.geom[data.contact.exclude == 0], axis=1)
+                found |= {(int(a), int(b)) for a, b in np.unique(geoms, axis=0) if a >= 0}
+    return found
+
+
 def sticking(model: Any, scene: Scene, states: States) -> Sticks:
     """What sticks in a motion, from sample to sample."""
-    limit = SLOW * math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
-    speeds = speeds_of(model, scene, states)
+    fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
     slow = [
-        frozenset(pair for pair, speed in found.items() if speed < max(limit, _STILL))
-        for found in speeds
+        frozenset(pair for pair, speed in found.items() if speed < max(_SLOW * fall, _STILL))
+        for found in speeds_of(model, scene, states)
     ]
     return tuple(slow[max(0, i - 1)] & slow[i] for i in range(len(slow)))
 
@@ -60,31 +88,31 @@ def slip(model: Any, scene: Scene, states: States, sticks: Sticks) -> float:
 
 def speeds_of(model: Any, scene: Scene, states: States) -> list[dict[Pair, float]]:
     """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
-    data = begun(Bounded(scene.scenario, math.inf, math.inf), model)
+    data = initial_data(Setup(scenario=scene.scenario), model)
     found = []
     for qpos, qvel, act in zip(states.qpos, states.qvel, states.act, strict=True):
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
-        found.append(_touching(model, data))
+        found.append(_speeds(model, data))
     return found
 
 
-def _touching(model: Any, data: Any) -> dict[Pair, float]:
+def _speeds(model: Any, data: Any) -> dict[Pair, float]:
     least: dict[Pair, float] = {}
     for contact in data.contact[: data.ncon]:
         first, second = (int(geom) for geom in contact.geom)
         if first < 0 or second < 0 or contact.dist > 0 or contact.dim < 3:
             continue  # a flex, or not yet touching, or without friction
-        relative = _at(model, data, second, contact.pos) - _at(model, data, first, contact.pos)
+        relative = _velocity(model, data, second, contact.pos)
+        relative = relative - _velocity(model, data, first, contact.pos)
         normal = contact.frame[:3]
         speed = float(np.linalg.norm(relative - normal * (normal @ relative)))
-        pair = (first, second)
-        least[pair] = min(speed, least.get(pair, math.inf))
+        least[first, second] = min(speed, least.get((first, second), math.inf))
     return least
 
 
-def _at(model: Any, data: Any, geom: int, point: Array) -> Array:
+def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
     """The velocity (3,) of a geom's material at a point of the world, m/s."""
     found = np.zeros(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, found, 0)

@@ -1,0 +1,127 @@
+"""What is measured on a hard case: errors and orders, largest stable timesteps, known quantities.
+
+Entry points: `measure_case(problem)`; `measure(problem, integrator, timestep)`, one run of it;
+`agreement(problem)`, of its two references.
+
+A run is judged first: the error of a run that was lost is not given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+
+from coursebuild.numerics.engine import compiled, motion_of, refsafe_active, simulate
+from coursebuild.numerics.measure import (
+    Errors,
+    Sizes,
+    energy_drift,
+    errors,
+    fitted_orders,
+    momentum_drift,
+    raised,
+    reference_motion,
+)
+from coursebuild.numerics.problem import STANDARD, Integrator, Problem, ScalarCheck
+from coursebuild.numerics.reports.bench import OrderRow
+from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine, ReferenceLine
+from coursebuild.numerics.stability import boundaries
+
+
+def measure_case(problem: Problem) -> CaseReport:
+    """Everything that there is to measure on a problem."""
+    runs = {one: [measure(problem, one, h) for h in problem.timesteps] for one in STANDARD}
+    return CaseReport(
+        name=problem.name,
+        title=problem.title,
+        case=problem.case,
+        engine=mujoco.__version__,
+        note=problem.note,
+        reference=_reference(problem),
+        boundaries=boundaries(problem),
+        figures=tuple(
+            _checked(check, integrator)
+            for check in problem.checks
+            for integrator in check.integrators
+        ),
+        orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
+        errors=tuple(line for lines in runs.values() for line in lines),
+    )
+
+
+def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:
+    """Run a problem and compare it with its reference.
+
+    Raises:
+        ValueError: the timestep (s) does not divide the interval of the looks.
+    """
+    model = compiled(problem.mjcf, integrator, timestep)
+    run = simulate(problem, model)
+    found, reference = Errors(None, None, None), problem.reference
+    if run.judgement.ok and reference is not None:
+        exact = reference_motion(reference, tuple(run.states.times.tolist()))
+        found = raised(errors(motion_of(model, run.states), exact), _floor(problem))
+    return ErrorLine(
+        integrator=integrator.value,
+        timestep=timestep,
+        status=run.judgement.status.value,
+        reasons=run.judgement.reasons,
+        position=found.position,
+        attitude=found.attitude,
+        velocity=found.velocity,
+        energy_drift=energy_drift(run) if problem.energy_conserved else None,
+        momentum_drift=momentum_drift(run) if problem.momentum_conserved else None,
+        penetration=run.penetration,
+        refsafe=refsafe_active(model),
+    )
+
+
+def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
+    """Orders of the integrator that the lines are of.
+
+    None where the problem is not smooth: a slope would say nothing there.
+    """
+    integrator = lines[0].integrator
+    if problem.reference is None or not problem.smooth:
+        return OrderRow(integrator, None, None, None)
+    runs = [(one.timestep, Errors(one.position, one.attitude, one.velocity)) for one in lines]
+    return fitted_orders(integrator, runs, _floor(problem))
+
+
+def agreement(problem: Problem) -> float | None:
+    """The largest difference of the problem's two references over its duration.
+
+    In m, rad, m/s or rad/s, whichever is larger; `None` where it has not two.
+    """
+    if problem.reference is None or problem.second is None:
+        return None
+    times = problem.scenario.times
+    exact = reference_motion(problem.reference, tuple(times.tolist()))
+    return errors(exact, problem.second.motion(times)).largest.largest
+
+
+def _floor(problem: Problem) -> Sizes:
+    floor = 0.0 if problem.reference is None else problem.reference.floor
+    return Sizes(floor, floor, floor)
+
+
+def _reference(problem: Problem) -> ReferenceLine | None:
+    first, second = problem.reference, problem.second
+    if first is None:
+        return None
+    name = "" if second is None else second.source
+    return ReferenceLine(first.kind, first.source, first.floor, name, agreement(problem))
+
+
+def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
+    measured, exact = check.measure(integrator), check.exact(integrator)
+    return FigureLine(
+        check.name,
+        check.unit,
+        integrator.value,
+        measured if math.isfinite(measured) else None,
+        exact,
+        check.source,
+    )

@@ -1,0 +1,320 @@
+"""What a scene's motion is measured against, and how well that is known.
+
+Entry points: `know(model, first)`, the reference of a scene; `references(model, first)`, by cone
+where something touches; `conserved(…)`, `energy_beyond(…)`.
+
+1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; Gauss's collocation does it
+   again. Their difference is what the reference may be wrong by. Both take the same accelerations,
+   so the engine in ever smaller steps must tend to the same motion.
+2. A closed form that the scenario names comes first, and that integration second. Where the two
+   are far apart the formula is not this scene's.
+3. Where something jumps, or the engine tends elsewhere, only the engine itself is left, in small
+   steps, and again in steps twice as long under another integrator; it is called `self`. So it is
+   where the scene is too stiff for an integration in reasonable time.
+4. A motion counts only as long as it is known: where two integrations part, the horizon ends.
+5. Errors under a cone are those of the timestep and the solver: they are measured against what the
+   engine tends to under that cone in small steps. What remains then is the model's own error:
+   against the closed form where the scenario names one, else of a pyramid against the cone that it
+   stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.model.scenarios import DeclaredScenario
+from coursebuild.numerics.closed_forms import closed_motion
+from coursebuild.numerics.contacts import Sticks, sticking
+from coursebuild.numerics.detector import Judgement, Status
+from coursebuild.numerics.engine import (
+    Run,
+    States,
+    initial_data,
+    invariants,
+    motion_of,
+    simulate,
+    states_of,
+    varied,
+)
+from coursebuild.numerics.forward import Method, forward_states, tends_to
+from coursebuild.numerics.integrate import (
+    NoConvergenceError,
+    Rate,
+    State,
+    bulirsch_stoer,
+    gauss_collocation,
+)
+from coursebuild.numerics.measure import (
+    FLOORS,
+    Sizes,
+    energy_drift,
+    energy_scale,
+    errors,
+    momentum_drift,
+)
+from coursebuild.numerics.pilot import Pilot, apart
+from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
+from coursebuild.numerics.scene import SceneError
+from coursebuild.numerics.settings import CONES
+from coursebuild.numerics.visible import visible_error
+
+EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
+"""Accelerations that a reference may take."""
+FINER, QUICK_FINER = 16, 8
+"""Times by which steps of a `self` reference are shorter than the shortest that is measured."""
+PARTED = 0.01
+"""Where two runs of the engine part, so that neither is a reference: rad, or relative to the
+extent."""
+FOREIGN = 1e-3
+"""The difference from which on a closed form is that of another scene, in the same units."""
+CONSERVED = 1e-8
+"""Relative change, over the reference, of what is called conserved."""
+_STEP = 1e-6
+"""s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
+_ROUNDING = 1e-14
+"""No reference in double precision is known better, in rad and relative to sizes of 1."""
+_ELSEWHERE = "the engine in small steps tends elsewhere"
+
+
+class Known(Struct, frozen=True):
+    """The reference of a scene, from the first sample to the horizon."""
+
+    kind: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    states: States
+    other: States
+    """Those of the second reference."""
+    motion: Motion
+    floor: Sizes
+    """What it may be wrong by."""
+    second: str
+    """The source of the second reference."""
+    agreement: float
+    """The largest difference of the two, in m, rad, m/s and rad/s."""
+    horizon: float
+    """s."""
+    note: str = ""
+    """Why it is no better one; empty where it is the best there is."""
+
+
+def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
+    """The reference of a scene.
+
+    Raises:
+        SceneError: the scenario names a closed form that is not this scene's.
+    """
+    wanted = first.scene.declared
+    found, note = None, ""
+    if first.smooth and not (wanted and wanted.reference == "self"):
+        try:
+            found = _integrated(model, first, quick)
+        except NoConvergenceError as error:
+            note = f"no integration: {error}"
+        if found is not None and not _tended(model, first, found):
+            found, note = None, f"no integration: {_ELSEWHERE}"
+            if wanted and wanted.reference == "ode":
+                raise _no_integration(_ELSEWHERE, wanted)
+    elif wanted and wanted.reference == "ode":
+        raise _no_integration(f"there is {' and '.join(first.jumps)}", wanted)
+    if found is None:
+        found = replace(itself(model, first, quick=quick), note=note)
+    return _closed(model, first, wanted, found) if wanted and wanted.closed else found
+
+
+def _no_integration(why: str, declared: DeclaredScenario) -> SceneError:
+    message = f"no integration can be the reference: {why}"
+    help = "leave `reference` out: the engine itself in small steps is the reference then"
+    return SceneError(message, declared.place("reference"), help)
+
+
+def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
+    """By two methods over the engine's accelerations."""
+    times = first.setup.scenario.times
+    times = times[times <= first.horizon * (1 + 1e-9)]
+    exact = varied(model, Integrator.EULER, _STEP)
+    exact.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    exact.opt.iterations, exact.opt.tolerance = max(100, int(exact.opt.iterations)), 0.0
+    exact.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+    exact.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
+    most = QUICK_EVALUATIONS if quick else EVALUATIONS
+
+    def run(method: Method) -> States:
+        return forward_states(exact, first.setup, times, method, evaluations=most)
+
+    states = run(_bulirsch_stoer)
+    source = "Bulirsch–Stoer over mj_forward"
+    try:
+        other, second = run(gauss_collocation), "Gauss's collocation of order 12 over mj_forward"
+    except NoConvergenceError:
+        other, second = run(_lower), "Bulirsch–Stoer of order 12 over mj_forward"
+    return _compared(model, "ode", source, states, second, other, first.horizon)
+
+
+def _bulirsch_stoer(rate: Rate, start: State, times: Array) -> State:
+    return bulirsch_stoer(rate, start, times, 1e-13)
+
+
+def _lower(rate: Rate, start: State, times: Array) -> State:
+    return bulirsch_stoer(rate, start, times, 1e-12, columns=6, first=3e-3)
+
+
+def _tended(model: Any, first: Pilot, found: Known) -> bool:
+    setup = _until(first.setup, float(found.states.times[-1]))
+    return tends_to(model, setup, found.states, min(first.scene.timesteps), PARTED)
+
+
+def itself(model: Any, first: Pilot, *, quick: bool = False) -> Known:
+    """By the engine itself in small steps, and in steps twice as long under another integrator."""
+    step = min(first.scene.timesteps) / (QUICK_FINER if quick else FINER)
+    found = []
+    for integrator, length in ((Integrator.IMPLICITFAST, step), (Integrator.EULER, 2 * step)):
+        fine = varied(model, integrator, length)
+        fine.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        fine.opt.iterations = max(100, int(fine.opt.iterations))
+        fine.opt.tolerance = min(1e-10, float(fine.opt.tolerance))
+        run = simulate(_until(first.setup, first.horizon), fine)
+        if not np.isfinite(run.states.qpos).all():
+            raise SceneError(f"it diverges even at {step:g} s a step")
+        found.append(run.states)
+    gaps = [apart(model, a, b) for a, b in zip(found[0].qpos, found[1].qpos, strict=True)]
+    good = next((i for i, gap in enumerate(gaps) if gap > PARTED), len(gaps))
+    states, other = (one.head(max(1, good)) for one in found)
+    source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"
+    second = f"the same under Euler at {2 * step:g} s"
+    return _compared(model, "self", source, states, second, other, float(states.times[-1]))
+
+
+def _until(setup: Setup, horizon: float) -> Setup:
+    """The same until the horizon, a multiple of the sample."""
+    return replace(setup, scenario=replace(setup.scenario, duration=horizon))
+
+
+def _compared(
+    model: Any, kind: str, source: str, states: States, second: str, other: States, horizon: float
+) -> Known:
+    motion = motion_of(model, states)
+    gap = errors(motion, motion_of(model, other)).largest
+    floor = Sizes(*(max(_ROUNDING, one) for one in (gap.position, gap.attitude, gap.velocity)))
+    return Known(kind, source, states, other, motion, floor, second, gap.largest, horizon)
+
+
+def _closed(model: Any, first: Pilot, declared: DeclaredScenario, second: Known) -> Known:
+    """The closed form that the scenario names, with what was integrated as the second reference."""
+    reference, motion = closed_motion(model, first.scene, declared, second.states.times)
+    gap = errors(motion, second.motion).largest
+    states = states_of(model, motion, second.states)
+    pairs = zip(states.qpos, second.states.qpos, strict=True)
+    away = max((apart(model, a, b) for a, b in pairs), default=0.0)
+    known = Sizes(reference.floor, reference.floor, reference.floor)
+    if second.kind == "ode":
+        if away > FOREIGN:
+            message = f"the closed form of `{declared.closed}` is not this scene's motion"
+            help = f"the two are {away:.2g} apart (rad, or relative to the extent)"
+            raise SceneError(message, declared.place("reference"), help)
+        parts = (gap.position, gap.attitude, gap.velocity)
+        known = Sizes(*(max(reference.floor, part) for part in parts))
+    return replace(
+        second,
+        kind="closed",
+        source=reference.source,
+        states=states,
+        other=second.states,
+        motion=motion,
+        floor=known,
+        second=second.source,
+        agreement=gap.largest,
+        note="",
+    )
+
+
+# ------------------------------------------------------------------------------------------- cones
+
+
+class Cone(Struct, frozen=True):
+    """What errors under a cone are measured against."""
+
+    known: Known
+    model_error: float | None
+    """What remains of the error however small the timestep, m or rad."""
+    seen: float
+    """The same in a picture, where it is not in the errors already."""
+    sticks: Sticks | None = None
+    """What sticks in the reference; `None` where nothing touches."""
+
+
+def references(model: Any, first: Pilot, *, quick: bool = False) -> dict[str, Cone]:
+    """By cone; by "" where nothing touches."""
+    known, scene = know(model, first, quick=quick), first.scene
+    if not first.contact:
+        return {"": Cone(known, None, 0.0)}
+    limits = {}
+    for cone, number in CONES.items():
+        other = varied(model, Integrator.EULER, scene.own)
+        other.opt.cone = number
+        limits[cone] = itself(other, first, quick=quick)
+    found = {}
+    for cone, limit in limits.items():
+        truth = known if known.kind == "closed" else limits["elliptic"]
+        sticks = sticking(model, scene, limit.states)
+        if cone == "elliptic" and truth is limit:
+            found[cone] = Cone(limit, None, 0.0, sticks)
+            continue
+        count = min(len(limit.states.times), len(truth.states.times))
+        near, true = limit.states.head(count), truth.states.head(count)
+        gap = errors(motion_of(model, near), motion_of(model, true)).largest.place
+        least = FLOORS * max(limit.floor.place, truth.floor.place)
+        if truth is known:
+            found[cone] = Cone(known, max(gap, least), 0.0, sticks)
+        else:
+            seen = visible_error(model, scene, near, true) if gap > least else 0.0
+            found[cone] = Cone(limit, max(gap, least), seen, sticks)
+    return found
+
+
+# --------------------------------------------------------------------------------------- invariants
+
+
+class Conserved(Struct, frozen=True):
+    """What does not change in a scene."""
+
+    energy: float | None
+    """What changes of energy are large against, J; `None` where energy is not conserved."""
+    momentum: bool
+    """Whether the angular momentum about the centre of mass is."""
+
+
+def conserved(model: Any, first: Pilot, known: Known) -> Conserved:
+    """What the author says is conserved, or else what the reference conserves."""
+    declared = first.scene.declared.conserved if first.scene.declared is not None else None
+    data, other = initial_data(first.setup, model), initial_data(first.setup, model)
+    states = [(data.qpos, data.qvel), *zip(known.states.qpos, known.states.qvel, strict=True)]
+    table = np.array([invariants(model, other, qpos, qvel) for qpos, qvel in states])
+    run = Run(known.states, table[:, :2], table[:, 2:], 0.0, Judgement(Status.OK))
+    scale = energy_scale(run)
+    if declared is not None:
+        energy = "energy" in declared and scale > 0
+        return Conserved(scale if energy else None, "angular-momentum" in declared)
+    if not first.smooth or known.kind == "self":
+        return Conserved(None, momentum=False)
+    drifts = energy_drift(run), momentum_drift(run)
+    steady = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
+    return Conserved(scale if steady[0] else None, steady[1])
+
+
+def energy_beyond(model: Any, first: Pilot, known: Known) -> float | None:
+    """Mean kinetic energy beyond the horizon, J, in the smallest steps; `None` without such."""
+    scenario = first.scene.scenario
+    if known.horizon > scenario.duration - scenario.sample * 1.5:
+        return None
+    integrator = Integrator.RK4 if first.smooth else Integrator.IMPLICITFAST
+    fine = varied(model, integrator, min(first.scene.timesteps) / 2)
+    run = simulate(first.setup, fine)
+    mean = float(run.energy[1:][run.states.times > known.horizon * (1 + 1e-9), 1].mean())
+    return mean if math.isfinite(mean) and mean > 0 else None

@@ -1,0 +1,118 @@
+"""The settings that are measured in a scene: what can be chosen without changing the scene.
+
+Entry points: `settings(model, first)`, `own_setting`, `apply`; `stable(model, first)`, the largest
+stable timestep of each integrator.
+
+Every integrator at every timestep; where a solver runs, also other solvers and fewer iterations;
+where something touches, also the other cone. These vary one at a time about the model's own: the
+full product would take hours and say little more.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+from msgspec.structs import replace
+
+from coursebuild.numerics.detector import Status
+from coursebuild.numerics.engine import choose, integrator_of, varied
+from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.problem import STANDARD, Integrator
+from coursebuild.numerics.reports.bench import Setting, StableRow
+from coursebuild.numerics.reports.points import FEWEST_STEPS
+from coursebuild.numerics.scene import thickness
+from coursebuild.numerics.stability import Trial, attempted, scan
+
+_SOLVERS = {
+    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
+    "CG": int(mujoco.mjtSolver.mjSOL_CG),
+    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
+}
+CONES = {
+    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
+}
+_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
+_SEARCH = (0.25, 64.0)
+"""Between which multiples of the model's timestep the largest stable one is looked for."""
+_MOST_STEPS = 200_000
+"""Steps of one trial of a timestep."""
+
+
+def own_setting(model: Any, first: Pilot) -> Setting:
+    """The setting that the model has."""
+    return Setting(
+        integrator=integrator_of(model).value,
+        timestep=first.scene.own,
+        solver=_name(_SOLVERS, int(model.opt.solver)) if first.constrained else "",
+        iterations=int(model.opt.iterations) if first.constrained else 0,
+        cone=_name(CONES, int(model.opt.cone)) if first.contact else "",
+    )
+
+
+def _name(names: dict[str, int], number: int) -> str:
+    return next(name for name, value in names.items() if value == number)
+
+
+def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[Setting, ...]:
+    """All settings to measure, each once, the model's own among them."""
+    own = own_setting(model, first)
+    found = [
+        replace(own, integrator=integrator.value, timestep=step)
+        for integrator in STANDARD
+        for step in reversed(first.scene.timesteps)
+    ]
+    if first.contact:
+        found += [replace(own, cone=cone) for cone in CONES]
+    if first.constrained:
+        found += [replace(own, solver=solver) for solver in _SOLVERS]
+        counts = _QUICK_ITERATIONS if quick else _ITERATIONS
+        found += [replace(own, iterations=n) for n in counts if n < own.iterations]
+    return tuple(dict.fromkeys(found))
+
+
+def apply(model: Any, setting: Setting) -> None:
+    """Give a `mjModel` a setting; what is empty in it stays as it is."""
+    choose(model, Integrator(setting.integrator), setting.timestep)
+    if setting.solver:
+        model.opt.solver = _SOLVERS[setting.solver]
+        model.opt.iterations = setting.iterations
+    if setting.cone:
+        model.opt.cone = CONES[setting.cone]
+
+
+def with_setting(model: Any, setting: Setting) -> Any:
+    """A copy of a `mjModel` with a setting, and automatic reset off."""
+    one = varied(model, Integrator(setting.integrator), setting.timestep)
+    apply(one, setting)
+    return one
+
+
+def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
+    """The largest stable timestep of every integrator, over the scenario.
+
+    The grid and the bisection are those of the hard cases. No timestep is tried of which the
+    scenario has fewer than 20: of so few steps none would tell.
+    """
+    duration = first.scene.scenario.duration
+    low, high = (part * first.scene.own for part in _SEARCH)
+    search = (max(low, duration / _MOST_STEPS), min(high, duration / FEWEST_STEPS))
+    if search[1] <= search[0]:
+        return ()
+    one, thick = varied(model, Integrator.EULER, first.scene.own), thickness(model)
+    rows = []
+    for integrator in STANDARD:
+
+        def attempt(step: float, integrator: Integrator = integrator) -> Trial:
+            choose(one, integrator, step)
+            try:
+                return attempted(first.setup, one, round(duration / step), thick)
+            except mujoco.FatalError:
+                return Trial(step, Status.DIVERGED, math.nan)
+
+        found = scan(attempt, search, grid=6 if quick else 12, resolution=1e-2 if quick else 1e-3)
+        largest = None if math.isinf(found.largest) else found.largest
+        rows.append(StableRow(integrator.value, largest, not found.islands, search))
+    return tuple(rows)
