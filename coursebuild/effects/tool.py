@@ -44,6 +44,7 @@ _LIBRARIES = (
     "msgspec",
     "pygments",
     "segno",
+    "tree_sitter",
     "uharfbuzz",
 )
 """What outputs are made with, as the folders with their versions in the name begin."""

@@ -1,7 +1,6 @@
-r"""Backslashes that were meant for TeX.
+r"""Strings with escapes, in JSON and TOML: their values, and where each character stands.
 
-Entry points: `tex_escapes` (escapes of a string that are valid and surely not meant), `tex_word`,
-`odd_character`.
+Entry points: `escaped_string`, `tex_escapes`, `tex_word`, `odd_character`.
 
 JSON and TOML both read `\t`, `\n`, `\b`, `\f` and `\r` as control characters, so that "$\tau$" in a
 lesson silently becomes a tab and "au". A backspace, form feed or carriage return before a letter
@@ -14,9 +13,12 @@ from __future__ import annotations
 import re
 import unicodedata
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
+from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.patterns import pattern
+from coursebuild.source import Excerpt
+from coursebuild.syntax.nodes import StringNode
 
 _LETTERS = pattern(r"[A-Za-z]+")
 _DOLLARS = pattern(r"(?<!\\)\$+")
@@ -36,6 +38,49 @@ _COMMANDS = frozenset(
     )
 )
 """Commands of TeX that begin with `t` or `n`."""
+
+
+def escaped_string(
+    body: Excerpt,
+    quoted: tuple[int, int],
+    content: tuple[int, int],
+    escapes: Iterable[re.Match[str]],
+    meaning: Callable[[re.Match[str]], str],
+    help: Callable[[str], str],
+    diagnostics: list[Diagnostic],
+) -> StringNode:
+    """The string between the offsets `quoted`, whose text without the quotes is `content`.
+
+    `escapes` are those in it, in order, and `meaning` says what each stands for. An escape that was
+    surely meant for TeX is reported, with what `help` says of the command.
+    """
+    parts: list[str] = []
+    runs: list[tuple[int, int]] = []
+    controls: list[tuple[int, str]] = []
+    length = 0
+
+    def add(part: str, place: int) -> None:
+        nonlocal length
+        if part:
+            runs.append((length, place))
+            parts.append(part)
+            length += len(part)
+
+    here, end = content
+    for escape in escapes:
+        add(body.text[here : escape.start()], here)
+        if escape[0] in ("\\t", "\\n", "\\b", "\\f", "\\r"):
+            controls.append((length, escape[0][1]))
+        add(meaning(escape), escape.start())
+        here = escape.end()
+    add(body.text[here:end], here)
+    value = "".join(parts)
+    places = dict(runs)  # an escape is a run of its own
+    for at, command in tex_escapes(value, controls):
+        span = body.span(places[at], places[at] + 1 + len(command))
+        message = f"`\\{command[0]}` of `\\{command}` is read as a control character"
+        diagnostics.append(diagnose("field-value", span, message, help=help(command)))
+    return StringNode(body, *quoted, value, tuple(runs) or ((0, content[0]),))
 
 
 def tex_word(text: str, at: int) -> str:

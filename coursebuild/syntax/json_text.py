@@ -15,13 +15,10 @@ from __future__ import annotations
 import re
 from typing import NoReturn
 
-from msgspec import Struct, field
-
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
-from coursebuild.syntax.escapes import odd_character
-from coursebuild.syntax.json_string import read_string
+from coursebuild.syntax.escapes import escaped_string, odd_character, tex_word
 from coursebuild.syntax.nodes import (
     ArrayNode,
     BoolNode,
@@ -40,15 +37,17 @@ MAX_DEPTH = 64
 interpreter's stack."""
 
 _SPACE = pattern(r"[ \t\n\r]*")
-_NUMBER = pattern(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?(?![\w.+-])")
-_PLAIN_KEY = pattern(r'"([^"\\\x00-\x1f\ud800-\udfff]*)"[ \t\n\r]*:[ \t\n\r]*(?=["{\[\-0-9tfn])')
-"""A key with its colon, in which nothing is unusual; a value follows."""
-_PLAIN_NEXT = pattern(r'[ \t\n\r]*(?:,[ \t\n\r]*(?=["{\[\-0-9tfn])|([\]}]))')
-"""What stands between two values or after the last one, where nothing is unusual."""
-_NUMBER_LIKE = pattern(r"[-+.\w]+")
-_WORD = pattern(r"[^\W\d][\w$]*")
-_KEY = pattern(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
 _COMMENT = pattern(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_WORD = pattern(r"[^\W\d][\w$]*")
+_SCALAR = pattern(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
+_NUMBER = pattern(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+_KEY = pattern(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
+_STRING = pattern(r'"((?:[^"\\\n]|\\.)*)"')
+_ESCAPE = pattern(
+    r"\\u[Dd][89ABab][0-9A-Fa-f]{2}\\u[Dd][C-Fc-f][0-9A-Fa-f]{2}"
+    r"|\\u[0-9A-Fa-f]{4}|\\.|[\x00-\x1f\ud800-\udfff]"
+)
+_ESCAPES = {'"': '"', "\\": "\\", "/": "/", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
 _CURLY = "“”„‟‘’‚‛«»"
 _WORDS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _WORDS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
@@ -60,247 +59,258 @@ def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
 
     The value can be there along with diagnostics; a caller that finds any must not publish it.
     """
+    if not body.text.strip(" \t\r\n"):
+        message = "the block is empty: a JSON object is expected"
+        help = 'write `{"field": value, …}`'
+        return Parsed(None, (diagnose("json-syntax", place, message, help=help),))
     reader = _Reader(body)
     try:
-        value = reader.document(place)
+        value = reader.document()
     except _LostError:
         value = None
-    return Parsed(value, tuple(reader.faults))
+    return Parsed(value, tuple(reader.diagnostics))
 
 
 class _LostError(Exception):
     """The rest of the text cannot be understood; what is wrong has been reported."""
 
 
-class _Reader(Struct):
-    body: Excerpt
-    faults: list[Diagnostic] = field(default_factory=list)
+class _Reader:
+    """Reads a text from its beginning to its end; `at` is the place of what comes next."""
 
-    def fault(
-        self,
-        start: int,
-        end: int,
-        message: str,
-        help: str = "",
-        *,
-        rule: str = "json-syntax",
-        notes: tuple[Note, ...] = (),
-    ) -> None:
-        span = self.body.span(start, max(start, end))
-        self.faults.append(diagnose(rule, span, message, help=help, notes=notes))
+    def __init__(self, body: Excerpt) -> None:
+        self.body = body
+        self.text = body.text
+        self.at = 0
+        self.diagnostics: list[Diagnostic] = []
 
-    def document(self, place: Span) -> Node:
-        at = self.skip(0)
-        text = self.body.text
-        if at >= len(text):
-            help = 'write `{"field": value, …}`'
-            self.faults.append(
-                diagnose(
-                    "json-syntax", place, "the block is empty: a JSON object is expected", help=help
-                )
-            )
-            raise _LostError
-        value = self.value(at, 0)
-        at = self.skip(value.end)
-        if at < len(text):
-            stop = text.find("\n", at)
-            end = len(text) if stop < 0 else stop
-            if text[at] in "]}":
-                self.fault(at, at + 1, f"`{text[at]}` closes nothing")
-            else:
-                self.fault(at, end, "text after the end of the JSON value")
+    def document(self) -> Node:
+        value = self.value(0)
+        char = self.next()
+        if char and char in "]}":
+            self.report(self.at, self.at + 1, f"`{char}` closes nothing")
+        elif char:
+            line = self.text[self.at :].split("\n", 1)[0]
+            self.report(self.at, self.at + len(line), "text after the end of the JSON value")
         return value
 
-    def skip(self, at: int) -> int:
-        """The next place that is neither white space nor a mistaken comment or space."""
-        text = self.body.text
+    def next(self) -> str:
+        """The next character that is neither white space nor a mistaken comment or space."""
         while True:
-            at = _SPACE.match(text, at).end()  # type: ignore[union-attr]  # it matches nothing too
-            char = text[at : at + 1]
-            if not char or char in '",:{}[]-0123456789tfn':
-                return at
-            comment = _COMMENT.match(text, at)
-            if comment:
+            self.at = at = _SPACE.match(self.text, self.at).end()  # type: ignore[union-attr]  # it matches nothing too
+            char = self.text[at : at + 1]
+            if comment := _COMMENT.match(self.text, at):
                 first_line = comment[0].split("\n", 1)[0]
-                self.fault(at, at + len(first_line), "JSON has no comments", "remove it")
-                at = comment.end()
+                self.report(at, at + len(first_line), "JSON has no comments", "remove it")
+                self.at = comment.end()
             elif odd := odd_character(char):
                 help = "replace it by a plain space, or remove it"
-                self.fault(at, at + 1, f"{odd} is not white space in JSON", help)
-                at += 1
+                self.report(at, at + 1, f"{odd} is not white space in JSON", help)
+                self.at += 1
             else:
-                return at
+                return char
 
-    def value(self, at: int, depth: int) -> Node:
-        text = self.body.text
-        char = text[at : at + 1]
+    # ----------------------------------------------------------------------- objects and arrays
+
+    def value(self, depth: int) -> Node:
+        char, start = self.next(), self.at
         if char == '"':
-            return self.string(at)
-        if char in ("{", "["):
+            return self.string()
+        if char and char in "{[":
             if depth == MAX_DEPTH:
-                self.fault(at, at + 1, f"objects and arrays nest more than {MAX_DEPTH} deep")
+                message = f"objects and arrays nest more than {MAX_DEPTH} deep"
+                self.report(start, start + 1, message)
                 raise _LostError
-            return self.object(at, depth) if char == "{" else self.array(at, depth)
-        number = _NUMBER.match(text, at)
-        if number:
-            return self.number(number)
-        word = _WORD.match(text, at)
-        if word:
-            return self.word(word)
-        if char and char in "+-.0123456789":
-            return self.malformed_number(at)
-        self.expected("a value", at)
+            self.at += 1
+            return self.object(start, depth) if char == "{" else self.array(start, depth)
+        scalar = _SCALAR.match(self.text, start)
+        if scalar is None:
+            self.expected("a value")
+        self.at = scalar.end()
+        return self.scalar(start, scalar[0])
 
-    def object(self, at: int, depth: int) -> ObjectNode:
-        text = self.body.text
+    def object(self, start: int, depth: int) -> ObjectNode:
         members: list[Member] = []
         known: dict[str, StringNode] = {}
-        here = self.skip(at + 1)
-        done = text[here : here + 1] == "}"
+        done = self.next() == "}"
         while not done:
-            key, place = self.key(here, at)
+            if self.next() != '"':
+                self.expected("a key in double quotes", opened=start)
+            key = self.string()
             first = known.setdefault(key.value, key)
             if first is not key:
-                notes = (Note("the first one is here", first.span),)
                 message = f"`{short(key.value)}` is given twice"
-                self.fault(key.start, key.end, message, rule="field-repeated", notes=notes)
-            value = self.value(self.colon(key) if place is None else place, depth + 1)
-            members.append(Member(key, value))
-            here, done = self.separator(value.end, at, "}")
-        return ObjectNode(self.body, at, here + 1, at, at + 1, tuple(members))
+                notes = (Note("the first one is here", first.span),)
+                self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
+            self.colon(key)
+            members.append(Member(key, self.value(depth + 1)))
+            done = self.separator(start, "}")
+        self.at += 1
+        return ObjectNode(self.body, start, self.at, start, start + 1, tuple(members))
 
-    def key(self, here: int, opened: int) -> tuple[StringNode, int | None]:
-        """The key at a place, and the place of its value where nothing is unusual before that."""
-        text = self.body.text
-        plain = _PLAIN_KEY.match(text, here)
-        if plain is not None:
-            node = StringNode(self.body, here, plain.end(1) + 1, plain[1], ((0, here + 1),))
-            return node, plain.end()
-        if text[here : here + 1] != '"':
-            self.expected("a key in double quotes", here, opened=opened)
-        return self.string(here), None
-
-    def array(self, at: int, depth: int) -> ArrayNode:
+    def array(self, start: int, depth: int) -> ArrayNode:
         items: list[Node] = []
-        here = self.skip(at + 1)
-        done = self.body.text[here : here + 1] == "]"
+        done = self.next() == "]"
         while not done:
-            if here >= len(self.body.text):
-                self.unclosed(at)
-            item = self.value(here, depth + 1)
-            items.append(item)
-            here, done = self.separator(item.end, at, "]")
-        return ArrayNode(self.body, at, here + 1, at + 1, tuple(items))
+            if not self.next():
+                self.unclosed(start)
+            items.append(self.value(depth + 1))
+            done = self.separator(start, "]")
+        self.at += 1
+        return ArrayNode(self.body, start, self.at, start + 1, tuple(items))
 
-    def colon(self, key: StringNode) -> int:
-        """The place of the value that belongs to a key."""
-        text = self.body.text
-        here = self.skip(key.end)
-        if text[here : here + 1] == ":":
-            return self.skip(here + 1)
-        if text[here : here + 1] == "=":
-            self.fault(here, here + 1, "`=` where JSON has `:`", "write `:`")
-            return self.skip(here + 1)
-        self.expected(f"`:` after the key `{short(key.value)}`", here)
+    def colon(self, key: StringNode) -> None:
+        char = self.next()
+        if char == "=":
+            self.report(self.at, self.at + 1, "`=` where JSON has `:`", "write `:`")
+        elif char != ":":
+            self.expected(f"`:` after the key `{short(key.value)}`")
+        self.at += 1
 
-    def separator(self, end: int, opened: int, closer: str) -> tuple[int, bool]:
-        """After a value: the place of the next one, or that of the closing bracket and `True`."""
-        text = self.body.text
-        plain = _PLAIN_NEXT.match(text, end)
-        if plain is not None and (plain[1] is None or plain[1] == closer):
-            return (plain.end(), False) if plain[1] is None else (plain.start(1), True)
-        here = self.skip(end)
-        char = text[here : here + 1]
-        if char == closer:
-            return here, True
+    def separator(self, opened: int, closer: str) -> bool:
+        """After a value: whether it was the last one; otherwise past the comma."""
+        end = self.at
+        char, comma = self.next(), self.at
         if char == ",":
-            comma = here
-            here = self.skip(here + 1)
-            while text[here : here + 1] == ",":
-                self.fault(here, here + 1, "two commas with no value between them", "remove one")
-                here = self.skip(here + 1)
-            if text[here : here + 1] == closer:
-                self.fault(comma, comma + 1, f"a comma before `{closer}`", "remove the comma")
-                return here, True
-            return here, False
-        if _KEY.match(text, here) if closer == "}" else char and char in '"{[-0123456789':
-            self.fault(end, end, "a comma is missing here", "put `,` between the two values")
-            return here, False
-        self.expected(f"`,` or `{closer}`", here, opened=opened)
+            self.at += 1
+            while self.next() == ",":
+                message = "two commas with no value between them"
+                self.report(self.at, self.at + 1, message, "remove one")
+                self.at += 1
+            if self.next() == closer:
+                self.report(comma, comma + 1, f"a comma before `{closer}`", "remove the comma")
+        elif char != closer:
+            key = _KEY.match(self.text, self.at)
+            if not (key if closer == "}" else char and char in '"{[-0123456789'):
+                self.expected(f"`,` or `{closer}`", opened=opened)
+            self.report(end, end, "a comma is missing here", "put `,` between the two values")
+        return self.next() == closer
 
-    def string(self, at: int) -> StringNode:
-        node = read_string(self.body, at, self.faults)
-        if node is None:
-            raise _LostError
-        return node
+    # ---------------------------------------------------------------------------------- scalars
 
-    def number(self, match: re.Match[str]) -> Node:
-        start, end = match.span()
-        if match[1] or match[2]:
-            return NumberNode(self.body, start, end, float(match[0]))
-        try:
-            return NumberNode(self.body, start, end, int(match[0]))
-        except ValueError:  # the interpreter converts no more than some thousand digits
-            self.fault(start, end, f"a number of {end - start} digits is too long")
-            return BrokenNode(self.body, start, end)
-
-    def malformed_number(self, at: int) -> Node:
-        match = _NUMBER_LIKE.match(self.body.text, at)
-        end = match.end() if match else at + 1
-        written = self.body.text[at:end]
-        if written.lstrip("+-") in _NOT_FINITE:
-            self.fault(at, end, f"JSON has no `{short(written)}`", "write a finite number")
-        else:
-            self.fault(
-                at, end, f"`{short(written)}` is not a number of JSON", _number_help(written)
-            )
-        return BrokenNode(self.body, at, end)
-
-    def word(self, match: re.Match[str]) -> Node:
-        start, end = match.span()
-        word = match[0]
-        if word in ("true", "false"):
-            return BoolNode(self.body, start, end, word == "true")
-        if word == "null":
+    def scalar(self, start: int, written: str) -> Node:
+        """A number or word; `BrokenNode` for one that is not JSON."""
+        end = self.at
+        if written in ("true", "false"):
+            return BoolNode(self.body, start, end, written == "true")
+        if written == "null":
             return NullNode(self.body, start, end)
-        if word in _WORDS:
-            self.fault(start, end, f"`{word}` is not JSON", f"write `{_WORDS[word]}`")
-            return BrokenNode(self.body, start, end)
-        if word in _NOT_FINITE:
-            self.fault(start, end, f"JSON has no `{word}`", "write a finite number")
-            return BrokenNode(self.body, start, end)
-        self.expected("a value", start)
+        number = _NUMBER.fullmatch(written)
+        if number is not None and (number[1] or number[2]):
+            return NumberNode(self.body, start, end, float(written))
+        if number is not None:
+            try:
+                return NumberNode(self.body, start, end, int(written))
+            except ValueError:  # the interpreter converts no more than some thousand digits
+                message, help = f"a number of {end - start} digits is too long", ""
+        elif written in _WORDS:
+            message, help = f"`{written}` is not JSON", f"write `{_WORDS[written]}`"
+        elif written.lstrip("+-") in _NOT_FINITE:
+            message, help = f"JSON has no `{written}`", "write a finite number"
+        elif written[0] in "+-.0123456789":
+            message, help = f"`{short(written)}` is not a number of JSON", _number_help(written)
+        else:
+            self.at = start
+            self.expected("a value")
+        self.report(start, end, message, help)
+        return BrokenNode(self.body, start, end)
+
+    def string(self) -> StringNode:
+        match = _STRING.match(self.text, self.at)
+        if match is None:
+            line = self.text[self.at :].split("\n", 1)[0].rstrip()
+            help = 'close it with `"`; a line end inside a string is written `\\n`'
+            message = "the string is not closed on its line"
+            self.report(self.at, self.at + len(line), message, help)
+            raise _LostError
+        self.at = match.end()
+        escapes = _ESCAPE.finditer(self.text, *match.span(1))
+        return escaped_string(
+            self.body,
+            match.span(),
+            match.span(1),
+            escapes,
+            self.escape,
+            _double,
+            self.diagnostics,
+        )
+
+    def escape(self, match: re.Match[str]) -> str:
+        """What an escape stands for, or a control character; a mistake is reported."""
+        written = match[0]
+        if len(written) == 12:
+            high, low = int(written[2:6], 16), int(written[8:], 16)
+            return chr(0x10000 + ((high - 0xD800) << 10) + low - 0xDC00)
+        if written[0] == "\\" and written[1] in _ESCAPES:
+            return _ESCAPES[written[1]]
+        code = int(written[2:], 16) if len(written) == 6 else ord(written[0])
+        if len(written) == 6 and not 0xD800 <= code < 0xE000:
+            return chr(code)
+        message, help = _escape_mistake(self.text, match, code)
+        self.report(match.start(), match.end(), message, help)
+        return "\ufffd"
+
+    # --------------------------------------------------------------------------------- mistakes
+
+    def report(
+        self, start: int, end: int, message: str, help: str = "", notes: tuple[Note, ...] = ()
+    ) -> None:
+        span = self.body.span(start, end)
+        self.diagnostics.append(diagnose("json-syntax", span, message, help=help, notes=notes))
 
     def unclosed(self, opened: int) -> NoReturn:
-        self.fault(opened, opened + 1, f"`{self.body.text[opened]}` is never closed")
+        self.report(opened, opened + 1, f"`{self.text[opened]}` is never closed")
         raise _LostError
 
-    def expected(self, what: str, at: int, *, opened: int | None = None) -> NoReturn:
-        """Report what stands at `at` in the place of something else; never returns."""
-        text = self.body.text
+    def expected(self, what: str, *, opened: int | None = None) -> NoReturn:
+        """Report what stands here in the place of something else; never returns."""
+        text, at = self.text, self.at
         if at >= len(text):
             if opened is not None:
                 self.unclosed(opened)
-            last = len(text.rstrip())
-            self.fault(max(last - 1, 0), last, f"the JSON ends where {what} is expected")
+            last = max(len(text.rstrip()), 1)
+            self.report(last - 1, last, f"the JSON ends where {what} is expected")
             raise _LostError
         word = _WORD.match(text, at)
-        end = word.end() if word else at + 1
+        found = word[0] if word else text[at]
         notes: tuple[Note, ...] = ()
-        if opened is not None and text[at] in "]}":
+        if opened is not None and found in "]}":
             notes = (Note(f"`{text[opened]}` is opened here", self.body.span(opened, opened + 1)),)
-        found = "a string" if text[at] == '"' else f"`{short(text[at:end])}`"
-        self.fault(at, end, f"expected {what}, found {found}", _help(text, at, what), notes=notes)
+        name = "a string" if found == '"' else f"`{short(found)}`"
+        help = _help(found, what)
+        self.report(at, at + len(found), f"expected {what}, found {name}", help, notes)
         raise _LostError
 
 
-def _help(text: str, at: int, what: str) -> str:
-    char = text[at]
+def _escape_mistake(text: str, match: re.Match[str], code: int) -> tuple[str, str]:
+    """What is wrong with an escape or a character inside a string, and how to mend it."""
+    written = match[0]
+    if 0xD800 <= code < 0xE000:
+        name = f"`{written}`" if len(written) > 1 else f"U+{code:04X}"
+        return f"{name} is half of a character", "write the character itself"
+    if written == "\t":
+        return "a tab inside a string", "write `\\t`, or a space"
+    if len(written) == 1:
+        message = f"the control character U+{code:04X} inside a string"
+        return message, f"write `\\u{code:04x}`, or remove it"
+    word = tex_word(text, match.start() + 1)
+    if written != "\\u":
+        return f"`{written}` is not an escape of JSON", _double(word)
+    help = _double(word) if len(word) > 1 else "write four hexadecimal digits after `\\u`"
+    return "`\\u` is not followed by four hexadecimal digits", help
+
+
+def _double(command: str) -> str:
+    return f"to write a backslash, double it: `\\\\{command}`"
+
+
+def _help(found: str, what: str) -> str:
+    """How to mend what was found in the place of something else; may be empty."""
+    char = found[0]
+    letter = char.isalpha() or char == "_"
     if char in _CURLY:
         return 'JSON knows only the straight quote `"`; replace the curly ones of this block'
-    if char == "'":
-        return 'JSON strings stand between double quotes: `"…"`'
-    if char == "`":
+    if char in "'`":
         return 'JSON strings stand between double quotes: `"…"`'
     if char == ";":
         return "JSON separates values by `,`"
@@ -308,22 +318,19 @@ def _help(text: str, at: int, what: str) -> str:
         return "a list stands between `[` and `]`"
     if what.startswith("`,`") and (char.isalnum() or char == "\\"):
         return 'a double quote inside a string is written `\\"`'
-    if what == "a key in double quotes" and (char.isalpha() or char == "_"):
-        return f'write `"{short(_WORD.match(text, at)[0])}"`'  # type: ignore[index]  # a letter is a word
-    if what == "a value" and (char.isalpha() or char == "_"):
+    if what == "a key in double quotes" and letter:
+        return f'write `"{short(found)}"`'
+    if what == "a value" and letter:
         return "text stands between double quotes"
     return ""
 
 
 def _number_help(written: str) -> str:
     """How a malformed number is written in JSON, where that is clear."""
-    if "_" in written and written.replace("_", "").isdigit():
-        return f"write `{written.replace('_', '')}`"
-    if re.fullmatch(r"[-+]?0[xXoObB]\w+", written):
-        return "JSON has decimal numbers only"
-    plain = re.fullmatch(r"([-+]?)([0-9]*)(?:\.([0-9]*))?([eE][+-]?[0-9]+)?", written)
-    if plain is None or not (plain[2] or plain[3]):
-        return ""
-    sign = "-" if plain[1] == "-" else ""
-    fraction = f".{plain[3]}" if plain[3] else ""
-    return f"write `{short(sign + (plain[2].lstrip('0') or '0') + fraction + (plain[4] or ''))}`"
+    for read in (lambda: int(written, 0), lambda: int(written), lambda: float(written)):
+        try:
+            value = read()
+        except ValueError:
+            continue
+        return "" if "n" in str(value) else f"write `{short(str(value))}`"  # inf, nan
+    return ""

@@ -42,19 +42,3 @@ def plain(node: Node) -> object:
             return "a date"
         case _:
             raise AssertionError(node)
-
-
-def tree(node: Node | None) -> object:
-    """A node with its places."""
-    match node:
-        case None:
-            return None
-        case ObjectNode():
-            inner: object = [(tree(one.key), tree(one.value)) for one in node.members]
-        case ArrayNode():
-            inner = [tree(item) for item in node.items]
-        case StringNode():
-            inner = (node.value, node.runs)
-        case _:
-            inner = node.raw
-    return type(node), node.start, node.end, node.mark, inner

@@ -29,7 +29,7 @@ PATH = "a path relative to the project, as in `content/pages/about.md`"
          " `example.org` [expected: an address that begins with `https://` or `http://`]"),
         (HEAD + 'language = "English!"', "3:12-22 field-value: `language` cannot be `English!`"
          " [expected: a language tag, as in `en` or `pt-BR`]"),
-        (HEAD + "licence =", '3:10-10 map-syntax: expected a value, found the end of the file'
+        (HEAD + "licence =", '3:10-10 map-syntax: a value is missing'
          ' [an empty text is written `""`]'),
         # levels and lessons
         (HEAD + '[level]\nid = "4"\n', "3:1-8 field-type: `level` must be an array of tables,"

@@ -101,7 +101,7 @@ SAME = "every timestep must end at the same times, or errors cannot be compared"
 
 MISTAKES = [
     ("\ufeff", ["1:1-2 toml-syntax: U+FEFF (zero width no-break space) cannot stand"]),
-    ("x = 1 2\n", ["1:7-8 toml-syntax: `2` after the value `1`"]),
+    ("x = 1 2\n", ["1:7-8 toml-syntax: expected the end of the line, found `2`"]),
     ("[scenario]\nname = 'a'\n", ["1:1-11 field-type: `scenario` must be an array of tables"]),
     ("[[scenarios]]\nname = 'a'\n", ["1:3-12 field-unknown: unknown field `scenarios` [did you"]),
     ("[[scenario]]\n", ["1:1-13 field-missing: `name` is missing [`name`: by which reports"]),
