@@ -158,7 +158,7 @@ TO_MEND: dict[Rule, str] = {
     waits_for_time: "effects/test_pool.py effects/test_v8.py effects/test_v8_library.py",
     patches_of_private_names: (
         "effects/test_code.py effects/test_examples.py "
-        "effects/test_installed.py effects/test_lab_engine.py "
+        "effects/test_lab_engine.py "
         "effects/test_resources.py effects/test_stamp.py effects/test_v8.py "
         "effects/test_v8_library.py effects/test_write.py pipeline/test_behind.py "
         "pipeline/test_cards.py pipeline/test_memory_files.py pipeline/test_noted.py"

@@ -1,4 +1,4 @@
-"""Throw-away environments with another version of MuJoCo and otherwise the packages of here.
+"""Environments with another version of MuJoCo and otherwise the packages of here.
 
 Entry points: `other_version`, what the user may name; `needed(states)`, the distributions that
 scripts use; `environment`, which makes one.
@@ -6,8 +6,7 @@ scripts use; `environment`, which makes one.
 1. An environment lies in `.coursebuild/environments`, under a name that says everything that is
    installed in it: one that is there is used again. The ones used last are kept.
 2. A new one is made beside its place and renamed there when MuJoCo can be imported in it, so that
-   none is ever half there. Whatever goes wrong, its remains are removed; those of a process that
-   was killed are, the next time.
+   none is ever half there. The remains of a process that was killed are removed the next time.
 3. pip installs, as the user has configured it. All that MuJoCo and the scripts need is held to the
    versions of here.
 """
@@ -19,18 +18,18 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import os
+import platform
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, UsageError, reason
-from coursebuild.effects.installing import pip_error, same_version
-from coursebuild.effects.locks import is_abandoned, make_private_folder, try_lock
+from coursebuild.effects.locks import make_private_folder
 from coursebuild.effects.prune import TEMPORARY
 from coursebuild.effects.surroundings import Place, library_folder
 from coursebuild.effects.versions import engine_version
@@ -41,10 +40,14 @@ _KEPT = 4
 _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
 )
-_REQUIRED = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _ENGINE = "mujoco"
-_TRY = f"import {_ENGINE}"
 _INSTALL = ("install", "--no-input", "--progress-bar", "off", "--only-binary", _ENGINE)
+_LINES = 4
+"""Of what pip says where it fails, so many lines are told."""
+_OFFLINE = (
+    "without a network let pip find the wheels in a folder, by the environment variables "
+    "PIP_FIND_LINKS and PIP_NO_INDEX"
+)
 
 
 def other_version(text: str) -> str:
@@ -55,9 +58,14 @@ def other_version(text: str) -> str:
     """
     if not _VERSION.fullmatch(text):
         raise UsageError(f"--against: {text!r} is no version of MuJoCo, such as 3.13.0")
-    if same_version(text, engine_version()):
+    if _shortened(text) == _shortened(engine_version()):
         raise UsageError(f"--against: MuJoCo {engine_version()} is the version installed here")
     return text
+
+
+def _shortened(version: str) -> str:
+    """3.13 for 3.13.0, which is the same version."""
+    return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
 
 
 def needed(states: Iterable[str]) -> dict[str, str]:
@@ -70,6 +78,11 @@ def needed(states: Iterable[str]) -> dict[str, str]:
     return found
 
 
+def _plain(name: str) -> str:
+    """A distribution's name as PEP 503 has it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
 def environment(
     root: Path, engine: str, wanted: Mapping[str, str], say: Callable[[str], None]
 ) -> Place:
@@ -80,22 +93,24 @@ def environment(
     Raises:
         EffectError: it cannot be made.
     """
-    held = _held({**wanted, "numpy": ""})
-    installed = {name: version for name, version in wanted.items() if name in held} | held
-    key = "\0".join([sys.version, sys.base_prefix, engine, *sorted(map(repr, installed.items()))])
-    name = f"mujoco-{engine}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    here = {_plain(one.name): one.version for one in importlib.metadata.distributions() if one.name}
+    here.pop(_ENGINE, None)
+    wanted = {"numpy": here["numpy"], **{name: v for name, v in wanted.items() if name in here}}
+    parts = [sys.version, sys.base_prefix, engine, sorted(wanted.items()), sorted(here.items())]
+    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     folder = root / ".coursebuild" / _FOLDER
     prefix = folder / name
     try:
         make_private_folder(folder.parent)
         folder.mkdir(exist_ok=True)
-        _remove_remains(folder)
+        for remains in folder.glob(f"{TEMPORARY}*"):
+            shutil.rmtree(remains, ignore_errors=True)
         if not (prefix / "pyvenv.cfg").is_file():
             say(f"installing MuJoCo {engine} into .coursebuild/{_FOLDER}/{name}")
-            wanted = {one: version for one, version in installed.items() if one in wanted}
-            _make(prefix, engine, wanted | {"numpy": installed["numpy"]}, installed)
+            _make(prefix, engine, wanted, here)
         os.utime(prefix)
-        packages = _packages(prefix)
+        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+        packages = str(prefix / "lib" / f"python{version}" / "site-packages")
         _link_library(packages)
         _remove_unused(folder, prefix)
     except OSError as error:
@@ -103,90 +118,69 @@ def environment(
     return Place(name, f"{prefix}/bin/python", str(prefix), packages)
 
 
-def _plain(name: str) -> str:
-    """A distribution's name as PEP 503 has it."""
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
-def _held(names: Iterable[str]) -> dict[str, str]:
-    """What is installed here of these distributions, MuJoCo, and all that they require."""
-    found: dict[str, str] = {}
-    todo = [*names, _ENGINE]
-    while todo:
-        name = _plain(todo.pop())
-        if name in found:
-            continue
-        try:
-            distribution = importlib.metadata.distribution(name)
-        except importlib.metadata.PackageNotFoundError:  # of another system, or of an extra
-            continue
-        found[name] = distribution.version
-        for line in distribution.requires or ():
-            match = _REQUIRED.match(line)
-            if match is not None and "extra" not in line.partition(";")[2]:
-                todo.append(match.group())
-    found.pop(_ENGINE, None)
-    return found
-
-
-def _make(prefix: Path, engine: str, wanted: Mapping[str, str], held: Mapping[str, str]) -> None:
+def _make(prefix: Path, engine: str, wanted: Mapping[str, str], here: Mapping[str, str]) -> None:
     if importlib.util.find_spec("pip") is None:
         raise EffectError(
             "pip is not installed for this Python, and nothing can be installed without it",
             help="run `python -m ensurepip`",
         )
-    with _temporary(prefix.parent) as new:
-        with _told("a virtual environment cannot be made"):
-            _run([sys.executable, "-m", "venv", "--without-pip", str(new)])
+    new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
+    try:
+        status, said = _run([sys.executable, "-m", "venv", "--without-pip", str(new)])
+        if status:
+            raise EffectError(f"a virtual environment cannot be made: {_last(said)}")
         configured = Path(sys.prefix) / "pip.conf"
         if configured.is_file():
             shutil.copyfile(configured, new / "pip.conf")
         constraints = new / "constraints.txt"
-        rest = {one: version for one, version in held.items() if one not in wanted}
-        constraints.write_text("".join(f"{one}=={version}\n" for one, version in rest.items()))
+        rest = [f"{one}=={version}\n" for one, version in here.items() if one not in wanted]
+        constraints.write_text("".join(rest))
         python = str(new / "bin" / "python")
-        pip = [sys.executable, "-m", "pip", "--python", python]
+        pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL, "-c", str(constraints)]
         pinned = [f"{one}=={version}" for one, version in wanted.items()]
-        done = _run(
-            [*pip, *_INSTALL, "-c", str(constraints), f"{_ENGINE}=={engine}", *pinned],
-            check=False,
-        )
-        if done.returncode:
-            raise pip_error(engine, done.stdout, {**held, **wanted})
-        with _told(f"MuJoCo {engine} cannot be imported beside the other packages of here"):
-            _run([python, "-E", "-P", "-c", _TRY])
+        status, said = _run([*pip, f"{_ENGINE}=={engine}", *pinned])
+        if status:
+            raise _pip_error(engine, said)
+        status, said = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
+        if status:
+            beside = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            raise EffectError(f"{beside}: {_last(said)}")
         new.rename(prefix)
-
-
-@contextlib.contextmanager
-def _temporary(folder: Path) -> Iterator[Path]:
-    """A folder that is gone afterwards, unless it was renamed; locked as long as we live."""
-    new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=folder))
-    fd = os.open(new, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        try_lock(fd)
-        yield new
     finally:
         shutil.rmtree(new, ignore_errors=True)
-        os.close(fd)
 
 
-@contextlib.contextmanager
-def _told(what: str) -> Iterator[None]:
-    try:
-        yield
-    except subprocess.CalledProcessError as error:
-        lines = [line.strip() for line in error.output.splitlines() if line.strip()]
-        raise EffectError(f"{what}: {lines[-1] if lines else 'it says nothing'}") from None
+def _pip_error(engine: str, said: str) -> EffectError:
+    """Why pip did not install this version of MuJoCo, mostly in its own words."""
+    if f"No matching distribution found for {_ENGINE}=={engine}" in said:
+        where = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
+        return EffectError(f"pip finds no MuJoCo {engine} for {where}", help=_OFFLINE)
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    if "ResolutionImpossible" in said:
+        told = [line for line in lines if " depends on " in line or "user requested" in line]
+        return EffectError(
+            f"MuJoCo {engine} cannot be installed beside the packages of here: "
+            f"{'; '.join(told[:_LINES])}",
+            help="name a version of MuJoCo that goes with them",
+        )
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    told = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
+    return EffectError(
+        f"pip cannot install MuJoCo {engine}: {'; '.join((told or lines)[-_LINES:])}"
+    )
 
 
-def _run(command: Sequence[str], *, check: bool = True) -> subprocess.CompletedProcess[str]:
-    """Run a program; if we are interrupted it ends, with all that it has started."""
+def _last(said: str) -> str:
+    return next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "no reason")
+
+
+def _run(command: Sequence[str]) -> tuple[int, str]:
+    """The status of a program and what it said; if we are interrupted it ends with its children."""
     # What is meant for this process's Python, such as warnings as errors, would disturb pip's.
     unsaid = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
     outer = {name: value for name, value in os.environ.items() if not name.startswith(unsaid)}
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
-    process = subprocess.Popen(
+    with subprocess.Popen(
         command,
         env={"PIP_RETRIES": "1", **outer, **ours},
         stdin=subprocess.DEVNULL,
@@ -196,25 +190,14 @@ def _run(command: Sequence[str], *, check: bool = True) -> subprocess.CompletedP
         encoding="utf-8",
         errors="backslashreplace",
         start_new_session=True,
-    )
-    try:
-        said, _ = process.communicate()
-    finally:
-        if process.poll() is None:
+    ) as process:
+        try:
+            said, _ = process.communicate()
+        except BaseException:
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-            assert process.stdout is not None
-            process.stdout.close()
-    done = subprocess.CompletedProcess(list(command), process.returncode, said)
-    if check:
-        done.check_returncode()
-    return done
-
-
-def _packages(prefix: Path) -> str:
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    return str(prefix / "lib" / f"python{version}" / "site-packages")
+            raise
+    return process.returncode, said
 
 
 def _link_library(packages: str) -> None:
@@ -225,21 +208,9 @@ def _link_library(packages: str) -> None:
         link.symlink_to(target)
 
 
-def _remove_remains(folder: Path) -> None:
-    """Remove environments whose makers were killed."""
-    for path in folder.glob(f"{TEMPORARY}*"):
-        with contextlib.suppress(OSError):
-            fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-            try:
-                if is_abandoned(fd):
-                    shutil.rmtree(path, ignore_errors=True)
-            finally:
-                os.close(fd)
-
-
 def _remove_unused(folder: Path, used: Path) -> None:
     """Keep the environments that were used last."""
-    others = [path for path in folder.iterdir() if path != used and TEMPORARY not in path.name]
+    others = [path for path in folder.iterdir() if path != used]
     others.sort(key=lambda path: path.stat().st_mtime, reverse=True)
     for path in others[_KEPT - 1 :]:
         shutil.rmtree(path, ignore_errors=True)

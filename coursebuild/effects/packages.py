@@ -1,73 +1,98 @@
-"""What is installed, for the archives in which scripts are downloaded.
+"""Which version of what is installed gives a module, without importing anything.
 
-Entry points: `distributions(modules)`, `kept_distributions`, `library_files()`.
+Entry points: `Installed`; `distributions`, `library_files`, for archives of scripts.
+
+Reading what each distribution provides takes a quarter of a second, so the whole map is kept until
+one of the folders with installed packages changes. A module that no distribution names, and one of
+this tool's own, is known by the content of its files.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.util
 import json
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from coursebuild.effects.digests import Digests
 from coursebuild.effects.store import Store
 from coursebuild.results import OutputFile
 
-_FOLDERS = ("site-packages", "dist-packages")
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution
+
+ABSENT = ""
+_OURS = "coursebuild"
+_LIBRARY = Path(__file__).resolve().parents[2]
 _TICK = 2_000_000_000
 """The coarsest clock of a file system, ns."""
+_FOLDERS = ("site-packages", "dist-packages")
 
 
-def distributions(modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
+def site_folders() -> tuple[str, ...]:
+    """The folders with installed packages that scripts see too."""
+    return tuple(path for path in sys.path if Path(path).name in _FOLDERS)
+
+
+class Installed:
+    """What is installed for the interpreter that runs the scripts."""
+
+    def __init__(
+        self, store: Store, digests: Digests, folders: Sequence[str] | None = None
+    ) -> None:
+        self._digests = digests
+        self._folders = site_folders() if folders is None else tuple(folders)
+        self._store = store
+        self._map: Mapping[str, str] | None = None
+        self._found: dict[str, str] = {}
+
+    def version(self, module: str) -> str:
+        """Such as `numpy 2.4.6`; empty where there is no such module."""
+        if module not in self._found:
+            self._found[module] = self._version(module)
+        return self._found[module]
+
+    def _version(self, module: str) -> str:
+        if self._map is None:
+            self._map = _provided(self._store, self._folders)
+        named = self._map.get(module)
+        if named is not None:
+            return named
+        spec = _spec(module, self._folders) or _spec(module, [str(_LIBRARY)])
+        return ABSENT if spec is None else f"files {self._content(spec)}"
+
+    def _content(self, spec: ModuleSpec) -> str:
+        """A hash of a module's files."""
+        if not spec.submodule_search_locations:
+            return self._digests.file(spec.origin or "")[:16]
+        digest = hashlib.sha256()
+        for top in sorted(spec.submodule_search_locations):
+            for file in sorted(Path(top).rglob("*")):
+                if "__pycache__" not in file.parts and file.is_file():
+                    state = self._digests.file(str(file))
+                    digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
+        return digest.hexdigest()[:16]
+
+
+def distributions(store: Store, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
     """(module, distribution, version) of each top-level module that an installed package provides.
 
     Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
     """
-    import importlib.metadata
-
-    provided = importlib.metadata.packages_distributions()
-    found = []
-    for module in sorted(set(modules) - {"mjcourse", "coursebuild"}):
-        names = sorted(set(provided.get(module, ())))
-        if names:
-            found.append((module, names[0], importlib.metadata.version(names[0])))
-    return tuple(found)
-
-
-def kept_distributions(store: Store, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
-    """The same from the store, as long as no folder with packages changes."""
     wanted = sorted(set(modules))
-    signature = _signature()
-    if not wanted:
-        return ()
-    if signature is None:
-        return distributions(wanted)
-    key = hashlib.sha256("\0".join((signature, *wanted)).encode("utf-8", "surrogateescape"))
-
-    def make() -> bytes:
-        return json.dumps(distributions(wanted)).encode()
-
-    data = store.kept("packages", key.hexdigest(), make)
-    return tuple((module, name, version) for module, name, version in json.loads(data))
-
-
-def _signature() -> str | None:
-    """The folders with packages, as they are now; none while they change."""
-    parts = [sys.version]
-    for folder in sys.path:
-        if not folder.endswith(_FOLDERS):  # other places change often, and no package is put there
-            continue
-        try:
-            status = Path(folder).stat()
-        except OSError:
-            continue
-        if time.time_ns() - status.st_mtime_ns < _TICK:
-            return None
-        parts.append(f"{folder}\0{status.st_mtime_ns}\0{status.st_ino}")
-    return "\0".join(parts)
+    provided = _provided(store, site_folders()) if wanted else {}
+    found = []
+    for module in wanted:
+        name, _, version = provided.get(module, "").split(", ")[0].rpartition(" ")
+        if name:
+            found.append((module, name, version))
+    return tuple(found)
 
 
 def library_files() -> tuple[OutputFile, ...]:
@@ -82,3 +107,68 @@ def library_files() -> tuple[OutputFile, ...]:
         for path in sorted(files)
         if "__pycache__" not in path.parts
     )
+
+
+def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
+    with contextlib.suppress(ImportError, ValueError):
+        return PathFinder.find_spec(module, list(folders))
+    return None
+
+
+def _provided(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
+    """The distributions, with versions, of each top-level module in these folders."""
+    key = _signature(folders)
+    kept = store.peek("installed", key) if key is not None else None
+    with contextlib.suppress(ValueError, AttributeError, RecursionError):
+        if kept is not None:
+            return {str(k): str(v) for k, v in json.loads(kept).items()}
+    found = _scan(folders)
+    if key is not None:
+        store.keep("installed", key, json.dumps(found, sort_keys=True).encode(), local=True)
+    return found
+
+
+def _signature(folders: Sequence[str]) -> str | None:
+    """A hash that differs when something was installed; `None` right after that."""
+    parts: list[object] = [3, sys.version]
+    for folder in folders:
+        try:
+            status = Path(folder).stat()
+        except OSError:
+            parts.append((folder, None))
+            continue
+        latest = max(status.st_mtime_ns, status.st_ctime_ns)
+        if latest + _TICK >= time.time_ns():
+            return None
+        parts.append((folder, status.st_ino, status.st_mtime_ns, status.st_ctime_ns))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def _scan(folders: Sequence[str]) -> dict[str, str]:
+    import importlib.metadata  # it takes longer than all else that a run with nothing to do needs
+
+    found: dict[str, set[str]] = {}
+    seen: set[str] = set()
+    for distribution in importlib.metadata.distributions(path=list(folders)):
+        name = distribution.metadata["Name"] or ""
+        if name in seen or name == _OURS:  # the first on the path counts
+            continue
+        seen.add(name)
+        for module in _modules(distribution):
+            found.setdefault(module, set()).add(f"{name} {distribution.version}")
+    return {module: ", ".join(sorted(names)) for module, names in found.items()}
+
+
+def _modules(distribution: Distribution) -> set[str]:
+    """The top-level modules of a distribution."""
+    listed = distribution.read_text("top_level.txt")
+    if listed:
+        return {module.rpartition("/")[2] for module in listed.split()}
+    modules = set()
+    for file in distribution.files or ():
+        first = file.parts[0] if file.parts else ""
+        if len(file.parts) > 1 and first.isidentifier():
+            modules.add(first)
+        elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
+            modules.add(first.split(".")[0])
+    return modules

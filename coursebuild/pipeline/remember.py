@@ -24,7 +24,7 @@ from msgspec import Struct
 
 from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
-from coursebuild.effects.installed import Installed
+from coursebuild.effects.packages import Installed
 from coursebuild.effects.store import Store
 from coursebuild.effects.surroundings import Place
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace

@@ -157,7 +157,9 @@ def _work(live: LiveCourse, saves: Watcher, options: Options, progress: Progress
 def _surroundings(options: Options, course: Course) -> Surroundings:
     """What the archives of scripts need."""
     library = library_files()
-    packages = tuple(Package(*p) for p in distributions(imported_modules(course, library)))
+    packages = tuple(
+        Package(*p) for p in distributions(options.store, imported_modules(course, library))
+    )
     meshes: list[OutputFile] = []
     for path in course.files:
         if path.startswith("models/"):

@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.digests import Digests
-from coursebuild.effects.packages import kept_distributions, library_files
+from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.prepared import prepared_copy, prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
@@ -239,7 +239,7 @@ class _Site:
         library = library_files() if "mjcourse" in used else ()
         imports = _Imports(self.store, by_text)
         modules = zips.imported_modules(self.course, library, imports, imports.of)
-        packages = tuple(zips.Package(*p) for p in kept_distributions(self.store, modules))
+        packages = tuple(zips.Package(*p) for p in distributions(self.store, modules))
         meshes = tuple(
             OutputFile(path, read_bytes(self.options.root, path))
             for path in self.course.files

@@ -247,7 +247,7 @@ def test_version_that_cannot_be_installed_leaves_nothing(
     done = against(course, "-q", version="9.0.9")
     assert done.status == 1
     assert done.err.startswith("coursebuild: pip finds no MuJoCo 9.0.9 for Python ")
-    assert done.err.endswith(f"\n  help: near it are {HERE}, {OTHER}\n")
+    assert "\n  help: without a network let pip find the wheels in a folder" in done.err
     wheel(wheels, "mujoco", "9.2.0", {"mujoco": "raise ImportError('built for another numpy')"})
     done = against(course, "-q", version="9.2.0")
     assert done.err == (

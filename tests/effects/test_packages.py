@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import time
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from coursebuild.effects import digests, installed
 from coursebuild.effects.digests import Digests
-from coursebuild.effects.installed import ABSENT, Installed
+from coursebuild.effects.packages import ABSENT, Installed, distributions
 from coursebuild.effects.store import Store
 
 
@@ -38,8 +40,7 @@ def install(folder: Path, name: str, version: str, files: list[str]) -> None:
 @pytest.fixture
 def later(monkeypatch: pytest.MonkeyPatch) -> None:
     real = time.time_ns
-    for module in (digests, installed):
-        monkeypatch.setattr(module.time, "time_ns", lambda: real() + 3_600_000_000_000)
+    monkeypatch.setattr(time, "time_ns", lambda: real() + 3_600_000_000_000)
 
 
 def ask(tmp_path: Path, site: Path) -> Installed:
@@ -86,13 +87,13 @@ def test_the_map_is_kept_until_something_is_installed(
     tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scans: list[int] = []
-    real = installed._scan
+    real = importlib.metadata.distributions
 
-    def scan(folders: tuple[str, ...]) -> dict[str, str]:
+    def scan(**where: Any) -> Iterable[importlib.metadata.Distribution]:
         scans.append(1)
-        return real(folders)
+        return real(**where)
 
-    monkeypatch.setattr(installed, "_scan", scan)
+    monkeypatch.setattr(importlib.metadata, "distributions", scan)
     for _ in range(3):
         assert ask(tmp_path, site).version("tool") == "Some-Tool 1.2"
     assert len(scans) == 1
@@ -108,7 +109,7 @@ def test_right_after_an_installation_nothing_is_kept(
     tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = time.time_ns()
-    monkeypatch.setattr(installed.time, "time_ns", lambda: now)
+    monkeypatch.setattr(time, "time_ns", lambda: now)
     ask(tmp_path, site).version("tool")
     install(site, "fresh", "1", ["fresh.py"])
     assert ask(tmp_path, site).version("fresh") == "fresh 1"
@@ -132,3 +133,6 @@ def test_the_real_environment(tmp_path: Path) -> None:
     assert found.version("mujoco").startswith("mujoco ")
     assert found.version("os") == ABSENT, "Python's own modules are of no distribution"
     assert os.sep not in found.version("mjcourse")
+    numpy = importlib.metadata.version("numpy")
+    asked = ("os", "numpy", "nowhere", "mjcourse")
+    assert distributions(store, asked) == (("numpy", "numpy", numpy),)
