@@ -26,10 +26,10 @@ What is kept:
 
 Engines and processes:
 
-- `v8` (with `typeset.js`): formulas to MathML, by `v8_library` and `v8_start`
+- `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
-- `lab_engine` (with `lab_pieces.js`), `lab_files` (with `lab_timers.js`), `native` (with
-  `native_worker`): labs in the browser's engine and natively
+- `lab_engine` (with `lab_pieces.js`), `lab_files`, `native` (with `native_worker`): labs in the
+  browser's engine and natively
 - `child`, `pool`: processes that answer, and copies of this one
 - `leaving`: the end of this process
 

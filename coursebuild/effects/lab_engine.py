@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.lab_files import script_paths, wasm_path
-from coursebuild.effects.v8 import Isolate
-from coursebuild.effects.v8_library import LimitError, ScriptError, StoppedError
+from coursebuild.effects.lab_files import script_path, wasm_path
+from coursebuild.effects.v8 import Isolate, LimitError, ScriptError, StoppedError
 
 _MEMORY = 1 << 30
 """Bytes: the engine's WebAssembly memory counts."""
@@ -27,14 +26,10 @@ _PIECES = Path(__file__).with_name("lab_pieces.js")
 
 
 class LabEngine:
-    """Tries labs, one after the other; a context manager for use in one thread.
+    """Tries labs, one after the other; a context manager for use in one thread."""
 
-    A trial ends itself when its time is over; code that never returns is ended `margin` seconds
-    later.
-    """
-
-    def __init__(self, margin: float = 15.0) -> None:
-        self._margin = margin
+    def __init__(self, memory: int = _MEMORY) -> None:
+        self._memory = memory
         self._isolate: Isolate | None = None
         self._stopped = False
         self.version = ""
@@ -54,8 +49,8 @@ class LabEngine:
     def stop(self) -> None:
         """From another thread: end what runs, and what comes after, by a `StoppedError` there."""
         self._stopped = True
-        if self._isolate is not None:
-            self._isolate.stop()
+        if (isolate := self._isolate) is not None:
+            isolate.stop()
 
     def mistakes(self, pieces: Sequence[tuple[str, str, str, bool]]) -> list[str | None]:
         """For each piece of code: why it cannot be part of a lab, or `None`.
@@ -68,29 +63,33 @@ class LabEngine:
         found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
         return found
 
-    def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
-        """The reply to a trial's request; `wall` is how many seconds it may take.
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        """The reply to a trial's request; `seconds` of processor time is what it may take.
 
-        A trial that had to be stopped gives a reply with one failure, of the kind `timeout`, at the
-        entry whose code was running.
+        A trial that had to be ended gives a reply with one failure, of the kind `timeout`, at the
+        entry whose code was running, or else at what was tried.
         """
         isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
-            text = isolate.call("trial", json.dumps({**request, "wall": wall}), wall + self._margin)
+            text = isolate.call("trial", json.dumps(request), seconds)
         except LimitError as error:
-            entry = _running(isolate) if error.resumable else []
-            self.close()
-            return self._ended("timeout", entry, str(error))
+            return self._ended(isolate, "timeout", str(error))
         except ScriptError as error:  # lab code has broken what all share
-            self.close()
-            return self._ended("engine", [], f"the trial broke: {str(error).splitlines()[0]}")
+            return self._ended(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
             self.close()  # what ended or was changed cannot be trusted with the rest
         return reply
 
-    def _ended(self, kind: str, entry: list[str | int], message: str) -> dict[str, Any]:
+    def _ended(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
+        entry: list[str | int] = []
+        with contextlib.suppress(LimitError, ScriptError):
+            told = json.loads(isolate.call("trying", "", _START_SECONDS))
+            entry = told["stuck"] or told["trying"]
+            if kind == "timeout" and told["stuck"] is None:
+                message = "did not finish in time"
+        self.close()
         failure = {"entry": entry, "kind": kind, "message": message, "at": None}
         return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
 
@@ -103,10 +102,10 @@ class LabEngine:
         return isolate
 
     def _start(self) -> Isolate:
-        scripts = (path.read_text(encoding="utf-8") for path in (*script_paths(), _PIECES))
-        self._isolate = isolate = Isolate(*scripts, memory=_MEMORY)
-        isolate.fill("wasm", wasm_path().read_bytes())
+        scripts = (path.read_text(encoding="utf-8") for path in (script_path(), _PIECES))
+        self._isolate = isolate = Isolate(*scripts, memory=self._memory)
         try:
+            isolate.fill("wasm", wasm_path().read_bytes())
             isolate.call("boot", "", _START_SECONDS)
             self.version = isolate.call("booted", "", _START_SECONDS)
         except (LimitError, ScriptError) as error:
@@ -114,12 +113,3 @@ class LabEngine:
             why = str(error).splitlines()[0]
             raise EffectError(f"the browser's engine does not start: {why}") from None
         return isolate
-
-
-def _running(isolate: Isolate) -> list[str | int]:
-    """The entry whose code was running when a trial was stopped; empty where none was."""
-    with contextlib.suppress(LimitError, ScriptError):
-        told = json.loads(isolate.call("trying", "", _START_SECONDS))
-        found: list[str | int] = told["entry"] or told["trying"] or []
-        return found
-    return []

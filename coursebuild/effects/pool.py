@@ -33,8 +33,6 @@ from typing import Any, Generic, NoReturn, Self, TypeVar
 
 from msgspec import Struct, field
 
-from coursebuild.effects import v8_start
-
 Ask = TypeVar("Ask")
 Answer = TypeVar("Answer")
 
@@ -48,8 +46,8 @@ def can_fork() -> bool:
     """Whether this process can be copied: it has one thread, and nothing that a copy breaks."""
     if not hasattr(os, "fork") or sys.platform == "darwin":
         return False
-    # The threads of these libraries do not come along into a copy.
-    return threading.active_count() == 1 and "mujoco" not in sys.modules and not v8_start.runs()
+    # Threads do not come along into a copy, and MuJoCo has some of its own.
+    return threading.active_count() == 1 and "mujoco" not in sys.modules
 
 
 @contextlib.contextmanager

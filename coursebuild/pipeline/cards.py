@@ -6,6 +6,7 @@ Entry point: `with_card(root, scene, report)`.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
@@ -13,21 +14,26 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.mjcf import parts
 from coursebuild.effects.native import NativeEngine, NativeError
-from coursebuild.effects.v8_library import StoppedError
+from coursebuild.effects.v8 import StoppedError
 from coursebuild.numerics.reports.bench import SceneCard, SceneReport
 from coursebuild.pipeline.scenes import Scene
+
+if TYPE_CHECKING:
+    from coursebuild.numerics.problem import Scenario
 
 _STEPS = 5000
 """Of a run in the browser's engine, at most."""
 _RUNS = 8
 """The first of them compile; the fastest counts."""
-_WALL = 20.0
-"""Seconds that a run may take."""
+_SECONDS = 20.0
+"""Processor time that a run may take."""
 _CODE = "({controls: [], readouts: [], plots: [], expect: []})"
 
 
-def with_card(root: Path, scene: Scene, report: SceneReport) -> SceneReport:
-    """The report with the model's card.
+def with_card(
+    root: Path, scene: Scene, report: SceneReport, seconds: float = _SECONDS
+) -> SceneReport:
+    """The report with the model's card; a run in the browser's engine may take so many `seconds`.
 
     Raises:
         EffectError: an engine cannot be loaded.
@@ -55,15 +61,15 @@ def with_card(root: Path, scene: Scene, report: SceneReport) -> SceneReport:
         touched=len(touched),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
-        browser=_browser(root, scene, found[0].scenario.duration, found[0].scenario.keyframe),
+        browser=_browser(root, scene, found[0].scenario, seconds),
     )
     return replace(report, card=card)
 
 
-def _browser(root: Path, scene: Scene, duration: float, keyframe: int) -> float | None:
+def _browser(root: Path, scene: Scene, scenario: Scenario, seconds: float) -> float | None:
     """Simulated time over the time it takes in WebAssembly; `None` where no run came to an end."""
     source, timestep = scene.model.source, scene.facts.timestep
-    data = {"id": "speed", "title": "", "key": None if keyframe < 0 else keyframe}
+    data = {"id": "speed", "title": "", "key": None if scenario.keyframe < 0 else scenario.keyframe}
     nothing = dict.fromkeys(("camera", "forceScale", "stopAt", "trail", "seed"))
     lists: dict[str, list[object]] = {
         name: [] for name in ("overlays", "controls", "readouts", "plots", "expect")
@@ -71,7 +77,7 @@ def _browser(root: Path, scene: Scene, duration: float, keyframe: int) -> float 
     request = {
         "config": {**data, **nothing, **lists, "autoplay": False},
         "code": _CODE,
-        "seconds": min(duration, _STEPS * timestep),
+        "seconds": min(scenario.duration, _STEPS * timestep),
         "parity": False,
     }
     best = 0
@@ -80,7 +86,7 @@ def _browser(root: Path, scene: Scene, duration: float, keyframe: int) -> float 
             mjb = native.save(source.path, source.text)
         with LabEngine() as engine:
             for _ in range(_RUNS):
-                reply = engine.trial(request, mjb, _WALL)
+                reply = engine.trial(request, mjb, seconds)
                 if reply["main"] is None:
                     break
                 best = max(best, reply.get("stepsPerSecond") or 0)

@@ -224,7 +224,7 @@ class Documents:
                 return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
             count = min(self._jobs, -(-2 * len(first) // _MANY))
-            self._pool = Pool(reader.answer, count, reader.begin_copy)
+            self._pool = Pool(reader.answer, count)
         with self._stage(name):
             return self._pool.run(requests)
 

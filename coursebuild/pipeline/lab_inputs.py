@@ -20,8 +20,8 @@ from coursebuild.scripts.extract import owners
 
 SIMULATED = "simlab"
 """The kind of labs that are tried; others are of the course's own."""
-WALL = 60.0
-"""Seconds that a trial may take."""
+SECONDS = 60.0
+"""Processor time that a trial may take."""
 _UNTRIED = ("id", "title", "model", "height", "toggles")
 """Data that no trial depends on."""
 
@@ -49,7 +49,7 @@ def lab_inputs(lab: Lab, name: str) -> Inputs:
         ("how a lab is repeated natively", native_digest()[:12]),
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
-    return Inputs(f"lab {name}", text, (), WALL, (), around)
+    return Inputs(f"lab {name}", text, (), SECONDS, (), around)
 
 
 def tried_data(module: LabModule) -> dict[str, Any]:

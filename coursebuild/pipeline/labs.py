@@ -48,7 +48,7 @@ from coursebuild.labs.verdict import (
 from coursebuild.model import Course, Lab
 from coursebuild.pipeline.custom_labs import custom_lab
 from coursebuild.pipeline.lab_export import Offer, exported
-from coursebuild.pipeline.lab_inputs import SIMULATED, WALL, lab_inputs, tried_data
+from coursebuild.pipeline.lab_inputs import SECONDS, SIMULATED, lab_inputs, tried_data
 from coursebuild.pipeline.lab_inputs import labs_of as labs_of
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.remember import LabTrial, Memory
@@ -279,7 +279,7 @@ class _Attempt(Struct, frozen=True):
             "seconds": self.lab.verify_seconds,
         }
         began = time.monotonic()
-        reply = self.engines.browser.trial(request, mjb, WALL)
+        reply = self.engines.browser.trial(request, mjb, SECONDS)
         main = reply["main"]
         if main is not None and main["parity"] is not None:
             main["recorded"] = export_check.recorded(main["parity"], self._horizon(main))

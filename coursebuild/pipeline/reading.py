@@ -108,9 +108,9 @@ def prepare_to_read(sample: Task) -> None:
     mark_now("python", 'f"{x}"\n')
     imports("x\n")
     if document_formulas(read):
-        from coursebuild.effects.v8_start import preload
+        from coursebuild.effects.v8 import start
 
-        preload()
+        start()
 
 
 class Reader:
@@ -137,12 +137,6 @@ class Reader:
         if self._engine is not None:
             self._engine.close()
             self._engine = None
-
-    def begin_copy(self) -> None:
-        """This process is a copy now, which does what is asked here and nothing else."""
-        from coursebuild.effects.v8_start import for_formulas_only
-
-        for_formulas_only()
 
     def answer(self, request: Request) -> Answer:
         """Do what is asked."""

@@ -5,7 +5,8 @@
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson
- *   trying('')          → JSON           the entry whose code ran last, for a trial that was stopped from outside
+ *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or
+ *                                        `null`, and `trying`, the entry that was tried
  */
 
 import './lab/trial/shims.js'
@@ -14,13 +15,17 @@ import { createEngine } from './lab/core/engine.js'
 import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
 import { Guard } from './lab/trial/guard.js'
-import { runTrial } from './lab/trial/trial.js'
+import { runTrial, stuck } from './lab/trial/trial.js'
 
 const buffers = new Map()
 const printed = []
 let engine = null
 let guard = null
 let failure = 'the engine has not been started'
+
+globalThis.setTimeout = () => {
+  throw new Error('a lab sets no timers: they would ring in the next one')
+}
 
 globalThis.reserve = (name, size) => {
   const buffer = new ArrayBuffer(size)
@@ -52,4 +57,4 @@ globalThis.trial = (json) => {
   return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
 }
 
-globalThis.trying = () => JSON.stringify({ entry: current.entry, trying: current.trying ?? null })
+globalThis.trying = () => JSON.stringify({ stuck: stuck(performance.now()), trying: current.trying ?? [] })

@@ -222,11 +222,6 @@ test('a state that is no number can be drawn, even in the first picture that has
   assert.deepEqual(reply.failures.map(({ kind }) => kind), ['diverged'])
 })
 
-test('a trial that takes too long says so', () => {
-  const reply = attempt(FALLING, {}, {}, { seconds: 1000, wall: 0.005 })
-  assert.deepEqual(told(reply).map(([, kind]) => kind), ['timeout'])
-})
-
 test('a reset that does not lead back is noticed, with the entry that would have to set the number', () => {
   const differs = (data, pieces) => {
     const reply = attempt(FALLING, data, pieces, { seconds: 0.1 })

@@ -17,10 +17,10 @@ from coursebuild.effects import lab_engine, lab_files
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.lab_files import engine_digest
-from coursebuild.effects.v8_library import StoppedError
+from coursebuild.effects.v8 import StoppedError
 from coursebuild.effects.versions import engine_version
 from support.lab_values import BALL, Bench, make_lab, request
-from support.runners import wait_until
+from support.runners import computed, wait_until
 
 pytestmark = pytest.mark.engine
 
@@ -44,25 +44,14 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         yield bench
 
 
-@pytest.fixture(scope="module")
-def hasty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    """The same, of which the browser's soon ends what never returns."""
-    bench = Bench(tmp_path_factory.mktemp("hasty"), LabEngine(margin=0.3))
-    with bench.browser, bench.native:
-        yield bench
-
-
 def told(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
     return [(tuple(f["entry"]), f["kind"], f["message"]) for f in reply["failures"]]
 
 
-def test_it_is_started_when_it_is_needed_and_kept(bench: Bench) -> None:
-    assert bench.browser._isolate is None
-    first = bench.trial(make_lab())
+def test_the_same_trial_gives_the_same_reply(shared: Bench) -> None:
+    first = shared.trial(make_lab())
     assert (first["version"], told(first)) == (engine_version(), [])
-    isolate = bench.browser._isolate
-    again = bench.trial(make_lab())
-    assert bench.browser._isolate is isolate
+    again = shared.trial(make_lab())
     assert {**first, "stepsPerSecond": 0} == {**again, "stepsPerSecond": 0}
 
 
@@ -93,28 +82,29 @@ def test_it_is_started_when_it_is_needed_and_kept(bench: Bench) -> None:
     ],
 )
 def test_an_endless_loop_is_told_at_its_entry_and_the_next_lab_is_tried(
-    hasty: Bench, fields: dict[str, Any], entry: tuple[Any, ...]
+    shared: Bench, fields: dict[str, Any], entry: tuple[Any, ...]
 ) -> None:
-    reply = hasty.trial(make_lab(**fields), wall=2.7)
+    reply = shared.trial(make_lab(**fields), seconds=3.0)
     assert told(reply) == [(entry, "timeout", "ran for more than 3 s")]
     assert (reply["main"], reply["version"]) == (None, engine_version())
-    assert told(hasty.trial(make_lab())) == []
+    assert told(shared.trial(make_lab())) == []
 
 
-def test_a_model_that_is_too_slow_ends_by_itself(shared: Bench) -> None:
-    reply = shared.trial(make_lab(verify={"seconds": 100_000}), wall=0.3)
-    assert told(reply) == [((), "timeout", "did not finish in time")]
-    assert shared.browser._isolate is not None, "which needs no new engine"
+def test_a_lab_that_simulates_too_much_is_told_from_an_endless_loop(shared: Bench) -> None:
+    lab = make_lab(controller="ctx.n = 0", verify={"seconds": 100_000})
+    assert told(shared.trial(lab, seconds=1.0)) == [((), "timeout", "did not finish in time")]
+    assert told(shared.trial(make_lab())) == []
 
 
 def test_memory_that_runs_out_takes_no_other_lab_along(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
-    monkeypatch.setattr(lab_engine, "_MEMORY", 160 << 20)
     eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
-    reply = bench.trial(make_lab(setup=eat))
-    assert told(reply) == [((), "timeout", "took more than 160 MiB")]
-    assert told(bench.trial(make_lab())) == []
+    bench = Bench(tmp_path, LabEngine(memory=160 << 20))
+    with bench.browser, bench.native:
+        reply = bench.trial(make_lab(setup=eat))
+        assert told(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
+        assert told(bench.trial(make_lab())) == []
 
 
 @pytest.mark.parametrize(
@@ -132,7 +122,7 @@ def test_memory_that_runs_out_takes_no_other_lab_along(
     ],
 )
 def test_what_lab_code_may_do_to_the_engine(shared: Bench, code: str) -> None:
-    reply = shared.trial(make_lab(setup=code), wall=300.0)
+    reply = shared.trial(make_lab(setup=code), seconds=300.0)
     assert reply["main"] is None
     assert {kind for _, kind, _ in told_kinds(reply)} <= {"throws", "engine"}
     assert told(shared.trial(make_lab())) == []
@@ -178,10 +168,15 @@ def test_a_lab_that_keeps_to_itself_keeps_the_engine(shared: Bench) -> None:
         overlays=["frames", "contacts"],
     )
     assert told(shared.trial(lab)) == []
-    isolate = shared.browser._isolate
     assert told(shared.trial(lab)) == []
-    assert isolate is not None
-    assert shared.browser._isolate is isolate
+
+
+def test_a_lab_sets_no_timers(shared: Bench) -> None:
+    for code in ("setTimeout(() => {}, 10)", "ctx.later = setTimeout(() => {})"):
+        ((entry, kind, message),) = told(shared.trial(make_lab(setup=code)))
+        assert (entry, kind) == (("setup",), "throws")
+        assert message == "Error: a lab sets no timers: they would ring in the next one"
+    assert told(shared.trial(make_lab(setup="ctx.can = typeof setTimeout"))) == []
 
 
 def test_a_model_that_the_engine_does_not_take(shared: Bench) -> None:
@@ -213,12 +208,6 @@ def test_stopped_before_it_began(bench: Bench) -> None:
     bench.browser.stop()
     with pytest.raises(StoppedError):
         bench.browser.mistakes([])
-
-
-def computed(process: int) -> int:
-    """Hundredths of a second of processor time."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return int(fields[11]) + int(fields[12])
 
 
 def test_an_interrupt_ends_a_trial_and_the_process() -> None:
@@ -297,17 +286,16 @@ def test_an_engine_that_is_damaged(
 def test_the_digest_is_of_what_a_trial_runs(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    folder = tmp_path / "assets"
-    for name in ("mujoco/mujoco.wasm", "js/lab-trial.js", "effects/lab_timers.js"):
-        (folder / name).parent.mkdir(parents=True)
-        (folder / name).write_bytes(b"1")
-    monkeypatch.setattr(lab_files, "assets_dir", lambda: folder)
-    monkeypatch.setattr(lab_files, "_TIMERS", folder / "effects" / "lab_timers.js")
-    found = []
-    for name in ("", "mujoco/mujoco.wasm", "js/lab-trial.js", "effects/lab_timers.js"):
-        if name:
-            (folder / name).write_bytes(b"2")
+    names = "mujoco/mujoco.wasm", "js/lab-trial.js"
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_bytes(b"1")
+    monkeypatch.setattr(lab_files, "assets_dir", lambda: tmp_path)
+    found = set()
+    for name in (None, *names):
+        if name is not None:
+            (tmp_path / name).write_bytes(b"2")
         engine_digest.cache_clear()
-        found.append(engine_digest())
+        found.add(engine_digest())
     engine_digest.cache_clear()
-    assert len(set(found)) == 4
+    assert len(found) == 3

@@ -37,9 +37,10 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def carded(root: Path) -> SceneReport:
+def carded(root: Path, seconds: float = 60.0) -> SceneReport:
     (scene,) = find_scenes(root, ("ball",)).scenes
-    return with_card(root, scene, SceneReport("ball", scene.digest, False, machine(), ()))
+    report = SceneReport("ball", scene.digest, False, machine(), ())
+    return with_card(root, scene, report, seconds)
 
 
 def test_a_card(root: Path) -> None:
@@ -59,10 +60,7 @@ def test_what_touches_depends_on_the_scenarios(root: Path) -> None:
     assert card is not None and (card.possible, card.touched) == (1, 0)
 
 
-def test_a_model_that_the_browser_cannot_run_says_so(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("coursebuild.pipeline.cards._WALL", 0.0)
-    card = carded(root).card
+def test_a_model_that_the_browser_cannot_run_says_so(root: Path) -> None:
+    card = carded(root, 0.0).card
     assert card is not None and card.browser is None
     assert card.geoms == 2

@@ -145,7 +145,7 @@ def test_failure_of_a_lab_is_kept_and_told_again(make: Make) -> None:
 def test_lab_that_took_too_long_is_tried_again(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = course(make, "## A\n\n" + fence('{"model": "ball", "verify": {"seconds": 20}}'))
     with monkeypatch.context() as hasty:
-        hasty.setattr(pipeline_labs, "WALL", 0.01)
+        hasty.setattr(pipeline_labs, "SECONDS", 0.01)
         assert checked(folder, status=1)["diagnostics"][0]["rule"] == "lab-timeout"
     assert cached(folder) == [False]
 

@@ -59,7 +59,7 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
         "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
-        " 'subprocess', 'coursebuild.effects.v8_library', 'coursebuild.numerics.reports.bench',"
+        " 'subprocess', 'coursebuild.effects.v8', 'coursebuild.numerics.reports.bench',"
         " 'coursebuild.numerics.reports.points', 'coursebuild.render.cutting',"
         " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"
         " 'coursebuild.report.machine'};"

@@ -47,18 +47,18 @@ class OtherEngine(LabEngine):
         super().__init__()
         self._other = version
 
-    def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
-        return {**super().trial(request, mjb, wall), "version": self._other}
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        return {**super().trial(request, mjb, seconds), "version": self._other}
 
 
 class ImpatientEngine(LabEngine):
     """The browser's engine, with less time for a trial."""
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(margin=1.0)
+        super().__init__()
         self._seconds = seconds
 
-    def trial(self, request: dict[str, Any], mjb: bytes, wall: float) -> dict[str, Any]:
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
         return super().trial(request, mjb, self._seconds)
 
 

@@ -50,9 +50,9 @@ class Bench:
         self.native = NativeEngine(root)
         self.browser = LabEngine() if browser is None else browser
 
-    def trial(self, lab: Lab, wall: float = 30.0, **more: Any) -> dict[str, Any]:
+    def trial(self, lab: Lab, seconds: float = 30.0, **more: Any) -> dict[str, Any]:
         mjb = self.native.save("models/x.xml", xml_of(lab))
-        return self.browser.trial(request(lab, **more), mjb, wall)
+        return self.browser.trial(request(lab, **more), mjb, seconds)
 
     def parity(self, lab: Lab, **more: Any) -> dict[str, Any]:
         """The comparison of the main run."""

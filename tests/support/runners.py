@@ -55,6 +55,12 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
+def computed(pid: int) -> int:
+    """The processor time that a process has taken, in hundredths of a second."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
+
+
 def wait_until(happened: Callable[[], object], what: str = "") -> None:
     """Look again and again; what takes two minutes hangs."""
     until = time.monotonic() + 120

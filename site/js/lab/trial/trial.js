@@ -7,7 +7,7 @@
  * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.
  * 3. Every claim (`expect`), from a fresh start; claims after the same steps share a run.
  *
- * The same request gives the same reply, but for `stepsPerSecond`, and for what did not fit into `wall`.
+ * The same request gives the same reply, but for `stepsPerSecond`.
  */
 
 import { EngineError } from '../core/engine.js'
@@ -25,13 +25,19 @@ const SECONDS = 5 // of simulated time, unless the lab says otherwise
 const STEPS = 20_000 // at most, unless the lab says for how long
 const PROBE = { seconds: 0.5, steps: 500 } // after each act
 const PACE = 2000 // steps, at most
-const SLICE = 64 // steps between two looks at the clock
+const SLICE = 64 // steps at a time
 const CHECKS = 100 // looks at the readouts during the main run
-
-class OutOfTime extends Error {}
 
 /** What ended the engine has been told; it cannot be trusted with the rest. */
 class Ended extends Error {}
+
+/** When the trial began, and when it last got on; they outlive a trial that was stopped from outside. */
+const progress = { began: 0, last: 0 }
+
+/** The entry that keeps a trial from its end: its code has run for a tenth of the time, so that it may never return. */
+export function stuck(now) {
+  return now - progress.last > (now - progress.began) / 10 ? current.entry : null
+}
 
 /** @param {import('./guard.js').Guard | null} guard of what labs share */
 export function runTrial(engine, request, bytes, now, guard = null) {
@@ -39,13 +45,13 @@ export function runTrial(engine, request, bytes, now, guard = null) {
 }
 
 class Trial {
-  constructor(engine, { config, code, seconds = null, wall = 60, parity = true }, bytes, now, guard) {
+  constructor(engine, { config, code, seconds = null, parity = true }, bytes, now, guard) {
     this.engine = engine
     this.guard = guard
     this.config = config
     this.bytes = bytes
     this.now = now
-    this.deadline = now() + 1000 * wall
+    progress.began = progress.last = now()
     this.seconds = seconds
     this.parity = parity
     this.tried = []
@@ -71,8 +77,7 @@ class Trial {
       this.claims()
       if (reply.main !== null && this.took === 0) this.pace(reply.main)
     } catch (error) {
-      if (error instanceof OutOfTime) this.fail(current.trying ?? [], 'timeout', 'did not finish in time', null)
-      else if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
+      if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
     }
     const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
     return { ...reply, tried: this.tried, failures: this.failures, stepsPerSecond }
@@ -95,6 +100,7 @@ class Trial {
   attempt(entry, what, action) {
     this.during = { entry, what }
     current.trying = entry
+    progress.last = this.now()
     let lab = null
     let result = null
     try {
@@ -104,7 +110,7 @@ class Trial {
       result = action(lab)
       this.shared(action)
     } catch (error) {
-      if (error instanceof OutOfTime || error instanceof Ended) throw error
+      if (error instanceof Ended) throw error
       this.shared(action) // which may be why
       this.failed(error, lab?.time ?? null)
     } finally {
@@ -204,13 +210,12 @@ class Trial {
       const timestep = lab.option.timestep
       const due = Math.round((t - lab.time) / timestep)
       if (!(due > 0)) return null
-      const started = this.now()
+      const started = (progress.last = this.now())
       const { steps, stopped } = lab.step(Math.min(due, left, SLICE))
       this.measure(lab, steps, this.now() - started)
       left -= steps
       this.state(lab)
       if (stopped === 'diverged' || stops.includes(stopped)) return stopped
-      if (this.now() > this.deadline) throw new OutOfTime()
       if (steps === 0) throw new Error(`no step can be made at t = ${begun}`)
     }
     return 'steps'
