@@ -45,6 +45,7 @@ _LIBRARIES = (
     "pygments",
     "segno",
     "tree_sitter",
+    "tree_sitter_javascript",
     "uharfbuzz",
 )
 """What outputs are made with, as the folders with their versions in the name begin."""

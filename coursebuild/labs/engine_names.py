@@ -208,12 +208,13 @@ _STAGES = """
     mj_collision mj_makeConstraint mj_projectConstraint mj_referenceConstraint mj_comVel mj_passive
     mj_subtreeVel mj_rnePostConstraint mj_setConst
 """
-CALLS: dict[str, tuple[str, ...]] = {
+Argument: TypeAlias = Literal["model", "data", "int", "size", "str", "number"]
+CALLS: dict[str, tuple[Argument, ...]] = {
     **dict.fromkeys(_STAGES.split(), ("model", "data")),
     "mj_resetDataKeyframe": ("model", "data", "size"),
     "mj_name2id": ("model", "int", "str"),
     "mj_getTotalmass": ("model",),
-    "mj_setTotalmass": ("model", "float"),
+    "mj_setTotalmass": ("model", "number"),
 }
 """Functions and what they take."""
 RESULTS = {"mj_name2id": "int", "mj_getTotalmass": "float"}

@@ -1,9 +1,9 @@
 """A lab as a Python script that does natively what the lab does in the page.
 
-Entry points: `export_script(lab, about)`; `filled`, the script with the controls at given values.
+Entry points: `export_script(lab, metadata)`; `filled`, the script with values for its controls.
 
-1. Every piece of the lab's code is translated (`python_code`). Where one cannot be, there is no
-   script, and the reason is told.
+1. Every piece of the lab's code is translated (`python_statements`). Where one cannot be, there is
+   no script, and the reason is said.
 2. The pieces are put together in the order in which the lab's core runs them (see docs/labs.md),
    with the helpers that they use.
 3. `{{control:N}}` stands in the text for the value of control N; the page puts it in.
@@ -11,32 +11,33 @@ Entry points: `export_script(lab, about)`; `filled`, the script with the control
 
 from __future__ import annotations
 
+import ast
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
+from tree_sitter import Node
 
 from coursebuild.labs import export_text as text
-from coursebuild.labs.export_text import About
-from coursebuild.labs.javascript import parse_expression, parse_statements
-from coursebuild.labs.javascript_tokens import UntranslatableError
-from coursebuild.labs.javascript_tree import Assign, Name, Statement
-from coursebuild.labs.python_code import (
-    RESERVED,
-    Piece,
-    expression,
-    setter,
-    statements,
-)
+from coursebuild.labs.export_text import ExportMetadata
+from coursebuild.labs.javascript import UntranslatableError, parse_statements
+from coursebuild.labs.python_calls import INEXACT
 from coursebuild.labs.python_context import field_types
-from coursebuild.labs.python_library import LIBRARY
-from coursebuild.labs.python_values import Code, Names, Type, Used
+from coursebuild.labs.python_library import LIBRARY, helpers, imports, names_in
+from coursebuild.labs.python_statements import (
+    RESERVED,
+    Translation,
+    translate_expression,
+    translate_statements,
+)
+from coursebuild.labs.python_values import Code, Type
 from coursebuild.model import Lab, LabControl
 
 _PLACE = re.compile(r"\{\{control:\d+\}\}")
-_HALVES = re.compile("[\ud800-\udfff]")
-"""Halves of characters, which no file can hold."""
+_RESERVED = "SECONDS XML DIVERGED WORD current seconds xml diverged word".split()
+"""Names that a script has besides those that its code can see."""
+_FORWARD = "mujoco.mj_forward(model, data)"
 
 
 class Export(Struct, frozen=True):
@@ -56,16 +57,18 @@ def file_name(lab: str) -> str:
     return f"lab_{re.sub(r'[^a-z0-9]+', '_', lab.lower().replace('-lab-', '_')).strip('_')}.py"
 
 
-def export_script(lab: Lab, about: About) -> Export | str:
+def export_script(lab: Lab, metadata: ExportMetadata) -> Export | str:
     """The script of a lab, or why there is none."""
     if lab.kind != "simlab":
         return "its kind has code of its own"
     if lab.xml is not None and "file" in lab.xml.text:
         return "the model in the lab may be made of several files"
     try:
-        return _Script(lab, about).export()
+        return _Script(lab, metadata).export()
     except UntranslatableError as error:
         return f"{error} has no counterpart in Python"
+    except (RecursionError, SyntaxError):  # Python, too, has a limit
+        return "code that is nested too deeply has no counterpart in Python"
 
 
 def filled(export: Export, values: Mapping[int, float | str]) -> str:
@@ -89,29 +92,46 @@ def initial_values(lab: Lab) -> dict[int, float | str]:
     }
 
 
+class _Control(Struct, frozen=True):
+    """A control that has a value."""
+
+    control: LabControl
+    value: Code
+    """The constant in the script: what `value` is in the control's code."""
+    applied: Translation
+
+
 class _Script:
     """Translates a lab, and writes the script."""
 
-    def __init__(self, lab: Lab, about: About) -> None:
-        self.lab = lab
-        self.about = about
-        self.used = Used()
+    def __init__(self, lab: Lab, metadata: ExportMetadata) -> None:
+        self.lab, self.metadata = lab, metadata
         self.taken = {*RESERVED, *_RESERVED}
         self.functions: list[str] = []
-        self.constants = [self._constant(control) for control in lab.controls]
-        self.values = [
-            None if name is None else _value(name, control)
-            for name, control in zip(self.constants, lab.controls, strict=True)
-        ]
-        self.context = field_types(self._parameters(), self._code())
+        values = [self._constant(control) for control in lab.controls]
+        self.context = field_types(self._parameters(values), _pieces(lab, values))
         self.args = "model, data, ctx" if self.context else "model, data"
         self.signature = "model: mujoco.MjModel, data: mujoco.MjData"
         self.signature += ", ctx: Ctx" if self.context else ""
+        self.setup = translate_statements(lab.setup, self.context)
+        self.controller = translate_statements(lab.controller, self.context)
+        self.controls = {
+            i: _Control(control, value, self._applied(control, value))
+            for i, (control, value) in enumerate(zip(lab.controls, values, strict=True))
+            if value is not None
+        }
+        self.runs = [
+            (control, translate_statements(control.run, self.context, button=True))
+            for control in lab.controls
+            if control.run is not None
+        ]
+        translations = [self.setup, self.controller, *(run for _, run in self.runs)]
+        translations += [control.applied for control in self.controls.values()]
+        self.used = names_in("\n".join(line for piece in translations for line in piece.lines))
 
-    def _name(self, text: str, otherwise: str) -> str:
+    def _name(self, label: str, otherwise: str) -> str:
         """A name of Python that nothing else has."""
-        words = re.findall(r"[a-z0-9]+", text.lower())
-        name = "_".join(words)[:50].strip("_")
+        name = "_".join(re.findall(r"[a-z0-9]+", label.lower()))[:50].strip("_")
         name = otherwise if not name or name[0].isdigit() else name
         number, own = 2, name
         while own in self.taken or own.upper() in self.taken:
@@ -119,217 +139,193 @@ class _Script:
         self.taken |= {own, own.upper()}
         return own
 
-    def _constant(self, control: LabControl) -> str | None:
+    def _constant(self, control: LabControl) -> Code | None:
+        """The constant of a control; a button has none."""
         if control.kind == "button":
             return None
-        return self._name(control.param or control.label, "control").upper()
+        name = self._name(control.param or control.label, "control").upper()
+        values = [value for _, value in control.options]
+        numbers = [value for value in values if not isinstance(value, str)]
+        if control.kind == "slider":
+            return Code(name, "num")
+        if not numbers:
+            return Code(name, "str")
+        if len(numbers) < len(values):
+            raise UntranslatableError("a choice between texts and numbers")
+        bound = max(abs(value) for value in numbers)
+        if any(value != int(value) for value in numbers) or bound >= 2**31:
+            return Code(name, "num")
+        return Code(name, "int" if min(numbers) < 0 else "nat", bound=bound)
 
-    def _parameters(self) -> dict[str, Type]:
+    def _parameters(self, values: list[Code | None]) -> dict[str, Type]:
         found: dict[str, Type] = {}
-        for control, value in zip(self.lab.controls, self.values, strict=True):
+        for control, value in zip(self.lab.controls, values, strict=True):
             if control.param is not None and value is not None:
                 if control.param in found:
                     raise UntranslatableError(f"`ctx.{control.param}` of two controls")
                 found[control.param] = value.type
         return found
 
-    def _code(self) -> Iterator[tuple[tuple[Statement, ...], Type | None]]:
-        """All statements, each piece with the type of `value` in it."""
-        for code in (self.lab.setup, self.lab.controller):
-            yield parse_statements(code), None
-        for control, value in zip(self.lab.controls, self.values, strict=True):
-            kind = value.type if value is not None else None
-            if control.set is not None:
-                target = parse_expression(control.set)
-                yield (Assign((target,), "", Name("value")),), kind
-            for run in (control.apply, control.run):
-                if run is not None:
-                    yield parse_statements(run), kind
-
-    def _names(self, value: Code | None = None) -> Names:
-        return Names(self.context, value)
+    def _applied(self, control: LabControl, value: Code) -> Translation:
+        """A control's setter at its present value."""
+        code = _setter(control)
+        if code is not None:
+            return translate_statements(code, self.context, value)
+        assert control.param is not None
+        as_number = self.context[control.param] == "num" and value.type != "num"
+        present = f"float({value.text})" if as_number else value.text
+        return Translation((f"ctx.{control.param} = {present}",))
 
     # --- the script
 
     def export(self) -> Export:
         """Everything, put together; what is used is known only at the end."""
         start = self._start()
-        buttons = [self._button(c) for c in self.lab.controls if c.run is not None]
+        buttons = [self._button(control, run) for control, run in self.runs]
         step = self._step()
-        readouts = self._readouts()
-        body = [*text.load(self.lab), *self.functions, *start]
-        for _, lines in buttons:
-            body += lines
-        body += [*step, *text.simulate(self.signature, self.args), *readouts]
-        body += text.report(self.signature, self.args)
+        exact = _is_exact("\n".join([*self.functions, *start, step]))
         names = tuple(name for name, _ in buttons)
-        body += text.main(self.args, bool(self.context), names)
-        script = "\n".join([*self._head(), *body, ""])
-        shown = sum(name is not None for name in self.constants)
-        if len(_PLACE.findall(script)) != shown or _HALVES.search(script):
+        sections = [
+            *text.context_class(self.context),
+            text.load(self.lab),
+            *self.functions,
+            *start,
+            *(section for _, sections in buttons for section in sections),
+            step,
+            text.simulate(self.signature, self.args),
+            *self._readouts(),
+            text.report(self.signature, self.args),
+            text.main(self.args, bool(self.context), names),
+        ]
+        script = self._with_head(sections)
+        if len(_PLACE.findall(script)) != len(self.controls):
             raise UntranslatableError("a text that no script can hold")
-        return Export(self.about.name, script, names, self.used.exact)
+        return Export(self.metadata.name, script, names, exact)
 
-    def _head(self) -> list[str]:
-        """All that comes before the functions of the lab."""
-        helpers = text.helpers(self.used.helpers)
-        modules = self.used.modules | text.context_modules(self.context)
-        modules |= {line for name in helpers for line in LIBRARY[name].imports}
-        modules |= {"import numpy as np"} if self.lab.readouts else set()
-        lines = text.docstring(self.lab, self.about)
-        lines += ["", *text.imports(modules, self.lab.xml is not None), ""]
-        lines += [f"SECONDS = {text.number(self.about.seconds)}  # of simulated time"]
-        for i, (name, control) in enumerate(zip(self.constants, self.lab.controls, strict=True)):
-            value = self.values[i]
-            if name is not None and value is not None:
-                lines += text.constant(i, name, control, value.type == "num")
-        lines += text.DIVERGED
+    def _with_head(self, sections: list[str]) -> str:
+        """The script, with all that comes before its functions."""
+        constants = [f"SECONDS = {text.number(self.metadata.seconds)}  # of simulated time"]
+        for i, one in self.controls.items():
+            constants += text.constant(i, one.value, one.control)
+        constants.append(text.DIVERGED)
         if self.lab.xml is not None:
-            lines += [f"XML = {text.long_text(self.lab.xml.text)}"]
-        for name in helpers:
-            lines += ["", LIBRARY[name].source.rstrip()]
-        if "Random" in helpers:
-            lines += ["", "", f"random = Random({self.lab.seed or 0})"]
-        return [*lines, *text.context_class(self.context)]
+            constants.append(f"XML = {text.long_text(self.lab.xml.text)}")
+        if any("random" in names_in(section) for section in sections):
+            sections = [f"random = Random({self.lab.seed or 0})", *sections]
+        needed = helpers("\n".join(sections))
+        body = "\n\n\n".join(["\n".join(constants), *(LIBRARY[n] for n in needed), *sections])
+        try:
+            body.encode()
+        except UnicodeEncodeError:
+            raise UntranslatableError("a text that no script can hold") from None
+        head = [*text.docstring(self.lab, self.metadata), "", *imports(body)]
+        return "\n".join([*head, "", body, "", "", 'if __name__ == "__main__":', "    main()", ""])
 
     # --- pieces
 
-    def _placed(self, piece: Piece, name: str, told: str) -> list[str]:
+    def _placed(self, piece: Translation, label: str, doc: str) -> list[str]:
         """The lines of a piece among others, or a call of a function that is added for it."""
-        if not piece.alone and not piece.returns:
+        if not piece.has_variables and not piece.returns:
             return list(piece.lines)
-        name = self._name(name, "piece")
-        self.functions += text.function(name, self.signature, told, piece.lines)
+        name = self._name(label, "piece")
+        self.functions.append(text.function(name, self.signature, doc, piece.lines))
         return [f"{name}({self.args})"]
 
-    def _applied(self, i: int) -> list[str]:
-        """A control's setter at its present value."""
-        control, value = self.lab.controls[i], self.values[i]
-        names = self._names(value)
-        if control.set is not None:
-            piece = setter(control.set, names, self.used)
-        elif control.apply is not None:
-            piece = statements(control.apply, names, self.used)
-        else:
-            assert control.param is not None and value is not None
-            number = self.context[control.param] == "num" and value.type != "num"
-            present = f"float({value.text})" if number else value.text
-            return [f"ctx.{control.param} = {present}"]
-        told = f"Apply the control “{text.plain(control.label)}”."
-        return self._placed(piece, f"set {control.label}", told)
+    def _set(self, controls: Iterable[_Control]) -> list[str]:
+        """The lines that apply controls."""
+        lines: list[str] = []
+        for one in controls:
+            label = one.control.label
+            doc = f"Apply the control “{text.plain(label)}”."
+            lines += self._placed(one.applied, f"set {label}", doc)
+        return lines
 
     def _start(self) -> list[str]:
-        probe = self._probe()
-        controls = self.lab.controls
-        settable = [i for i, control in enumerate(controls) if control.kind != "button"]
-        params = [i for i in settable if controls[i].param is not None]
-        once = [i for i in settable if i not in params and not controls[i].init]
-        again = [i for i in settable if i not in params and controls[i].init]
-        first = [line for i in params for line in self._applied(i)] + self._to_keyframe(
-            "Random" in probe.helpers
-        )
-        middle = [line for i in once for line in self._applied(i)]
-        last: list[str] = []
-        if self.lab.setup:
-            piece = statements(self.lab.setup, self._names(), self.used)
-            last += self._placed(piece, "set up", "The lab's own preparation.")
-        last += [line for i in again for line in self._applied(i)]
-        last += ["mujoco.mj_forward(model, data)"]
-        if not probe.resets:
-            told = "Bring the lab to its start."
-            return text.function("start", self.signature, told, [*first, *middle, *last])
-        middle = ["if first:", *(f"    {line}" for line in middle)] if middle else []
-        told = "What happens at the start (`first`) and at every reset."
+        """The functions that bring the lab to its start."""
+        controls = self.controls.values()
+        others = [one for one in controls if one.control.param is None]
+        first = self._set(one for one in controls if one.control.param is not None)
+        first += self._to_keyframe()
+        once = self._set(one for one in others if not one.control.init)
+        last = self._placed(self.setup, "set up", "The lab's own preparation.")
+        last += self._set(one for one in others if one.control.init)
+        last.append(_FORWARD)
+        doc = "Bring the lab to its start."
+        if "reset" not in self.used:
+            return [text.function("start", self.signature, doc, [*first, *once, *last])]
+        once = ["if first:", *(f"    {line}" for line in once)] if once else []
         signature = f"{self.signature}, *, first: bool = False"
-        start = [f"reset({self.args}, first=True)"]
-        lines = text.function("reset", signature, told, [*first, *middle, *last])
-        return lines + text.function("start", self.signature, "Bring the lab to its start.", start)
+        why = "What happens at the start (`first`) and at every reset."
+        return [
+            text.function("reset", signature, why, [*first, *once, *last]),
+            text.function("start", self.signature, doc, [f"reset({self.args}, first=True)"]),
+        ]
 
-    def _probe(self) -> Used:
-        """What the code of the lab uses, found before anything is written."""
-        used = Used()
-        for code in (self.lab.setup, self.lab.controller):
-            statements(code, self._names(), used)
-        for control, value in zip(self.lab.controls, self.values, strict=True):
-            if control.apply is not None:
-                statements(control.apply, self._names(value), used)
-            if control.set is not None:
-                setter(control.set, self._names(value), used)
-            if control.run is not None:
-                statements(control.run, self._names(), used, button=True)
-        return used
-
-    def _to_keyframe(self, random: bool) -> list[str]:
+    def _to_keyframe(self) -> list[str]:
         key = self.lab.key
         lines = ["mujoco.mj_resetData(model, data)"]
         if key is not None:
             number = str(key) if isinstance(key, int) else f"model.key({json.dumps(key)}).id"
             lines = [f"mujoco.mj_resetDataKeyframe(model, data, {number})"]
-        if random:
-            lines += ["random.restart()"]
-        return [*lines, "mujoco.mj_forward(model, data)"]
+        return [*lines, *(["random.restart()"] if "random" in self.used else []), _FORWARD]
 
-    def _button(self, control: LabControl) -> tuple[str, list[str]]:
-        assert control.run is not None
-        exact = self.used.exact  # buttons are not pressed where results are compared
-        piece = statements(control.run, self._names(), self.used, button=True)
-        self.used.exact = exact
+    def _button(self, control: LabControl, run: Translation) -> tuple[str, list[str]]:
+        """The name of a button's function, and what it consists of."""
         name = self._name(control.label, "button")
-        lines = list(piece.lines)
-        if piece.returns:
-            lines = self._placed(piece, f"press {control.label}", "What the button does.")
-        lines = ["mujoco.mj_forward(model, data)", *lines, "mujoco.mj_forward(model, data)"]
-        told = f"The button “{text.plain(control.label)}”."
-        return name, text.function(name, self.signature, told, lines)
+        lines, sections = list(run.lines), []
+        if run.returns:
+            inner = self._name(f"press {control.label}", "piece")
+            doc = "What the button does."
+            sections.append(text.function(inner, self.signature, doc, lines))
+            lines = [f"{inner}({self.args})"]
+        doc = f"The button “{text.plain(control.label)}”."
+        lines = [_FORWARD, *lines, _FORWARD]
+        return name, [*sections, text.function(name, self.signature, doc, lines)]
 
-    def _step(self) -> list[str]:
-        lines: list[str] = []
-        if self.lab.controller:
-            piece = statements(self.lab.controller, self._names(), self.used)
-            if piece.returns:
-                lines += self._control(piece)
-            else:
-                lines += piece.lines
-        told = "One step: the lab's controller, then MuJoCo." if lines else "One step."
-        return text.function("step", self.signature, told, [*lines, "mujoco.mj_step(model, data)"])
+    def _step(self) -> str:
+        lines = list(self.controller.lines)
+        doc = "One step: the lab's controller, then MuJoCo." if lines else "One step."
+        if self.controller.returns:
+            self.functions.append(
+                text.function("control", self.signature, "The controller.", lines)
+            )
+            lines = [f"control({self.args})"]
+        lines.append("mujoco.mj_step(model, data)")
+        return text.function("step", self.signature, doc, lines)
 
-    def _control(self, piece: Piece) -> list[str]:
-        self.functions += text.function(
-            "control", self.signature, "The controller.", list(piece.lines)
-        )
-        return [f"control({self.args})"]
-
-    def _readouts(self) -> list[str]:
-        told = "Label, value and decimal places of what the lab shows."
-        lines = ["data = current(model, data)"] if self.lab.readouts else []
-        lines += ["return ["]
-        exact = self.used.exact
-        for readout in self.lab.readouts:
-            value = expression(readout.expr, self._names(), self.used)
-            label = json.dumps(readout.label, ensure_ascii=False)
-            lines.append(f"    ({label}, {value.text}, {readout.digits}),")
-        self.used.exact = exact
-        lines = ["return []"] if not self.lab.readouts else [*lines, "]"]
+    def _readouts(self) -> Iterator[str]:
+        lines = ["return []"]
+        if self.lab.readouts:
+            yield text.CURRENT
+            lines = ["data = current(model, data)", "return ["]
+            for readout in self.lab.readouts:
+                value = translate_expression(readout.expr, self.context).text
+                label = json.dumps(readout.label, ensure_ascii=False)
+                lines.append(f"    ({label}, {value}, {readout.digits}),")
+            lines.append("]")
+        doc = "Label, value and decimal places of what the lab shows."
         result = "list[tuple[str, float | str, int]]"
-        made = text.function("readouts", self.signature, told, lines, result)
-        return [*(text.current() if self.lab.readouts else []), *made]
+        yield text.function("readouts", self.signature, doc, lines, result)
 
 
-def _value(name: str, control: LabControl) -> Code:
-    """What `value` is in the code of a control."""
-    if control.kind == "slider":
-        return Code(name, "num")
-    values = [value for _, value in control.options]
-    numbers = [value for value in values if not isinstance(value, str)]
-    if not numbers:
-        return Code(name, "str")
-    if len(numbers) < len(values):
-        raise UntranslatableError("a choice between texts and numbers")
-    if any(value != int(value) or abs(value) >= 2**31 for value in numbers):
-        return Code(name, "num")
-    bound = max(abs(value) for value in numbers)
-    return Code(name, "int" if min(numbers) < 0 else "nat", bound=bound)
+def _setter(control: LabControl) -> str | None:
+    """The code that a control runs at a value; `None` where it only has a name."""
+    return f"({control.set}\n) = value" if control.set is not None else control.apply
 
 
-_RESERVED = "SECONDS XML DIVERGED WORD current seconds xml diverged word".split()
-"""Names that a script has besides those that its code can see."""
+def _pieces(lab: Lab, values: list[Code | None]) -> Iterator[tuple[list[Node], Type | None]]:
+    """All statements of a lab, each piece with the type of `value` in it."""
+    for code in (lab.setup, lab.controller):
+        yield parse_statements(code), None
+    for control, value in zip(lab.controls, values, strict=True):
+        for piece in (_setter(control), control.run):
+            if piece is not None:
+                yield parse_statements(piece), value.type if value is not None else None
+
+
+def _is_exact(code: str) -> bool:
+    """Whether no function is involved whose last bit may differ from one library to another."""
+    return not INEXACT & names_in(code) and not any(
+        isinstance(node, ast.Pow) or (isinstance(node, ast.Attribute) and node.attr in INEXACT)
+        for node in ast.walk(ast.parse(code))
+    )

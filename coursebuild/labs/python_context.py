@@ -1,105 +1,93 @@
 """What lab code keeps in `ctx`: the fields and their types.
 
-Entry point: `field_types(parameters, code)`.
+Entry point: `field_types(parameters, pieces)`.
 """
 
 from __future__ import annotations
 
 import keyword
 from collections.abc import Iterable, Iterator, Mapping
-from typing import assert_never
+
+from tree_sitter import Node
 
 from coursebuild.labs.engine_names import ARRAYS
-from coursebuild.labs.javascript_tree import (
-    Array,
-    Assign,
-    Binary,
-    Block,
-    Boolean,
-    Call,
-    Conditional,
-    Declare,
-    Evaluate,
-    Expression,
-    For,
-    If,
-    Jump,
-    Member,
-    Name,
-    Statement,
-    String,
-    Template,
-    Unary,
-    While,
+from coursebuild.labs.javascript import (
+    UntranslatableError,
+    children,
+    dotted_name,
+    field,
+    text_of,
 )
-from coursebuild.labs.python_values import NUMBERS, Type, refuse
+from coursebuild.labs.python_values import NUMBERS, Type
 
 
 def field_types(
-    parameters: Mapping[str, Type], code: Iterable[tuple[tuple[Statement, ...], Type | None]]
+    parameters: Mapping[str, Type], pieces: Iterable[tuple[list[Node], Type | None]]
 ) -> dict[str, Type]:
     """The fields of `ctx`: those of parameters, and those that statements assign to.
 
-    `code` is all statements of a lab, each piece with the type of `value` in it. Where a type can
-    only be guessed, translating the assignment tells whether the guess was right.
+    `pieces` are all statements of a lab, each with the type of `value` in it. Where a type can only
+    be guessed, translating the assignment tells whether the guess was right.
     """
     types = dict(parameters)
-    for name in types:
-        _check_field(name)
-    for body, value in code:
-        for name, assigned in _assigned(body):
-            _check_field(name)
-            found = "num" if assigned is None else _guess(assigned, value, types)
+    for nodes, given in pieces:
+        for name, value in _assigned(nodes):
+            found = "num" if value is None else _guess(value, given, types)
             if name not in types or (types[name] in NUMBERS and found in NUMBERS):
                 types[name] = found if found not in NUMBERS else "num"
             if name not in parameters and types[name] == "str":
-                raise refuse(f"the text `ctx.{name}`, which is not there from the start")
+                raise UntranslatableError(f"the text `ctx.{name}`, which is not there at the start")
+    for name in types:
+        if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
+            raise UntranslatableError(f"the name `ctx.{name}`")
     return types
 
 
-def _check_field(name: str) -> None:
-    if keyword.iskeyword(name) or "$" in name or name.startswith("__"):
-        raise refuse(f"the name `ctx.{name}`")
-
-
-def _assigned(body: Iterable[Statement]) -> Iterator[tuple[str, Expression | None]]:
+def _assigned(nodes: Iterable[Node]) -> Iterator[tuple[str, Node | None]]:
     """Fields with what is assigned to them; `None` where they count on."""
-    for statement in body:
-        match statement:
-            case Assign(targets, operator, value):
-                for target in targets:
-                    if isinstance(target, Member) and target.whole == Name("ctx"):
-                        yield target.name, value if operator == "" else None
-            case If(_, then, otherwise):
-                yield from _assigned((*then, *otherwise))
-            case While(_, inner) | Block(inner) | For(_, _, _, _, _, inner):
-                yield from _assigned(inner)
-            case Declare() | Evaluate() | Jump():
-                pass
-            case _:
-                assert_never(statement)
+    for node in nodes:
+        target = node.child_by_field_name("left") or node.child_by_field_name("argument")
+        path = dotted_name(target) if target is not None else ()
+        if len(path) == 2 and path[0] == "ctx":
+            if node.type == "assignment_expression":
+                value = field(node, "right")
+                while value.type == "assignment_expression":
+                    value = field(value, "right")
+                yield path[1], value
+            elif node.type in ("augmented_assignment_expression", "update_expression"):
+                yield path[1], None
+        yield from _assigned(children(node))
 
 
-def _guess(value: Expression, given: Type | None, types: Mapping[str, Type]) -> Type:
+def _guess(value: Node, given: Type | None, types: Mapping[str, Type]) -> Type:
     """The type of a value, as far as it can be told without knowing variables."""
-    match value:
-        case Boolean() | Unary("!", _):
+    path = dotted_name(value)
+    match value.type:
+        case "true" | "false":
             return "bool"
-        case Binary("==" | "!=" | "===" | "!==" | "<" | ">" | "<=" | ">=" | "&&" | "||", _, _):
+        case "unary_expression" | "binary_expression" if _is_test(value):
             return "bool"
-        case String() | Template():
+        case "string" | "template_string":
             return "str"
-        case Array() | Call(Member(_, "slice" | "subarray"), _):
+        case "array":
             return "vector"
-        case Call(Member(Name("lib"), "momentum" | "angmom" | "sitePos" | "bodyPos"), _):
-            return "vector"
-        case Conditional(_, then, _):
-            return _guess(then, given, types)
-        case Member(Name("ctx"), name) if name in types:
-            return types[name]
-        case Member(Name(owner), name) if (owner, name) in ARRAYS:
-            return "vector"
-        case Name("value") if given is not None:
+        case "call_expression":
+            function = field(value, "function")
+            name = text_of(function).rpartition(".")[2] if "member" in function.type else ""
+            vectors = ("slice", "subarray", "momentum", "angmom", "sitePos", "bodyPos")
+            return "vector" if name in vectors else "num"
+        case "ternary_expression":
+            return _guess(field(value, "consequence"), given, types)
+        case "identifier" if path == ("value",) and given is not None:
             return given
+        case "member_expression" if path[:1] == ("ctx",) and path[-1] in types:
+            return types[path[-1]]
+        case "member_expression" if path in ARRAYS:
+            return "vector"
         case _:
             return "num"
+
+
+def _is_test(node: Node) -> bool:
+    operators = ("!", "==", "!=", "===", "!==", "<", ">", "<=", ">=", "&&", "||")
+    return text_of(field(node, "operator")) in operators

@@ -1,7 +1,6 @@
 """JavaScript expressions of lab code as Python.
 
-Entry point: `Expressions.value(expression)`. Calls are translated by a subclass, see
-`python_calls`.
+Entry point: `Expressions.value(node)`. Calls are translated by a subclass, see `python_calls`.
 
 A Python expression made here has the same value as the one in JavaScript, as long as no error is
 raised. Where the two languages differ for numbers a helper takes over (see `python_library`), and
@@ -10,36 +9,30 @@ where they differ otherwise the expression is refused.
 
 from __future__ import annotations
 
-import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
-from typing import assert_never
+from collections.abc import Iterable, Mapping
 
-from coursebuild.labs.engine_names import ARRAYS, SCALARS, SIZES
-from coursebuild.labs.javascript_tree import (
-    Array,
-    Binary,
-    Boolean,
-    Call,
-    Conditional,
-    Expression,
-    Index,
-    Member,
-    Name,
-    Number,
-    String,
-    Template,
-    Unary,
+from msgspec import Struct
+from tree_sitter import Node
+
+from coursebuild.labs import engine_names as engine
+from coursebuild.labs.javascript import (
+    UntranslatableError,
+    array_items,
+    dotted_name,
+    field,
+    string_value,
+    template_parts,
+    text_of,
 )
-from coursebuild.labs.python_texts import joined
 from coursebuild.labs.python_values import (
     AND,
+    ARRAYS,
     ATOM,
     BITS,
     COMPARISON,
     CONDITIONAL,
-    NAMED,
     NOT,
     NUMBERS,
     OR,
@@ -48,14 +41,12 @@ from coursebuild.labs.python_values import (
     SIGN,
     SMALL,
     Code,
-    Names,
     Type,
-    Used,
-    Variable,
     arithmetic,
-    floating,
+    as_float,
+    join_texts,
     literal,
-    refuse,
+    text_literal,
 )
 
 _CONSTANTS = {
@@ -68,277 +59,13 @@ _CONSTANTS = {
     "LOG2E": repr(1 / math.log(2)),
     "LOG10E": repr(1 / math.log(10)),
 }
-_COMPARISONS = {"===": "==", "!==": "!=", "==": "==", "!=": "!=", "<": "<", ">": ">", "<=": "<="}
-_COMPARISONS[">="] = ">="
 _ROOTS = frozenset("model data mj sim ctx lib Math value".split())
-
-
-class Expressions(ABC):
-    """Translates expressions, given the variables that are in scope."""
-
-    def __init__(self, names: Names, used: Used) -> None:
-        self.names = names
-        self.used = used
-        self.scopes: list[dict[str, Variable]] = [{}]
-
-    # --- what is needed
-
-    def number(self, expression: Expression) -> Code:
-        """An expression whose value is a number."""
-        return _numeric(self.value(expression, single=True))
-
-    def test(self, expression: Expression) -> Code:
-        """An expression that is only asked whether it is true."""
-        if isinstance(expression, Unary) and expression.operator == "!":
-            return Code(f"not {self.test(expression.operand).within(NOT)}", "bool", NOT)
-        if isinstance(expression, Binary) and expression.operator in _LOGICAL:
-            word, strength = _LOGICAL[expression.operator]
-            left, right = self.test(expression.left), self.test(expression.right)
-            text = f"{left.within(strength)} {word} {right.within(strength + 1)}"
-            return Code(text, "bool", strength)
-        code = self.value(expression, single=True)
-        if code.type in NUMBERS:  # NaN is false
-            return Code(f"abs({code.text}) > 0", "bool", COMPARISON)
-        if code.type != "bool":
-            raise refuse(f"{NAMED[code.type]} as a condition")
-        return code
-
-    def index(self, expression: Expression) -> str:
-        """An expression as an index; a negative one means something else in Python."""
-        code = self.number(expression)
-        if code.type == "nat":
-            return code.text
-        self.used.helpers.add("index")
-        return f"index({code.text})"
-
-    def integer(self, expression: Expression) -> str:
-        """An expression as a whole number, cut off where it is none."""
-        code = self.number(expression)
-        return f"int({code.text})" if code.type == "num" else code.text
-
-    def text(self, expression: Expression) -> str:
-        """An expression whose value is a text."""
-        code = self.value(expression)
-        if code.type != "str":
-            raise refuse(f"{NAMED[code.type]} where a text should be")
-        return code.text
-
-    def array(self, expression: Expression) -> Code:
-        """An expression whose value is an array."""
-        code = self.value(expression)
-        if code.type not in ("vector", "rows"):
-            raise refuse(f"{NAMED[code.type]} where an array should be")
-        return code
-
-    # --- expressions
-
-    def value(self, expression: Expression, *, single: bool = False) -> Code:
-        """Any expression; `single`: where one number will do, it is one."""
-        match expression:
-            case Number(text):
-                return literal(text)
-            case String(text):
-                return _text(text)
-            case Template(parts):
-                values = [_text(p) if isinstance(p, str) else self.value(p) for p in parts]
-                return joined(values, self.used)
-            case Boolean(value):
-                return Code(str(value), "bool")
-            case Name(name):
-                return self._name(name)
-            case Member():
-                return self._member(expression)
-            case Index(whole, index):
-                return self._element(self.array(whole), self.index(index))
-            case Call():
-                return self.call(expression, single)
-            case Array(items):
-                self.used.modules.add("import numpy as np")
-                return Code(f"np.array([{self.items(items)}], dtype=float)", "vector")
-            case Unary(operator, operand):
-                return self._unary(operator, operand)
-            case Binary(operator, left, right):
-                return self._binary(operator, left, right)
-            case Conditional(test, then, otherwise):
-                return self._conditional(test, then, otherwise)
-            case _:
-                assert_never(expression)
-
-    def items(self, items: Iterable[Expression]) -> str:
-        """Numbers, with commas between them."""
-        return ", ".join(self.number(item).text for item in items)
-
-    def _name(self, name: str) -> Code:
-        for scope in reversed(self.scopes):
-            if name in scope:
-                return scope[name].code
-        if name == "value" and self.names.value is not None:
-            return self.names.value
-        raise refuse(f"`{name}`")
-
-    def way(self, expression: Expression) -> tuple[str, ...]:
-        """The way to something that is known by its name: `("model", "opt", "timestep")`."""
-        match expression:
-            case Name(name) if name in _ROOTS:
-                return (name,)
-            case Member(whole, name):
-                way = self.way(whole)
-                return (*way, name) if way else ()
-            case _:
-                return ()
-
-    def _member(self, member: Member) -> Code:
-        way = self.way(member)
-        text = ".".join(way)
-        match way:
-            case ("sim", "time"):
-                return Code("data.time", "num")
-            case ("model", name) if name in SIZES:
-                return Code(text, "nat")
-            case ("ctx", name) if name in self.names.context:
-                return Code(text, self.names.context[name])
-            case ("Math", name) if name in _CONSTANTS:
-                if name in ("PI", "E"):
-                    self.used.modules.add("import math")
-                return Code(_CONSTANTS[name], "num")
-            case ("mj", enumeration, name, "value") if enumeration.startswith("mjt"):
-                return Code(f"mujoco.{enumeration}.{name}.value", "int")
-        if member.name == "length":
-            return Code(f"{self.array(member.whole).text}.size", "nat")
-        if way in SCALARS:
-            types: dict[str, Type] = {"float": "num", "int": "int", "size": "nat"}
-            return Code(text, types[SCALARS[way]])
-        if way in ARRAYS:
-            field = ARRAYS[way]
-            return Code(text, "rows" if field.rows else "vector", element=field.element)
-        if way:
-            raise refuse(f"`{text}`")
-        whole = self.value(member.whole)
-        if whole.type == "energy" and member.name in ("kinetic", "potential", "total"):
-            return Code(f"{whole.text}.{member.name}", "num")
-        raise refuse(f"`.{member.name}`")
-
-    def _element(self, array: Code, index: str) -> Code:
-        text = f"{array.text}{'.flat' if array.type == 'rows' else ''}[{index}]"
-        match array.element:
-            case "f64":
-                return Code(text, "num")
-            case "f32":
-                return Code(f"float({text})", "num")
-            case "int":
-                sure = array.text.startswith("model.") and array.text[6:] in _NEVER_NEGATIVE
-                return Code(f"int({text})", "nat" if sure else "int")
-
-    # --- operators
-
-    def _unary(self, operator: str, operand: Expression) -> Code:
-        if operator == "!":
-            return self.test(Unary(operator, operand))
-        code = self.number(operand)
-        if operator == "+":
-            return code
-        if operator == "~":
-            _check_bits(operator, code)
-            return Code(f"~{code.within(SIGN)}", "int", SIGN)
-        if isinstance(operand, Number) and code.type == "nat" and code.bound > 0:
-            return Code(f"-{code.text}", "int", SIGN, code.bound)
-        return Code(f"-{floating(code).within(SIGN)}", "num", SIGN)
-
-    def _binary(self, operator: str, left: Expression, right: Expression) -> Code:
-        if operator in _LOGICAL:
-            sides = self.value(left), self.value(right)
-            if any(side.type != "bool" for side in sides):
-                raise refuse(f"`{operator}` for its value")
-            return self.test(Binary(operator, left, right))
-        if operator in _COMPARISONS:
-            return self._comparison(operator, left, right)
-        a, b = self.value(left, single=True), self.value(right, single=True)
-        if operator == "+" and "str" in (a.type, b.type):
-            return joined((a, b), self.used)
-        a, b = _numeric(a), _numeric(b)
-        if operator in _BITS:
-            _check_bits(operator, a, b)
-            return Code(f"{a.within(ATOM)} {operator} {b.within(ATOM)}", "int", BITS)
-        if operator == "**":
-            return self._power(left, a, right, b)
-        if operator == "%":
-            return self._remainder(a, right, b)
-        return arithmetic(operator, a, b)
-
-    def _comparison(self, operator: str, left: Expression, right: Expression) -> Code:
-        a, b = self.value(left, single=True), self.value(right, single=True)
-        numbers = a.type in NUMBERS and b.type in NUMBERS
-        texts = a.type == b.type == "str" and operator[0] in "=!"
-        if a.type == b.type == "bool" and operator[0] in "=!":
-            return _same_truth(operator, (left, a), (right, b))
-        if not numbers and not texts:
-            raise refuse(f"`{operator}` between {NAMED[a.type]} and {NAMED[b.type]}")
-        text = f"{a.within(BITS)} {_COMPARISONS[operator]} {b.within(BITS)}"
-        return Code(text, "bool", COMPARISON)
-
-    def _power(self, left: Expression, a: Code, right: Expression, b: Code) -> Code:
-        self.used.exact = False
-        if isinstance(right, Number) and b.type == "nat" and b.bound <= 16:
-            return Code(f"{floating(a).within(ATOM)}**{b.text}", "num", POWER)
-        return self.call(Call(Member(Name("Math"), "pow"), (left, right)), single=True)
-
-    def _remainder(self, a: Code, divisor: Expression, b: Code) -> Code:
-        if a.type == "nat" and isinstance(divisor, Number) and b.type == "nat" and b.bound > 0:
-            return Code(f"{a.within(PRODUCT)} % {b.text}", "nat", PRODUCT, b.bound)
-        self.used.modules.add("import numpy as np")
-        return Code(f"np.fmod({floating(a).text}, {floating(b).text})", "num")
-
-    def _conditional(self, test: Expression, then: Expression, otherwise: Expression) -> Code:
-        a, b = self.value(then, single=True), self.value(otherwise, single=True)
-        kind: Type = a.type
-        if a.type != b.type:
-            if a.type not in NUMBERS or b.type not in NUMBERS:
-                raise refuse(f"{NAMED[a.type]} or {NAMED[b.type]}")
-            kind = "int" if "num" not in (a.type, b.type) else "num"
-            if kind == "num":
-                a, b = floating(a), floating(b)
-        if kind in ("vector", "rows", "energy", "nothing"):
-            raise refuse(f"{NAMED[kind]} that depends on a condition")
-        condition = self.test(test).within(OR)
-        text = f"{a.within(OR)} if {condition} else {b.text}"
-        return Code(text, kind, CONDITIONAL, max(a.bound, b.bound))
-
-    @abstractmethod
-    def call(self, call: Call, single: bool) -> Code:
-        """A call."""
-
-
-def _same_truth(
-    operator: str, left: tuple[Expression, Code], right: tuple[Expression, Code]
-) -> Code:
-    """Whether two truth values are the same, or not."""
-    for (_, code), (other, _) in ((left, right), (right, left)):
-        if isinstance(other, Boolean):
-            if other.value == (operator[0] == "="):
-                return code
-            return Code(f"not {code.within(NOT)}", "bool", NOT)
-    text = f"{left[1].within(BITS)} {_COMPARISONS[operator]} {right[1].within(BITS)}"
-    return Code(text, "bool", COMPARISON)
-
-
-def _numeric(code: Code) -> Code:
-    if code.type not in NUMBERS:
-        raise refuse(f"{NAMED[code.type]} where a number should be")
-    return code
-
-
-def _text(text: str) -> Code:
-    return Code(json.dumps(text, ensure_ascii=False), "str")
-
-
-def _check_bits(operator: str, *operands: Code) -> None:
-    """Bits are those of 32-bit integers in JavaScript."""
-    if any(code.type == "num" or code.bound > SMALL for code in operands):
-        raise refuse(f"`{operator}` on a number that need not be a whole one of 32 bits")
-
-
+_SCALAR_TYPES: dict[str, Type] = {"float": "num", "int": "int", "size": "nat"}
+_COMPARISONS = {
+    **{"===": "==", "!==": "!=", "==": "==", "!=": "!="},
+    **{"<": "<", ">": ">", "<=": "<=", ">=": ">="},
+}
 _LOGICAL = {"&&": ("and", AND), "||": ("or", OR)}
-_BITS = ("&", "|", "^")
 _NEVER_NEGATIVE = frozenset(
     """
         jnt_qposadr jnt_dofadr jnt_bodyid dof_bodyid dof_jntid geom_bodyid site_bodyid cam_bodyid
@@ -346,3 +73,256 @@ _NEVER_NEGATIVE = frozenset(
         actuator_actnum body_jntnum body_dofnum body_geomnum
     """.split()
 )
+
+
+class Variable(Struct, frozen=True):
+    """A variable of the code: what it is called in Python, and its type."""
+
+    code: Code
+    constant: bool = True
+
+
+class Expressions(ABC):
+    """Translates expressions, given what is in scope."""
+
+    def __init__(self, context: Mapping[str, Type], value: Code | None) -> None:
+        """`context`: the fields of `ctx`; `value`: what `value` stands for."""
+        self.context = context
+        self.given = value
+        self.scopes: list[dict[str, Variable]] = [{}]
+
+    # --- what is needed
+
+    def number(self, node: Node) -> Code:
+        """An expression whose value is a number."""
+        return _number(self.value(node, single=True))
+
+    def test(self, node: Node) -> Code:
+        """An expression that is only asked whether it is true."""
+        if node.type == "unary_expression" and _operator(node) == "!":
+            return Code(f"not {self.test(field(node, 'argument')).within(NOT)}", "bool", NOT)
+        if node.type == "binary_expression" and _operator(node) in _LOGICAL:
+            word, precedence = _LOGICAL[_operator(node)]
+            left, right = self.test(field(node, "left")), self.test(field(node, "right"))
+            text = f"{left.within(precedence)} {word} {right.within(precedence + 1)}"
+            return Code(text, "bool", precedence)
+        code = self.value(node, single=True)
+        if code.type in NUMBERS:  # NaN is false
+            return Code(f"abs({code.text}) > 0", "bool", COMPARISON)
+        if code.type != "bool":
+            raise UntranslatableError(f"{code.named} as a condition")
+        return code
+
+    def index(self, node: Node) -> str:
+        """An expression as an index; a negative one means something else in Python."""
+        code = self.number(node)
+        return code.text if code.type == "nat" else f"index({code.text})"
+
+    def integer(self, node: Node) -> str:
+        """An expression as a whole number, cut off where it is none."""
+        code = self.number(node)
+        return f"int({code.text})" if code.type == "num" else code.text
+
+    def array(self, node: Node) -> Code:
+        """An expression whose value is an array."""
+        code = self.value(node)
+        if code.type not in ARRAYS:
+            raise UntranslatableError(f"{code.named} where an array should be")
+        return code
+
+    def numbers(self, nodes: Iterable[Node]) -> str:
+        """Numbers, with commas between them."""
+        return ", ".join(self.number(node).text for node in nodes)
+
+    # --- expressions
+
+    def value(self, node: Node, *, single: bool = False) -> Code:
+        """Any expression; `single`: where one number will do, it is one."""
+        match node.type:
+            case "number":
+                return literal(text_of(node))
+            case "string":
+                return text_literal(string_value(node))
+            case "template_string":
+                parts = template_parts(node)
+                return join_texts(
+                    [text_literal(p) if isinstance(p, str) else self.value(p) for p in parts]
+                )
+            case "true" | "false":
+                return Code(node.type.capitalize(), "bool")
+            case "identifier":
+                return self._name(text_of(node))
+            case "member_expression":
+                return self._member(node)
+            case "subscript_expression":
+                return self._element(self.array(field(node, "object")), field(node, "index"))
+            case "call_expression":
+                return self.call(node, single=single)
+            case "array":
+                return Code(f"np.array([{self.numbers(array_items(node))}], dtype=float)", "vector")
+            case "unary_expression":
+                return self._unary(node)
+            case "binary_expression" if _operator(node) in _LOGICAL:
+                if any(self.value(field(node, side)).type != "bool" for side in ("left", "right")):
+                    raise UntranslatableError(f"`{_operator(node)}` for its value")
+                return self.test(node)
+            case "binary_expression":
+                return self.binary(_operator(node), field(node, "left"), field(node, "right"))
+            case "ternary_expression":
+                return self._conditional(node)
+            case _:
+                raise UntranslatableError(f"`{text_of(node)}`")
+
+    def variable(self, name: str) -> Variable | None:
+        """The variable of this name that is in scope."""
+        return next((scope[name] for scope in reversed(self.scopes) if name in scope), None)
+
+    def _name(self, name: str) -> Code:
+        variable = self.variable(name)
+        if variable is not None:
+            return variable.code
+        if name == "value" and self.given is not None:
+            return self.given
+        raise UntranslatableError(f"`{name}`")
+
+    def path(self, node: Node) -> tuple[str, ...]:
+        """The path of something that is known by its name: `("model", "opt", "timestep")`."""
+        names = dotted_name(node)
+        return names if names[:1] and names[0] in _ROOTS else ()
+
+    def _member(self, node: Node) -> Code:
+        path, name = self.path(node), text_of(field(node, "property"))
+        text = ".".join(path)
+        match path:
+            case ("sim", "time"):
+                return Code("data.time", "num")
+            case ("model", size) if size in engine.SIZES:
+                return Code(text, "nat")
+            case ("ctx", own) if own in self.context:
+                return Code(text, self.context[own])
+            case ("Math", constant) if constant in _CONSTANTS:
+                return Code(_CONSTANTS[constant], "num")
+            case ("mj", enumeration, member, "value") if enumeration.startswith("mjt"):
+                return Code(f"mujoco.{enumeration}.{member}.value", "int")
+            case _:
+                pass
+        if path in engine.SCALARS:
+            return Code(text, _SCALAR_TYPES[engine.SCALARS[path]])
+        if path in engine.ARRAYS:
+            array = engine.ARRAYS[path]
+            return Code(text, "rows" if array.rows else "vector", element=array.element)
+        if name == "length":
+            return Code(f"{self.array(field(node, 'object')).text}.size", "nat")
+        if path:
+            raise UntranslatableError(f"`{text}`")
+        whole = self.value(field(node, "object"))
+        if whole.type == "energy" and name in ("kinetic", "potential", "total"):
+            return Code(f"{whole.text}.{name}", "num")
+        raise UntranslatableError(f"`.{name}`")
+
+    def _element(self, array: Code, index: Node) -> Code:
+        text = f"{array.flat}[{self.index(index)}]"
+        match array.element:
+            case "f64":
+                return Code(text, "num")
+            case "f32":
+                return Code(f"float({text})", "num")
+            case "int":
+                owner, _, name = array.text.partition(".")
+                sure = owner == "model" and name in _NEVER_NEGATIVE
+                return Code(f"int({text})", "nat" if sure else "int")
+
+    # --- operators
+
+    def _unary(self, node: Node) -> Code:
+        operator, operand = _operator(node), field(node, "argument")
+        if operator == "!":
+            return self.test(node)
+        if operator not in ("-", "+", "~"):
+            raise UntranslatableError(f"`{operator}`")
+        code = self.number(operand)
+        if operator == "+":
+            return code
+        if operator == "~":
+            _check_bits(operator, code)
+            return Code(f"~{code.within(SIGN)}", "int", SIGN)
+        if operand.type == "number" and code.type == "nat" and code.bound > 0:
+            return Code(f"-{code.text}", "int", SIGN, code.bound)
+        return Code(f"-{as_float(code).within(SIGN)}", "num", SIGN)
+
+    def binary(self, operator: str, left: Node, right: Node) -> Code:
+        """Two operands with an operator between them that is not `&&` or `||`."""
+        if operator in _COMPARISONS:
+            return self._comparison(operator, left, right)
+        a, b = self.value(left, single=True), self.value(right, single=True)
+        if operator == "+" and "str" in (a.type, b.type):
+            return join_texts((a, b))
+        a, b = _number(a), _number(b)
+        match operator:
+            case "+" | "-" | "*" | "/":
+                return arithmetic(operator, a, b)
+            case "&" | "|" | "^":
+                _check_bits(operator, a, b)
+                return Code(f"{a.within(ATOM)} {operator} {b.within(ATOM)}", "int", BITS)
+            case "**" if right.type == "number" and b.type == "nat" and b.bound <= 16:
+                return Code(f"{as_float(a).within(ATOM)}**{b.text}", "num", POWER)
+            case "**":
+                return Code(f"power({a.text}, {b.text})", "num")
+            case "%" if a.type == b.type == "nat" and right.type == "number" and b.bound > 0:
+                return Code(f"{a.within(PRODUCT)} % {b.text}", "nat", PRODUCT, b.bound)
+            case "%":
+                return Code(f"np.fmod({as_float(a).text}, {as_float(b).text})", "num")
+            case _:
+                raise UntranslatableError(f"`{operator}`")
+
+    def _comparison(self, operator: str, left: Node, right: Node) -> Code:
+        a, b = self.value(left, single=True), self.value(right, single=True)
+        python, equality = _COMPARISONS[operator], operator[0] in "=!"
+        kinds = {"number" if code.type in NUMBERS else code.type for code in (a, b)}
+        if kinds == {"bool"} and equality:
+            for code, other in ((a, right), (b, left)):
+                if other.type in ("true", "false"):
+                    if (other.type == "true") == (python == "=="):
+                        return code
+                    return Code(f"not {code.within(NOT)}", "bool", NOT)
+        elif kinds != {"number"} and not (kinds == {"str"} and equality):
+            raise UntranslatableError(f"`{operator}` between {a.named} and {b.named}")
+        return Code(f"{a.within(BITS)} {python} {b.within(BITS)}", "bool", COMPARISON)
+
+    def _conditional(self, node: Node) -> Code:
+        a = self.value(field(node, "consequence"), single=True)
+        b = self.value(field(node, "alternative"), single=True)
+        type = a.type
+        if a.type != b.type:
+            if a.type not in NUMBERS or b.type not in NUMBERS:
+                raise UntranslatableError(f"{a.named} or {b.named}")
+            type = "int"
+            if "num" in (a.type, b.type):
+                type, a, b = "num", as_float(a), as_float(b)
+        if type not in (*NUMBERS, "bool", "str"):
+            raise UntranslatableError(f"{a.named} that depends on a condition")
+        condition = self.test(field(node, "condition")).within(OR)
+        text = f"{a.within(OR)} if {condition} else {b.text}"
+        return Code(text, type, CONDITIONAL, max(a.bound, b.bound))
+
+    @abstractmethod
+    def call(self, node: Node, *, single: bool) -> Code:
+        """A call; `single`: where it may give one number, it does."""
+
+
+def _operator(node: Node) -> str:
+    return text_of(field(node, "operator"))
+
+
+def _number(code: Code) -> Code:
+    if code.type not in NUMBERS:
+        raise UntranslatableError(f"{code.named} where a number should be")
+    return code
+
+
+def _check_bits(operator: str, *operands: Code) -> None:
+    """Bits are those of 32-bit integers in JavaScript."""
+    if any(code.type == "num" or code.bound > SMALL for code in operands):
+        raise UntranslatableError(
+            f"`{operator}` on a number that need not be a whole one of 32 bits"
+        )

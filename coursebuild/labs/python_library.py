@@ -1,35 +1,26 @@
 """Functions that an exported script brings along: `lib`, and where JavaScript counts otherwise.
 
-Entry point: `LIBRARY`, by name.
+Entry points: `LIBRARY`, the definitions by name; `helpers`, those that code needs; `imports`.
 
-Each does what its JavaScript counterpart does, bit for bit where no function of the C library is
-involved, for every number: NaN, infinities and the sign of zero included. None is part of a script
-that does not use it.
+Each function does what its JavaScript counterpart does, bit for bit where no function of the C
+library is involved, for every number: NaN, infinities and the sign of zero included. None is part
+of a script that does not use it.
 """
 
 from __future__ import annotations
 
-from msgspec import Struct
+import ast
+import re
 
-
-class Helper(Struct, frozen=True):
-    """A definition, what it needs, and the modules that it is written with."""
-
-    source: str
-    imports: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
-
-
-_ENERGY_TYPE = '''
+_SOURCE = '''
 class Energy(NamedTuple):
     """Energies of everything, J."""
 
     kinetic: float
     potential: float  # of gravity and springs
     total: float
-'''
 
-_ENERGY = '''
+
 def energy(model: mujoco.MjModel, data: mujoco.MjData) -> Energy:
     """The energy now; `data.energy` stays as it is."""
     before = data.energy.copy()
@@ -40,9 +31,8 @@ def energy(model: mujoco.MjModel, data: mujoco.MjData) -> Energy:
     data.energy[:] = before
     data.flg_energypos, data.flg_energyvel = flags
     return Energy(kinetic, potential, kinetic + potential)
-'''
 
-_SUBTREE = '''
+
 def of_everything(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
     """Momentum (kg m/s), and angular momentum about the common centre of mass (kg m^2/s)."""
     before = data.subtree_linvel.copy(), data.subtree_angmom.copy()
@@ -53,21 +43,18 @@ def of_everything(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarra
     data.subtree_linvel[:], data.subtree_angmom[:] = before
     data.flg_subtreevel = flag
     return linear, angular
-'''
 
-_MOMENTUM = '''
+
 def momentum(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """The momentum of everything, kg m/s."""
     return of_everything(model, data)[0]
-'''
 
-_ANGMOM = '''
+
 def angular_momentum(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """The angular momentum of everything about its common centre of mass, kg m^2/s."""
     return of_everything(model, data)[1]
-'''
 
-_NORMAL_FORCE = '''
+
 def normal_force(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int | str | None = None
 ) -> float:
@@ -79,78 +66,120 @@ def normal_force(
             mujoco.mj_contactForce(model, data, i, force)
             total += float(force[0])
     return total
-'''
 
-_NORM = '''
+
 def norm(vector: Iterable[float]) -> float:
     """The Euclidean length of a vector."""
     total = 0.0
     for x in vector:
         total += float(x) * float(x)
     return np.sqrt(total)
-'''
 
-_RAD = '''
+
 def rad(degrees: float) -> float:
     """An angle in radians."""
     return degrees / (180 / math.pi)
-'''
 
-_DEG = '''
+
 def deg(radians: float) -> float:
     """An angle in degrees."""
     return radians * (180 / math.pi)
-'''
 
-_INDEX = '''
+
 def index(number: float) -> int:
     """A number as an index: from 0, and whole."""
     if not (number >= 0 and number == int(number)):
         raise IndexError(f"{number} is no index")
     return int(number)
-'''
 
-_MAXIMUM = '''
+
 def maximum(*numbers: float) -> float:
     """The largest of some numbers; NaN if one of them is."""
     if any(math.isnan(x) for x in numbers):
         return math.nan
     return max(numbers, key=lambda x: (x, math.copysign(1.0, x)))
-'''
 
-_MINIMUM = '''
+
 def minimum(*numbers: float) -> float:
     """The smallest of some numbers; NaN if one of them is."""
     if any(math.isnan(x) for x in numbers):
         return math.nan
     return min(numbers, key=lambda x: (x, math.copysign(1.0, x)))
-'''
 
-_SIGN = '''
+
 def sign(x: float) -> float:
     """-1.0, 0.0 or 1.0."""
     return x if x == 0 or math.isnan(x) else math.copysign(1.0, x)
-'''
 
-_ROUNDED = '''
+
 def rounded(x: float) -> float:
     """The nearest whole number, and of two the larger."""
     if not math.isfinite(x) or x == 0:
         return x
     down = float(np.floor(x))
     return math.copysign(down + (x - down >= 0.5), x)
-'''
 
-_POWER = '''
+
 def power(base: float, exponent: float) -> float:
     """`base` to the power of `exponent`."""
     if math.isnan(exponent) or (abs(base) == 1 and math.isinf(exponent)):
         return math.nan
     return np.power(float(base), float(exponent))
-'''
 
 
-_RANDOM = '''
+def numeral(x: float) -> str:
+    """A number as JavaScript writes it: with the fewest digits that stand for it."""
+    x = float(x)
+    if not math.isfinite(x):
+        return "NaN" if math.isnan(x) else "Infinity" if x > 0 else "-Infinity"
+    if x == 0:
+        return "0"
+    minus = "-" if x < 0 else ""
+    _, written, power = Decimal(repr(abs(x))).as_tuple()
+    digits = "".join(map(str, written)).rstrip("0")
+    point = len(written) + int(power)
+    if 0 < point <= 21:
+        digits = digits.ljust(point, "0")
+        return minus + ".".join(filter(None, (digits[:point], digits[point:])))
+    if -6 < point <= 0:
+        return f"{minus}0.{'0' * -point}{digits}"
+    return minus + ".".join(filter(None, (digits[0], digits[1:]))) + f"e{point - 1:+d}"
+
+
+def fixed(x: float, decimals: int) -> str:
+    """A number with so many decimals; of two as near the larger, without its sign."""
+    x = float(x)
+    if not abs(x) < 1e21:
+        return numeral(x)
+    nearest = Decimal(abs(x)).quantize(Decimal(1).scaleb(-decimals), context=DIGITS)
+    return f"{'-' if x < 0 else ''}{nearest:f}"
+
+
+DIGITS = Context(prec=200, rounding=ROUND_HALF_UP)
+
+
+def exponential(x: float, decimals: int) -> str:
+    """A number with so many decimals and a power of ten."""
+    x = float(x)
+    if not math.isfinite(x):
+        return numeral(x)
+    nearest = Context(prec=decimals + 1, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
+    digits = "".join(map(str, nearest.as_tuple().digits)).ljust(decimals + 1, "0")
+    digits = ".".join(filter(None, (digits[0], digits[1:])))
+    return f"{'-' if x < 0 else ''}{digits}e{nearest.adjusted():+d}"
+
+
+def precise(x: float, digits: int) -> str:
+    """A number with so many digits in all."""
+    x = float(x)
+    if not math.isfinite(x):
+        return numeral(x)
+    nearest = Context(prec=digits, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
+    if not -6 <= nearest.adjusted() < digits:
+        return exponential(x, digits - 1)
+    return f"{'-' if x < 0 else ''}{nearest:.{digits - 1 - nearest.adjusted()}f}"
+
+
 class Random:
     """The lab's random numbers: xoshiro128** by Blackman and Vigna, seeded by splitmix32."""
 
@@ -188,86 +217,43 @@ def _rotated(x: int, by: int) -> int:
 WORD = 2**32 - 1
 '''
 
-_NUMERAL = '''
-def numeral(x: float) -> str:
-    """A number as JavaScript writes it: with the fewest digits that stand for it."""
-    x = float(x)
-    if not math.isfinite(x):
-        return "NaN" if math.isnan(x) else "Infinity" if x > 0 else "-Infinity"
-    if x == 0:
-        return "0"
-    minus = "-" if x < 0 else ""
-    _, written, power = Decimal(repr(abs(x))).as_tuple()
-    digits = "".join(map(str, written)).rstrip("0")
-    point = len(written) + int(power)
-    if 0 < point <= 21:
-        digits = digits.ljust(point, "0")
-        return minus + ".".join(filter(None, (digits[:point], digits[point:])))
-    if -6 < point <= 0:
-        return f"{minus}0.{'0' * -point}{digits}"
-    return minus + ".".join(filter(None, (digits[0], digits[1:]))) + f"e{point - 1:+d}"
-'''
-
-_FIXED = '''
-def fixed(x: float, decimals: int) -> str:
-    """A number with so many decimals; of two as near the larger, without its sign."""
-    x = float(x)
-    if not abs(x) < 1e21:
-        return numeral(x)
-    nearest = Decimal(abs(x)).quantize(Decimal(1).scaleb(-decimals), context=DIGITS)
-    return f"{'-' if x < 0 else ''}{nearest:f}"
-
-
-DIGITS = Context(prec=200, rounding=ROUND_HALF_UP)
-'''
-
-_EXPONENTIAL = '''
-def exponential(x: float, decimals: int) -> str:
-    """A number with so many decimals and a power of ten."""
-    x = float(x)
-    if not math.isfinite(x):
-        return numeral(x)
-    nearest = Context(prec=decimals + 1, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
-    digits = "".join(map(str, nearest.as_tuple().digits)).ljust(decimals + 1, "0")
-    digits = ".".join(filter(None, (digits[0], digits[1:])))
-    return f"{'-' if x < 0 else ''}{digits}e{nearest.adjusted():+d}"
-'''
-
-_PRECISE = '''
-def precise(x: float, digits: int) -> str:
-    """A number with so many digits in all."""
-    x = float(x)
-    if not math.isfinite(x):
-        return numeral(x)
-    nearest = Context(prec=digits, rounding=ROUND_HALF_UP).plus(Decimal(abs(x)))
-    if not -6 <= nearest.adjusted() < digits:
-        return exponential(x, digits - 1)
-    return f"{'-' if x < 0 else ''}{nearest:.{digits - 1 - nearest.adjusted()}f}"
-'''
-
-_DECIMAL = "from decimal import Decimal"
-_ROUNDING = "from decimal import ROUND_HALF_UP, Context, Decimal"
-
-LIBRARY: dict[str, Helper] = {
-    "Energy": Helper(_ENERGY_TYPE, ("from typing import NamedTuple",)),
-    "energy": Helper(_ENERGY, needs=("Energy",)),
-    "of_everything": Helper(_SUBTREE, ("import numpy as np",)),
-    "momentum": Helper(_MOMENTUM, ("import numpy as np",), ("of_everything",)),
-    "angular_momentum": Helper(_ANGMOM, ("import numpy as np",), ("of_everything",)),
-    "normal_force": Helper(_NORMAL_FORCE, ("import numpy as np",)),
-    "norm": Helper(_NORM, ("from collections.abc import Iterable", "import numpy as np")),
-    "rad": Helper(_RAD, ("import math",)),
-    "deg": Helper(_DEG, ("import math",)),
-    "index": Helper(_INDEX),
-    "maximum": Helper(_MAXIMUM, ("import math",)),
-    "minimum": Helper(_MINIMUM, ("import math",)),
-    "sign": Helper(_SIGN, ("import math",)),
-    "rounded": Helper(_ROUNDED, ("import math", "import numpy as np")),
-    "power": Helper(_POWER, ("import math", "import numpy as np")),
-    "numeral": Helper(_NUMERAL, ("import math", _DECIMAL)),
-    "fixed": Helper(_FIXED, (_ROUNDING,), ("numeral",)),
-    "exponential": Helper(_EXPONENTIAL, ("import math", _ROUNDING), ("numeral",)),
-    "precise": Helper(_PRECISE, ("import math", _ROUNDING), ("exponential", "numeral")),
-    "Random": Helper(_RANDOM, ("import struct",)),
+LIBRARY = {
+    re.split(r"\W+", source.removeprefix("def ").removeprefix("class "), maxsplit=1)[0]: source
+    for source in _SOURCE.strip().split("\n\n\n")
 }
 """What a script can bring along, by name, in the order in which it stands there."""
+
+_IMPORTS = {
+    "collections.abc": ("Iterable",),
+    "dataclasses": ("dataclass", "field"),
+    "decimal": ("ROUND_HALF_UP", "Context", "Decimal"),
+    "typing": ("NamedTuple",),
+}
+"""What a script takes from modules of the standard library, by module."""
+
+
+def names_in(code: str) -> set[str]:
+    """The names that code uses."""
+    return {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
+
+
+def helpers(code: str) -> list[str]:
+    """Names of the helpers that code uses, and of those that they use, in order."""
+    wanted, new = set[str](), names_in(code) & LIBRARY.keys()
+    while new:
+        wanted |= new
+        new = set[str]().union(*(names_in(LIBRARY[name]) for name in new)) & LIBRARY.keys() - wanted
+    return [name for name in LIBRARY if name in wanted]
+
+
+def imports(code: str) -> list[str]:
+    """The import statements that code needs, in their usual order, with lines between groups."""
+    used = names_in(code)
+    standard = [f"import {module}" for module in ("math", "struct") if module in used]
+    for module, names in _IMPORTS.items():
+        if taken := [name for name in names if name in used]:
+            standard.append(f"from {module} import {', '.join(taken)}")
+    engine = ["import mujoco", *(["import numpy as np"] if "np" in used else [])]
+    own = ["from mjcourse import model_path"] if "model_path" in used else []
+    groups = (standard, engine, own)
+    return "\n\n".join("\n".join(group) for group in groups if group).split("\n")

@@ -1,6 +1,6 @@
-"""Python expressions with their types, and arithmetic with them as JavaScript does it.
+"""Python expressions with their types, and arithmetic and texts as JavaScript has them.
 
-Entry points: `Code`, `literal`, `arithmetic`, `floating`.
+Entry points: `Code`, `literal`, `as_float`, `arithmetic`, `join_texts`.
 
 Numbers in JavaScript are doubles. In Python they are `int` only where they stay small and no zero
 can be negative (`int`, and `nat` that is never below 0), so that indices read as they should;
@@ -9,22 +9,25 @@ everything else is a float, `num`.
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.labs.engine_names import Element
-from coursebuild.labs.javascript_tokens import UntranslatableError
+from coursebuild.labs.javascript import UntranslatableError
 
 Type: TypeAlias = Literal["nat", "int", "num", "bool", "str", "vector", "rows", "energy", "nothing"]
 """Of a Python expression; `rows` is an array that has two dimensions there, and one in JavaScript.
 """
 NUMBERS = ("nat", "int", "num")
+ARRAYS = ("vector", "rows")
 
 CONDITIONAL, OR, AND, NOT, COMPARISON, BITS, SUM, PRODUCT, SIGN, POWER, ATOM = range(11)
-"""How strongly Python's operators bind."""
+"""Precedence of Python's operators."""
 _EXACT = 2.0**53
 SMALL = 2.0**31
 
@@ -34,42 +37,35 @@ class Code(Struct, frozen=True):
 
     text: str
     type: Type
-    strength: int = ATOM
+    precedence: int = ATOM
     bound: float = SMALL
     """A `nat` or `int` is at most so far from 0."""
     element: Element = "f64"
     """What an array holds."""
 
-    def within(self, strength: int) -> str:
-        """It as an operand of an operator that binds so strongly."""
-        return self.text if self.strength >= strength else f"({self.text})"
+    def within(self, precedence: int) -> str:
+        """It as an operand of an operator of this precedence."""
+        return self.text if self.precedence >= precedence else f"({self.text})"
 
+    @property
+    def flat(self) -> str:
+        """An array that is indexed by one number, as in JavaScript."""
+        return f"{self.text}.flat" if self.type == "rows" else self.text
 
-class Used(Struct):
-    """What the code that was translated needs."""
+    @property
+    def flat_view(self) -> str:
+        """An array of one dimension that can be cut and written to."""
+        return f"{self.text}.reshape(-1)" if self.type == "rows" else self.text
 
-    helpers: set[str] = field(default_factory=set)
-    modules: set[str] = field(default_factory=set)
-    resets: bool = False
-    """Whether the function `reset` is called."""
-    exact: bool = True
-    """Whether no function is involved whose last bit may differ from one library to another."""
+    @property
+    def is_copy(self) -> bool:
+        """Whether an array was just made."""
+        return "(" in self.text
 
-
-class Variable(Struct, frozen=True):
-    """A variable of the code: what it is called in Python, and its type."""
-
-    code: Code
-    constant: bool = True
-
-
-class Names(Struct, frozen=True):
-    """What the code may refer to besides the engine."""
-
-    context: Mapping[str, Type]
-    """The fields of `ctx`."""
-    value: Code | None
-    """What `value` stands for."""
+    @property
+    def named(self) -> str:
+        """What it is, in words."""
+        return NAMED[self.type]
 
 
 NAMED: dict[Type, str] = {
@@ -87,25 +83,25 @@ NAMED: dict[Type, str] = {
 
 def literal(text: str) -> Code:
     """A number of JavaScript, as it is written."""
-    plain = text.replace("_", "")
-    if plain[:2].lower() in ("0x", "0o", "0b"):
+    plain = text.replace("_", "").lower()
+    if plain.endswith("n") or re.match("0[0-9]", plain) or len(plain) > 300:
+        raise UntranslatableError(f"the number `{text}`")
+    if plain[:2] in ("0x", "0o", "0b") or plain.isdecimal():
         whole = int(plain, 0)
-        if whole >= SMALL:
-            return Code(repr(float(whole)), "num")
-        return Code(plain.lower(), "nat", bound=float(whole))
-    if plain.isdecimal() and float(plain) < SMALL:
-        return Code(plain, "nat", bound=float(plain))
+        if whole < SMALL:
+            return Code(plain, "nat", bound=float(whole))
+        plain = str(whole)
     value = float(plain)
     if math.isinf(value):
-        raise refuse(f"the number `{text}`")
+        raise UntranslatableError(f"the number `{text}`")
     if plain.startswith("."):
         plain = f"0{plain}"
     same = plain[-1].isdecimal() and ("." in plain or "e" in plain) and ".e" not in plain
     return Code(plain if same else repr(value), "num")
 
 
-def floating(code: Code) -> Code:
-    """The number as a float."""
+def as_float(code: Code) -> Code:
+    """A number as a float."""
     if code.type == "num":
         return code
     if code.text.isdecimal():
@@ -117,24 +113,48 @@ def floating(code: Code) -> Code:
 
 def arithmetic(operator: str, a: Code, b: Code) -> Code:
     """`+`, `-`, `*` and `/` of numbers."""
-    strength = SUM if operator in "+-" else PRODUCT
+    precedence = SUM if operator in "+-" else PRODUCT
     whole = "num" not in (a.type, b.type)
+    natural = a.type == b.type == "nat"
     type: Type = "num"
     bound = SMALL
     if whole and operator in "+-":
         bound = a.bound + b.bound
-        type = "nat" if a.type == b.type == "nat" and operator == "+" else "int"
-    elif a.type == b.type == "nat" and operator == "*":
+        type = "nat" if natural and operator == "+" else "int"
+    elif natural and operator == "*":
         bound = a.bound * b.bound
         type = "nat"
     if type != "num" and bound >= _EXACT:
         type = "num"
     if whole and type == "num" and operator != "/":
-        a = floating(a)
-    text = f"{a.within(strength)} {operator} {b.within(strength + 1)}"
-    return Code(text, type, strength, bound)
+        a = as_float(a)
+    text = f"{a.within(precedence)} {operator} {b.within(precedence + 1)}"
+    return Code(text, type, precedence, bound)
 
 
-def refuse(what: str) -> UntranslatableError:
-    """Why something is not translated."""
-    return UntranslatableError(what)
+def text_literal(text: str) -> Code:
+    """A text of JavaScript."""
+    return Code(json.dumps(text, ensure_ascii=False), "str")
+
+
+def join_texts(parts: Sequence[Code]) -> Code:
+    """Values put together to one text, as in `` `x = ${x}` ``."""
+    texts = [_written(part) for part in parts]
+    if len(texts) < 2:
+        return texts[0] if texts else Code('""', "str")
+    return Code(" + ".join(text.within(SUM) for text in texts), "str", SUM)
+
+
+def _written(code: Code) -> Code:
+    """A value as JavaScript writes it into a text."""
+    match code.type:
+        case "str":
+            return code
+        case "bool":
+            return Code(f'"true" if {code.within(OR)} else "false"', "str", CONDITIONAL)
+        case "nat" | "int":
+            return Code(f"str({code.text})", "str")
+        case "num":
+            return Code(f"numeral({code.text})", "str")
+        case _:
+            raise UntranslatableError(f"{code.named} in a text")

@@ -19,7 +19,7 @@ from coursebuild.effects.store import Store
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
-from coursebuild.labs.export_text import About
+from coursebuild.labs.export_text import ExportMetadata
 from coursebuild.labs.verdict import PARITY_RTOL, Parity
 from coursebuild.model import Course, Lab
 
@@ -51,8 +51,10 @@ def exported(
     """
     owner, name, itself = lab
     seconds = _seconds(itself, main)
-    about = About(file_name(name), _origin(course, owner), course.title, engine_version(), seconds)
-    export = export_script(itself, about)
+    metadata = ExportMetadata(
+        file_name(name), _origin(course, owner), course.title, engine_version(), seconds
+    )
+    export = export_script(itself, metadata)
     if isinstance(export, str):
         return Offer(None, export)
     if main.get("recorded") is None:

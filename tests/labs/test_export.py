@@ -17,7 +17,7 @@ from coursebuild.effects.mjcf import compile_all
 from coursebuild.effects.native import NativeEngine
 from coursebuild.effects.v8 import Isolate
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
-from coursebuild.labs.export_text import About
+from coursebuild.labs.export_text import ExportMetadata
 from coursebuild.pipeline import lab_export
 from coursebuild.pipeline.labs import Engines, try_labs
 from coursebuild.pipeline.load import load
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.engine
 ROOT = Path(__file__).parents[2]
 Tried: TypeAlias = Callable[..., list[LabResult]]
 
-ABOUT = About("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)
+METADATA = ExportMetadata("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)
 
 PENDULUM = """<mujoco><option timestep="0.005"/><worldbody>
   <body name="arm" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
@@ -138,7 +138,7 @@ def try_all(root: Path, engines: Engines, *labs: dict[str, Any]) -> list[LabResu
 
 
 def exported(**fields: Any) -> Export | str:
-    return export_script(make_lab(**fields), ABOUT)
+    return export_script(make_lab(**fields), METADATA)
 
 
 def script(root: Path, result: LabResult, *values: object) -> str:
@@ -194,7 +194,7 @@ def test_everything_at_once(tried: Tried, course: Path) -> None:
 
 def test_a_script_reads_well(course: Path) -> None:
     lab = make_lab(**RICH)
-    export = export_script(lab, ABOUT)
+    export = export_script(lab, METADATA)
     assert isinstance(export, Export)
     assert export.buttons == ("kick", "again") and export.exact
     text = filled(export, initial_values(lab))
@@ -241,6 +241,12 @@ def test_what_cannot_be_translated_has_no_script(fields: dict[str, Any], reason:
     assert exported(**fields) == f"{reason} has no counterpart in Python"
 
 
+def test_code_that_is_nested_too_deeply_has_no_script() -> None:
+    for depth in (250, 100_000):
+        deep = exported(setup=f"data.qpos[0] = {'Math.abs(' * depth}1{')' * depth}")
+        assert deep == "code that is nested too deeply has no counterpart in Python"
+
+
 def test_a_model_of_several_files_has_no_script() -> None:
     xml = '<mujoco><asset><mesh name="m" file="m.obj"/></asset></mujoco>'
     assert exported(xml=xml) == "the model in the lab may be made of several files"
@@ -256,8 +262,8 @@ def test_a_reason_is_told_and_nothing_offered(tried: Tried) -> None:
 def wrong(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
     """Make a mistake in each script."""
 
-    def spoilt(lab: Any, about: About) -> Export | str:
-        export = export_script(lab, about)
+    def spoilt(lab: Any, metadata: ExportMetadata) -> Export | str:
+        export = export_script(lab, metadata)
         assert isinstance(export, Export) and old in export.text
         return Export(export.name, export.text.replace(old, new), export.buttons, export.exact)
 

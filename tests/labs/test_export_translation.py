@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 from coursebuild.labs.engine_names import ARRAYS, CALLS, SCALARS, SIZES
-from coursebuild.labs.javascript_tokens import UntranslatableError
-from coursebuild.labs.python_code import expression, statements
-from coursebuild.labs.python_values import Code, Names, Used
+from coursebuild.labs.javascript import UntranslatableError
+from coursebuild.labs.python_statements import translate_expression, translate_statements
+from coursebuild.labs.python_values import Code, Type
 from support.lab_values import Bench, make_lab
 
-NAMES = Names({"n": "num", "on": "bool", "v": "vector", "k": "nat"}, Code("GAIN", "num"))
+CONTEXT: dict[str, Type] = {"n": "num", "on": "bool", "v": "vector", "k": "nat"}
+GAIN = Code("GAIN", "num")
 
 
 def translated(code: str, *, button: bool = False) -> str:
-    return "\n".join(statements(code, NAMES, Used(), button=button).lines)
+    return "\n".join(translate_statements(code, CONTEXT, GAIN, button=button).lines)
 
 
 @pytest.mark.parametrize(
@@ -29,6 +30,8 @@ def translated(code: str, *, button: bool = False) -> str:
         ("mj.mj_resetData(model, data)", "mujoco.mj_resetData(model, data)"),
         ("data.qvel[0] = -0", "data.qvel[0] = -0.0"),
         ("data.qvel[0] = data.qvel[1] = 0", "data.qvel[0] = data.qvel[1] = 0"),
+        ("data.qpos[0] = (ctx.n = 1)", "data.qpos[0] = ctx.n = 1.0"),
+        ("ctx.n = 1, ctx.n--; ; // end", "ctx.n = 1.0\nctx.n -= 1"),
         ("data.qvel[0] -= value * data.qvel[0]", "data.qvel[0] -= GAIN * data.qvel[0]"),
         ("ctx.n = 0; ctx.n++\n--ctx.n", "ctx.n = 0.0\nctx.n += 1\nctx.n -= 1"),
         ("ctx.n %= 3", "ctx.n = np.fmod(ctx.n, 3.0)"),
@@ -125,7 +128,6 @@ data.qpos[0] ??= 1
 data.qpos[0] = 5 & ctx.n
 data.qpos[0] = 1 << 2
 data.qpos[0] = ctx.n = 1, f()
-data.qpos[0] = (ctx.n = 1)
 data.qpos[0] = 10n
 data.qpos[0] = NaN
 data.qpos[0] = parseFloat('1')
@@ -188,12 +190,37 @@ label: ctx.n = 1""".splitlines(),
 )
 def test_code_without_a_counterpart_in_python_is_refused(code: str) -> None:
     with pytest.raises(UntranslatableError):
-        statements(code, NAMES, Used())
+        translate_statements(code, CONTEXT, GAIN)
 
 
-def test_a_template_with_a_line_that_goes_on_is_refused() -> None:
-    with pytest.raises(UntranslatableError):
-        statements("const s = `a\\\nb`", NAMES, Used())
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("a => 1", "`=>`"),
+        ("new Float64Array(3)", "`new`"),
+        ("class C { }", "`class`"),
+        ("data?.qpos", "`?.`"),
+        ("ctx.n = 'a", "code that cannot be read"),
+        ("ctx.n = 010", "the number `010`"),
+        ("ctx.n = 1n", "the number `1n`"),
+        ("ctx.n = 1e999", "the number `1e999`"),
+        ("const s = '\\ud800'", "the escape `\\ud800`"),
+        ("const s = '\\u{110000}'", "the escape `\\u{110000}`"),
+        ("const s = '\\01'", "the escape `\\01`"),
+        ("const s = `a\\\nb`", "the escape `\\\n`"),
+        ("const s = '\ud800'", "half of a character"),
+        ("const s = f`1`", "a template behind a name or a value"),
+        ("ctx.v = [1, , 2]", "an array with holes"),
+        ("const é = 1", "a variable `é`"),
+        ("let u", "`u` without a value"),
+        ("break now", "`now`"),
+        ("ctx.n = 1; 2", "an expression that does nothing"),
+    ],
+)
+def test_a_refusal_says_what_has_no_counterpart(code: str, message: str) -> None:
+    with pytest.raises(UntranslatableError) as refused:
+        translate_statements(code, CONTEXT)
+    assert str(refused.value) == message
 
 
 @pytest.mark.parametrize(
@@ -223,13 +250,13 @@ def test_a_template_with_a_line_that_goes_on_is_refused() -> None:
     ],
 )
 def test_expressions_become_those_of_python(code: str, python: str) -> None:
-    assert expression(code, NAMES, Used()).text == python
+    assert translate_expression(code, CONTEXT).text == python
 
 
 @pytest.mark.parametrize("code", ["ctx.on", "data.qpos", "lib.energy()", "1;", "a => 1"])
 def test_an_expression_gives_a_number_or_a_text(code: str) -> None:
     with pytest.raises(UntranslatableError):
-        expression(code, NAMES, Used())
+        translate_expression(code, CONTEXT)
 
 
 def test_the_names_of_the_engine_are_those_of_the_bindings() -> None:

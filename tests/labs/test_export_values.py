@@ -14,13 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.effects.v8 import Isolate
-from coursebuild.labs.export_text import helpers
-from coursebuild.labs.python_code import expression, statements
-from coursebuild.labs.python_library import LIBRARY
-from coursebuild.labs.python_values import Code, Names, Used
+from coursebuild.labs.python_library import LIBRARY, helpers
+from coursebuild.labs.python_statements import translate_expression, translate_statements
+from coursebuild.labs.python_values import Type
 
-NAMES = Names({"n": "num", "on": "bool", "v": "vector", "k": "nat"}, Code("GAIN", "num"))
-
+CONTEXT: dict[str, Type] = {"n": "num"}
 
 VALUES = "const x = -0, y = -7.25, z = 0.1, i = 5, data = {qpos: new Float64Array([2.5, -0])}"
 ATOMS = "x y z 0 1 2 3 0.5 1.5 2.5 1e3 1e-3 0x10 4294967296 1e300 data.qpos[0] data.qpos[1]".split()
@@ -61,17 +59,16 @@ def formulas(functions: list[str]) -> st.SearchStrategy[str]:
 
 def python_value(code: str) -> float | None:
     """The value of an expression in Python; `None` where Python raises for a division by zero."""
-    used = Used()
     declared = "const x = -0, y = -7.25, z = 0.1, i = 5\n"
-    lines = statements(f"{declared}ctx.n = {code}", NAMES, used).lines
+    lines = translate_statements(f"{declared}ctx.n = {code}", CONTEXT).lines
     scope = {
         "np": np,
         "math": math,
         "data": SimpleNamespace(qpos=np.array([2.5, -0.0])),
         "ctx": SimpleNamespace(n=None),
     }
-    for name in helpers(used.helpers):
-        exec(LIBRARY[name].source, scope)
+    for name in helpers("\n".join(lines)):
+        exec(LIBRARY[name], scope)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -116,12 +113,11 @@ WRITTEN = st.one_of(
 
 @given(x=WRITTEN, form=st.sampled_from(FORMS))
 def test_numbers_are_written_as_v8_writes_them(v8: Isolate, x: float, form: str) -> None:
-    used = Used()
-    made = expression(f"`${{ctx.n{form}}}`", NAMES, used).text
+    made = translate_expression(f"`${{ctx.n{form}}}`", CONTEXT).text
     scope: dict[str, object] = {"ctx": SimpleNamespace(n=np.float64(x)), "math": math}
     exec("from decimal import ROUND_HALF_UP, Context, Decimal", scope)
-    for name in helpers(used.helpers):
-        exec(LIBRARY[name].source, scope)
+    for name in helpers(made):
+        exec(LIBRARY[name], scope)
     number = "NaN" if math.isnan(x) else repr(x).replace("inf", "Infinity")
     assert eval(made, scope) == v8.call("run", f"`${{({number}){form}}}`", 10.0)
 
@@ -163,13 +159,15 @@ def test_powers_are_those_of_v8(v8: Isolate, base: str, exponent: str) -> None:
     ],
 )
 def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:
-    made = expression(code, NAMES, Used()).text
+    made = translate_expression(code, CONTEXT).text
     assert eval(made) == v8.call("run", code, 10.0)
 
 
 def test_random_numbers_are_those_of_the_lab() -> None:
     scope: dict[str, object] = {}
-    exec("import struct\n" + LIBRARY["Random"].source, scope)
+    exec("import struct", scope)
+    for name in helpers("Random"):
+        exec(LIBRARY[name], scope)
     random = scope["Random"](7)  # type: ignore[operator]
     first = [random() for _ in range(5)]
     random.restart()
