@@ -1,11 +1,11 @@
-"""A whole course checked: lessons, links, mentions, quizzes, labs and terms, against each other.
+"""A whole course checked: lessons, links, mentions, labs, terms and features, against each other.
 
 Entry points: `check_course`; `check_document`, the same for one document.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator
 
 from coursebuild.checks.benches import bench_findings
 from coursebuild.checks.labs import lab_findings
@@ -17,15 +17,15 @@ from coursebuild.checks.links import (
     places,
     remembered_anchors,
 )
-from coursebuild.checks.quizzes import quiz_findings
 from coursebuild.checks.terms import term_findings
+from coursebuild.core.features import features
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course, Document, Script, document_blocks
 from coursebuild.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
-    """Lessons, links, mentions, quizzes, labs and terms, checked against each other."""
+    """Lessons, links, mentions, labs, terms and features, checked against each other."""
     scripts: dict[str, bool] = {}
     terms: dict[str, Span] = {}
     for document in course.documents:
@@ -36,28 +36,27 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
             terms.setdefault(id, span)
     known = places(course, scripts, terms)
     anchors_of = remembered_anchors()
-    quizzes: dict[str, Span] = {}
     found: list[Diagnostic] = []
     for document in course.documents:
         blocks = tuple(document_blocks(document))
         found += lesson_findings(course, document, blocks)
         found += document_links(course, document, known, anchors_of)
-        found += quiz_findings(blocks, scripts, quizzes)
         found += lab_findings(blocks, course)
         found += bench_findings(blocks, course)
         found += term_findings(blocks, known.terms)
-    return tuple(found)
+    return (*found, *feature_findings(course, course.documents))
 
 
-def check_document(
-    course: Course, document: Document, known: Places, scripts: Mapping[str, bool]
-) -> tuple[Diagnostic, ...]:
-    """What `check_course` finds in one document, given what the rest of the course offers.
+def feature_findings(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """What features find wrong in some documents of a course."""
+    for feature in features():
+        if feature.check is not None:
+            yield from feature.check(course, documents)
 
-    `scripts` are those of the course by path, and whether they are not run. Only that another
-    document has a quiz of the same id goes unseen.
-    """
+
+def check_document(course: Course, document: Document, known: Places) -> tuple[Diagnostic, ...]:
+    """What `check_course` finds in one document, given what the rest of the course offers."""
     blocks = tuple(document_blocks(document))
     whole = (*lesson_findings(course, document, blocks), *document_links(course, document, known))
     own = (*bench_findings(blocks, course), *term_findings(blocks, known.terms))
-    return (*whole, *quiz_findings(blocks, scripts), *lab_findings(blocks, course), *own)
+    return (*whole, *lab_findings(blocks, course), *own, *feature_findings(course, (document,)))

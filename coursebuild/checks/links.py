@@ -23,6 +23,7 @@ from coursebuild.model import (
     Course,
     Document,
     ExampleTarget,
+    FeatureBlock,
     Heading,
     HtmlBlock,
     Image,
@@ -32,7 +33,6 @@ from coursebuild.model import (
     MjcfModel,
     ModelTarget,
     PageTarget,
-    Quiz,
     RawInline,
     Recording,
     Script,
@@ -132,8 +132,8 @@ def anchors(document: Document) -> frozenset[str]:
     for block in document_blocks(document):
         if isinstance(block, Heading):
             found.add(block.anchor)
-        elif isinstance(block, Quiz):
-            found.update((block.id, *map(block.anchor, block.keys)))
+        elif isinstance(block, FeatureBlock):
+            found.update(block.anchors())
         elif isinstance(block, Script):
             found.add(listing_anchor(block.path))
         elif isinstance(block, Recording) and block.script is not None:

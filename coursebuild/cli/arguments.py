@@ -196,7 +196,7 @@ def _diet(parser: argparse.ArgumentParser) -> None:
 
 def _schema(parser: argparse.ArgumentParser) -> None:
     parser.description = None
-    parser.add_argument("name", choices=("quiz", "lab", "course", "model"))
+    parser.add_argument("name", metavar="NAME", help="lab, course, model, or of a feature, as quiz")
 
 
 _COMMANDS = (

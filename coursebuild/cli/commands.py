@@ -9,7 +9,7 @@ import argparse
 import os
 import sys
 
-from coursebuild.cli.output import CLEAN, print_report, report_text, style_of, write
+from coursebuild.cli.output import CLEAN, USAGE, fail, print_report, report_text, style_of, write
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
@@ -209,6 +209,9 @@ def diet_command(arguments: argparse.Namespace) -> int:
 
 def schema_command(arguments: argparse.Namespace) -> int:
     """Print a JSON Schema."""
-    from coursebuild.syntax.schemas import json_schema
+    from coursebuild.syntax.schemas import json_schema, schema_roots
 
+    names = sorted(schema_roots())
+    if arguments.name not in names:
+        return fail(USAGE, f"there is no schema {arguments.name!r}: choose from {', '.join(names)}")
     return write(json_schema(arguments.name).decode(), CLEAN)

@@ -25,6 +25,7 @@ from coursebuild.model.blocks import Cell as Cell
 from coursebuild.model.blocks import CodeBlock as CodeBlock
 from coursebuild.model.blocks import Comparison as Comparison
 from coursebuild.model.blocks import Document as Document
+from coursebuild.model.blocks import FeatureBlock as FeatureBlock
 from coursebuild.model.blocks import Filter as Filter
 from coursebuild.model.blocks import Footnote as Footnote
 from coursebuild.model.blocks import Heading as Heading
@@ -76,9 +77,6 @@ from coursebuild.model.inlines import TermTarget as TermTarget
 from coursebuild.model.inlines import Text as Text
 from coursebuild.model.inlines import UrlTarget as UrlTarget
 from coursebuild.model.inlines import plain_text as plain_text
-from coursebuild.model.interactive import AnyQuestion as AnyQuestion
-from coursebuild.model.interactive import Choice as Choice
-from coursebuild.model.interactive import ChoiceQuestion as ChoiceQuestion
 from coursebuild.model.interactive import Lab as Lab
 from coursebuild.model.interactive import LabCamera as LabCamera
 from coursebuild.model.interactive import LabControl as LabControl
@@ -87,12 +85,6 @@ from coursebuild.model.interactive import LabPlot as LabPlot
 from coursebuild.model.interactive import LabReadout as LabReadout
 from coursebuild.model.interactive import LabStep as LabStep
 from coursebuild.model.interactive import LabTrace as LabTrace
-from coursebuild.model.interactive import NumericQuestion as NumericQuestion
-from coursebuild.model.interactive import OpenQuestion as OpenQuestion
-from coursebuild.model.interactive import OrderQuestion as OrderQuestion
-from coursebuild.model.interactive import OutputQuestion as OutputQuestion
-from coursebuild.model.interactive import Question as Question
-from coursebuild.model.interactive import Quiz as Quiz
 from coursebuild.model.lexicon import DefinedTerm as DefinedTerm
 from coursebuild.model.lexicon import Equation as Equation
 from coursebuild.model.lexicon import Lexicon as Lexicon

@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 from coursebuild.model.inlines import Inline, Label
-from coursebuild.model.interactive import Lab, Quiz
+from coursebuild.model.interactive import Lab
 from coursebuild.model.lexicon import Lexicon
 from coursebuild.source import Excerpt, Source, Span
 
@@ -254,6 +254,39 @@ class PlainCode(Struct, frozen=True):
     fragment: bool
 
 
+class FeatureBlock(Struct, frozen=True):
+    """A block that a feature adds, and what the rest of the tool asks of it.
+
+    What a method does not say, the block does not have.
+    """
+
+    span: Span
+
+    def child_blocks(self) -> tuple[Block, ...]:
+        """The blocks of Markdown in it, in the order of the page."""
+        return ()
+
+    def child_inlines(self) -> tuple[Inline, ...]:
+        """The lines of Markdown in it that are in none of its blocks."""
+        return ()
+
+    def summary(self) -> FeatureBlock | None:
+        """The block without what only its own page shows; `None` where nothing is left."""
+        return None
+
+    def anchors(self) -> tuple[str, ...]:
+        """The ids that a link may name."""
+        return ()
+
+    def quoted_lines(self) -> tuple[tuple[str, int], ...]:
+        """Lines of verified outputs that it shows: the script's path, and the line from 1."""
+        return ()
+
+    def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
+        """What a reader's progress is kept for: an id, unique in the course, and keys under it."""
+        return None
+
+
 Block: TypeAlias = (
     Heading
     | Paragraph
@@ -273,7 +306,7 @@ Block: TypeAlias = (
     | Mjcf
     | Bench
     | Lab
-    | Quiz
+    | FeatureBlock
 )
 
 

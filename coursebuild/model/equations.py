@@ -12,9 +12,9 @@ from __future__ import annotations
 import hashlib
 from typing import NamedTuple
 
-from coursebuild.model.blocks import Block, Document, Heading, MathBlock
+from coursebuild.model.blocks import Block, Document, FeatureBlock, Heading, MathBlock
 from coursebuild.model.inlines import Label, Math
-from coursebuild.model.interactive import Lab, Quiz
+from coursebuild.model.interactive import Lab
 from coursebuild.model.walk import (
     block_inlines,
     child_blocks,
@@ -35,11 +35,11 @@ class DisplayFormula(NamedTuple):
     """Empty where it has none."""
 
 
-_ELSEWHERE = (Quiz, Lab)
+_ELSEWHERE = (FeatureBlock, Lab)
 
 
 def blocks_elsewhere(document: Document) -> frozenset[int]:
-    """The Python ids of quizzes, labs and the blocks inside them."""
+    """The Python ids of labs, blocks of features and the blocks inside them."""
     return frozenset(
         id(block)
         for holder in document_blocks(document)

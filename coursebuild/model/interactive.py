@@ -1,6 +1,6 @@
-"""Labs and quizzes: what a reader plays with and is asked.
+"""Labs: what a reader plays with.
 
-Entry points: `Lab`, `Quiz`, the union `AnyQuestion`.
+Entry point: `Lab`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.model.inlines import Inline
 from coursebuild.source import Excerpt, Span
 
 if TYPE_CHECKING:
@@ -142,93 +141,3 @@ class LabCamera(Struct, frozen=True):
     elevation: float | None
     distance: float | None
     target: tuple[float, float, float] | None
-
-
-class Choice(Struct, frozen=True):
-    """An option of a question, with what to say to a learner who takes it."""
-
-    span: Span
-    key: str
-    """Among the options of its question; it depends on the text alone."""
-    text: tuple[Inline, ...]
-    feedback: tuple[Block, ...]
-
-
-class Question(Struct, frozen=True):
-    """What every question has, whatever its kind."""
-
-    span: Span
-    key: str
-    """Among the questions of its quiz: a learner's answer hangs on it."""
-    label: str
-    text: tuple[Block, ...]
-    explain: tuple[Block, ...]
-    hints: tuple[tuple[Block, ...], ...]
-
-
-class ChoiceQuestion(Question, frozen=True):
-    """`mcq` and `predict`.
-
-    `answers` are indices of the right options; `several` when all right ones must be chosen.
-    """
-
-    options: tuple[Choice, ...]
-    answers: tuple[int, ...]
-    several: bool
-    sim: Lab | None
-    """For `predict`: opened once the learner has committed to an answer."""
-    predict: bool
-
-
-class NumericQuestion(Question, frozen=True):
-    """A number: right within `tolerance` (absolute) of `answer`, in `unit`."""
-
-    answer: float
-    answer_text: str
-    """As the author wrote it."""
-    tolerance: float
-    unit: str
-
-
-class OpenQuestion(Question, frozen=True):
-    """Free text, compared by the learner with `reference`."""
-
-    reference: tuple[Block, ...]
-
-
-class OutputQuestion(Question, frozen=True):
-    """What does the script print there? The key is the verified output's line `line` (from 1)."""
-
-    script: str
-    script_span: Span
-    line: int
-    line_span: Span
-
-
-class OrderQuestion(Question, frozen=True):
-    """Put the items in order; they are written in the right order."""
-
-    items: tuple[tuple[Inline, ...], ...]
-    item_keys: tuple[str, ...]
-    """Of each item; it depends on the item's text alone."""
-
-
-AnyQuestion: TypeAlias = (
-    ChoiceQuestion | NumericQuestion | OpenQuestion | OutputQuestion | OrderQuestion
-)
-
-
-class Quiz(Struct, frozen=True):
-    """A quiz; `id` is unique in the course and stable."""
-
-    span: Span
-    id: str
-    id_span: Span
-    title: str
-    questions: tuple[AnyQuestion, ...]
-    keys: tuple[str, ...]
-    """Of all questions, also where `questions` holds only some of them."""
-
-    def anchor(self, key: str) -> str:
-        """The anchor of the question with a key; its dot parts it from the quiz's own."""
-        return f"{self.id}.{key}"

@@ -27,6 +27,7 @@ from coursebuild.model.blocks import (
     Callout,
     CodeBlock,
     Document,
+    FeatureBlock,
     Heading,
     HtmlBlock,
     HtmlFlow,
@@ -42,7 +43,7 @@ from coursebuild.model.blocks import (
     ThematicBreak,
 )
 from coursebuild.model.inlines import Image, Inline, Link, NumberBinding, RawInline, Term
-from coursebuild.model.interactive import Lab, OutputQuestion, Quiz
+from coursebuild.model.interactive import Lab
 from coursebuild.model.walk import block_inlines, document_blocks, is_blank, walk_inlines
 from coursebuild.source import Span
 
@@ -76,8 +77,10 @@ def _bones(block: Block) -> Iterator[Block]:
             yield replace(block, caption=_inlines(block))
         case Lab():
             yield replace(block, note=())
-        case Quiz():
-            yield replace(block, questions=tuple(_questions(block)))
+        case FeatureBlock():
+            bare = block.summary()
+            if bare is not None:
+                yield bare
             yield from _text(block.span, _inlines(block))
         case Callout():
             yield replace(block, title=_inlines(block), blocks=())
@@ -99,10 +102,3 @@ def _inlines(block: Block) -> tuple[Inline, ...]:
         for inline in walk_inlines(block_inlines(block))
         if type(inline) in _KEPT
     )
-
-
-def _questions(quiz: Quiz) -> Iterator[OutputQuestion]:
-    """The questions whose answer a script gives."""
-    for question in quiz.questions:
-        if isinstance(question, OutputQuestion):
-            yield replace(question, text=(), explain=(), hints=())

@@ -14,6 +14,7 @@ from coursebuild.model.blocks import (
     BlockQuote,
     Callout,
     Document,
+    FeatureBlock,
     Heading,
     HtmlBlock,
     HtmlFlow,
@@ -25,17 +26,10 @@ from coursebuild.model.blocks import (
     Table,
 )
 from coursebuild.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
-from coursebuild.model.interactive import (
-    AnyQuestion,
-    ChoiceQuestion,
-    Lab,
-    OpenQuestion,
-    OrderQuestion,
-    Quiz,
-)
+from coursebuild.model.interactive import Lab
 from coursebuild.patterns import pattern
 
-_HOLDERS = frozenset((BlockQuote, Callout, ListBlock, Lab, Quiz, Recording))
+_HOLDERS = (BlockQuote, Callout, ListBlock, Lab, FeatureBlock, Recording)
 """Blocks that may have others in them."""
 _AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
 """Inlines that may have others in them."""
@@ -50,21 +44,11 @@ def child_blocks(block: Block) -> tuple[Block, ...]:
         return tuple(b for item in block.items for b in item.blocks)
     if isinstance(block, Lab):
         return block.note
-    if isinstance(block, Quiz):
-        return tuple(b for q in block.questions for b in _question_blocks(q))
+    if isinstance(block, FeatureBlock):
+        return block.child_blocks()
     if isinstance(block, Recording) and isinstance(block.body, Table):
         return (block.body,)
     return ()
-
-
-def _question_blocks(question: AnyQuestion) -> tuple[Block, ...]:
-    blocks = [*question.text, *question.explain, *(b for hint in question.hints for b in hint)]
-    if isinstance(question, ChoiceQuestion):
-        blocks += [b for option in question.options for b in option.feedback]
-        blocks += [question.sim] if question.sim is not None else []
-    if isinstance(question, OpenQuestion):
-        blocks += question.reference
-    return tuple(blocks)
 
 
 def block_inlines(block: Block) -> tuple[Inline, ...]:
@@ -72,16 +56,10 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
     kind = type(block)
     if kind in _LINES:
         return block.children  # type: ignore[union-attr]
+    if isinstance(block, FeatureBlock):
+        return block.child_inlines()
     inner = _INLINES.get(kind)
     return () if inner is None else inner(block)
-
-
-def _question_inlines(question: AnyQuestion) -> tuple[Inline, ...]:
-    if isinstance(question, ChoiceQuestion):
-        return tuple(i for option in question.options for i in option.text)
-    if isinstance(question, OrderQuestion):
-        return tuple(i for item in question.items for i in item)
-    return ()
 
 
 _LINES = frozenset((Paragraph, Heading, HtmlFlow))
@@ -92,7 +70,6 @@ _INLINES: dict[type, Callable[[Any], tuple[Inline, ...]]] = {
     ),
     Recording: lambda recording: recording.caption,
     Io: lambda io: (*io.input, *io.process, *io.output),
-    Quiz: lambda quiz: tuple(i for q in quiz.questions for i in _question_inlines(q)),
 }
 
 
@@ -100,7 +77,7 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
     """Every block in document order, a container before what it holds."""
     for block in blocks:
         yield block
-        if type(block) in _HOLDERS:
+        if isinstance(block, _HOLDERS):
             yield from walk_blocks(child_blocks(block))
 
 
@@ -123,14 +100,11 @@ def is_blank(blocks: Iterable[Block]) -> bool:
     )
 
 
-def document_has(document: Document, *kinds: type[Block] | type[AnyQuestion]) -> bool:
-    """Whether a document has blocks, or questions in quizzes, of one of these types."""
+def document_has(document: Document, *kinds: type[Block]) -> bool:
+    """Whether a document has blocks of one of these types."""
     known: frozenset[type] | None = document.__dict__.get("kinds")
     if known is None:
-        blocks = tuple(document_blocks(document))
-        quizzes = (block for block in blocks if isinstance(block, Quiz))
-        questions = (question for quiz in quizzes for question in quiz.questions)
-        known = frozenset(map(type, (*blocks, *questions)))
+        known = frozenset(map(type, document_blocks(document)))
         document.__dict__["kinds"] = known
     return not known.isdisjoint(kinds)
 

@@ -27,7 +27,8 @@ from coursebuild.effects.locks import project_lock
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.model import Block, Course, Quiz, document_blocks
+from coursebuild.features.quiz.model import Quiz
+from coursebuild.model import Block, Course, document_blocks
 from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents

@@ -93,7 +93,7 @@ _HEAVY = (
     "coursebuild.render.search.page",
     "coursebuild.syntax.document",
     "coursebuild.syntax.lab",
-    "coursebuild.syntax.quiz",
+    "coursebuild.features.quiz.parse",
 )
 
 

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, assert_never
 from msgspec import Struct, field
 
 from coursebuild.checks.compiled import check_compiled, mjcf_texts
-from coursebuild.checks.quizzes import check_output_lines
+from coursebuild.core.features import check_runs
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.effects.errors import OutsideProjectError
 from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.effects.write import remove_leftovers
-from coursebuild.model import Course, Lab, OutputQuestion, Quiz, document_blocks, document_has
+from coursebuild.model import Course, FeatureBlock, Lab, document_blocks, document_has
 from coursebuild.pipeline.kept import KeptBindings
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -120,7 +120,7 @@ def verify(
         from coursebuild.scripts.repeat import repeat_findings
 
         found += repeat_findings(course, chosen, memory.differing)
-    found += check_output_lines(course, runs)
+    found += check_runs(course, runs)
     versions = python_version(), engine_version()
     results = Results(runs, verdicts, (), models, *versions, labs)
     return Verified(results, tuple(found), script_lines(chosen, runs, verdicts), lab_lines(labs))
@@ -140,10 +140,9 @@ def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
     for document in course.documents:
         if document.source.path in documents:
             paths |= {b.script for b in document_bindings(document) if b.script is not None}
-            quizzes = (b for b in document_blocks(document) if isinstance(b, Quiz))
-            for question in (q for quiz in quizzes for q in quiz.questions):
-                if isinstance(question, OutputQuestion):
-                    paths.add(question.script)
+            for block in document_blocks(document):
+                if isinstance(block, FeatureBlock):
+                    paths |= {script for script, _ in block.quoted_lines()}
     return paths
 
 

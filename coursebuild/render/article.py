@@ -12,11 +12,11 @@ from coursebuild.model import (
     Bench,
     Block,
     Document,
+    FeatureBlock,
     Heading,
     HtmlBlock,
     Lab,
     Mjcf,
-    Quiz,
     Recording,
     Script,
     Table,
@@ -56,7 +56,7 @@ class _Group(Struct, frozen=True):
     after: tuple[Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Bench, Quiz, Lab, Table, HtmlBlock)
+_WIDE = (Script, Recording, Mjcf, Bench, FeatureBlock, Lab, Table, HtmlBlock)
 """Blocks that take the whole width, so that no lab can stand beside them."""
 
 

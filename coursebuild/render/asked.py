@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import TypeAlias
 from urllib.parse import quote
 
-from coursebuild.model import Document, Quiz, document_blocks
+from coursebuild.model import Document, FeatureBlock, document_blocks
 
 AskedBy: TypeAlias = Mapping[str, str]
 """By the path of the document; those that ask nothing are left out."""
@@ -20,8 +20,9 @@ AskedBy: TypeAlias = Mapping[str, str]
 
 def asked(document: Document) -> str:
     """`ID:KEY,KEY ID:KEY`: each quiz with the keys of its questions; ids are percent-encoded."""
-    quizzes = (block for block in document_blocks(document) if isinstance(block, Quiz))
-    return " ".join(f"{quote(quiz.id, safe='')}:{','.join(quiz.keys)}" for quiz in quizzes)
+    blocks = (block for block in document_blocks(document) if isinstance(block, FeatureBlock))
+    quizzes = (keys for block in blocks if (keys := block.progress_keys()) is not None)
+    return " ".join(f"{quote(id, safe='')}:{','.join(keys)}" for id, keys in quizzes)
 
 
 def count(text: str) -> int:

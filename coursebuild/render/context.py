@@ -15,11 +15,13 @@ from urllib.parse import quote, unquote
 from markupsafe import Markup, escape
 from msgspec import Struct
 
+from coursebuild.core.features import kind_of_block
 from coursebuild.model import (
     Bench,
     Block,
     Callout,
     Document,
+    FeatureBlock,
     Inline,
     Io,
     Lab,
@@ -27,7 +29,6 @@ from coursebuild.model import (
     Mjcf,
     NumberBinding,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Target,
@@ -35,7 +36,7 @@ from coursebuild.model import (
     child_blocks,
     document_blocks,
 )
-from coursebuild.render import blocks, formulas, labs, markup, quizzes, urls
+from coursebuild.render import blocks, formulas, labs, markup, urls
 from coursebuild.render.direction import direction
 from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
@@ -146,8 +147,8 @@ class PageContext(Struct, frozen=True):
                 return blocks.plain_code(self, block)
             case Lab():
                 return labs.lab(self, block)
-            case Quiz():
-                return quizzes.quiz(self, block)
+            case FeatureBlock():
+                return kind_of_block(block).draw(self, block)
             case _:
                 assert_never(block)
 

@@ -14,18 +14,20 @@ from msgspec import Struct, field
 from coursebuild.model import (
     Bench,
     Callout,
+    FeatureBlock,
     Io,
     Lab,
     Mjcf,
     NumberBinding,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Target,
 )
 
-OwnBlock: TypeAlias = Bench | Callout | Io | Lab | Mjcf | PlainCode | Quiz | Recording | Script
+OwnBlock: TypeAlias = (
+    Bench | Callout | Io | Lab | Mjcf | PlainCode | FeatureBlock | Recording | Script
+)
 """The blocks that are more than Markdown."""
 
 

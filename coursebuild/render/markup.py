@@ -25,6 +25,7 @@ from coursebuild.model import (
     CodeBlock,
     CodeSpan,
     Emphasis,
+    FeatureBlock,
     Footnote,
     FootnoteRef,
     HardBreak,
@@ -44,7 +45,6 @@ from coursebuild.model import (
     NumberBinding,
     Paragraph,
     PlainCode,
-    Quiz,
     RawInline,
     Recording,
     Script,
@@ -184,9 +184,9 @@ class _Writer:
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
-            case Bench() | Callout() | Io() | Lab() | Mjcf() | PlainCode() | Quiz():
+            case Bench() | Callout() | Io() | Lab() | Mjcf() | PlainCode():
                 return self.context.block(block)
-            case Recording() | Script():
+            case Recording() | Script() | FeatureBlock():
                 return self.context.block(block)
             case _:
                 assert_never(block)

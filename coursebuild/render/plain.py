@@ -16,6 +16,7 @@ from coursebuild.model import (
     Callout,
     Document,
     ExampleTarget,
+    FeatureBlock,
     Io,
     Lab,
     LessonTarget,
@@ -25,7 +26,6 @@ from coursebuild.model import (
     NumberBinding,
     PageTarget,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Table,
@@ -125,7 +125,9 @@ class PlainContext:
                 )
             case Bench():
                 return Markup(f"<p>{escape(block.model)}</p>\n")
-            case Lab() | Quiz():
+            case Lab():
                 return Markup(f"<p>{escape(block.title)}</p>\n")
+            case FeatureBlock():
+                return Markup(render_blocks(block.child_blocks(), self, PLAIN))
             case _:
                 assert_never(block)

@@ -14,14 +14,13 @@ from coursebuild.model import (
     Callout,
     Document,
     ExampleTarget,
+    FeatureBlock,
     Lab,
     LessonTarget,
     LevelTarget,
     Link,
     ModelTarget,
-    OutputQuestion,
     PageTarget,
-    Quiz,
     Recording,
     Script,
     Target,
@@ -89,7 +88,7 @@ class _Page:
         self.benches: dict[int, ShownBench] = {}
         self.keyframes: dict[str, tuple[str, ...]] = {}
         self.scripts: dict[str, set[int]] = {}
-        """Paths of scripts, and the numbers of the lines that questions ask for."""
+        """Paths of scripts, and the numbers of the lines that are quoted."""
 
     def note(self, block: Block) -> None:
         """Note what a block asks for."""
@@ -102,10 +101,9 @@ class _Page:
                 self._lab(block)
             case Bench():
                 self.benches[block.span.start] = _shown_bench(self.library, self.place, block)
-            case Quiz():
-                for question in block.questions:
-                    if isinstance(question, OutputQuestion):
-                        self.scripts.setdefault(question.script, set()).add(question.line)
+            case FeatureBlock():
+                for script, line in block.quoted_lines():
+                    self.scripts.setdefault(script, set()).add(line)
             case Callout():
                 library, kind = self.library, block.kind
                 words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))

@@ -5,9 +5,10 @@ Entry point: `fence_block`.
 
 from __future__ import annotations
 
+from coursebuild.core.features import FenceKind, fence_kind
 from coursebuild.diagnostics import Note, diagnose
-from coursebuild.model import Block, CodeBlock, Script
-from coursebuild.syntax.fence import Fence, near_kind
+from coursebuild.model import Block, CodeBlock, FeatureBlock, Script
+from coursebuild.syntax.fence import Fence, missing_feature, near_kind
 from coursebuild.syntax.info import parse_info, read_keys
 from coursebuild.syntax.io import parse_io
 from coursebuild.syntax.mjcf import parse_mjcf
@@ -43,9 +44,14 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
             return mjcf.value
         case "bench":
             return _bench(fence, session)
-        case "quiz" | "lab":
-            return _interactive(fence, session, texts)
+        case "lab":
+            return _lab(fence, session, texts)
+        case name if (kind := fence_kind(name)) is not None:
+            return _of_feature(kind, fence, session, texts)
         case _:
+            missing = missing_feature(fence)
+            if missing is not None:
+                session.report(missing)
             near = near_kind(fence)
             if near is not None:
                 session.report(near)
@@ -82,33 +88,37 @@ def _bench(fence: Fence, session: Session) -> Block:
 
     parsed = parse_bench(fence)
     session.diagnostics += parsed.diagnostics
-    if fence.nested:
-        message = "a text of a quiz or lab cannot hold a bench"
-        session.report(diagnose("fence-info", fence.head, message))
-        return fence.code()
-    return parsed.value
+    return _nested(fence, session) if fence.nested else parsed.value
 
 
-def _interactive(fence: Fence, session: Session, texts: TextParser) -> Block:
+def _lab(fence: Fence, session: Session, texts: TextParser) -> Block:
     info = parse_info(fence.info)
     session.diagnostics += info.diagnostics
     words = list(info.value.words)
     kind, kind_span = "simlab", info.value.kind_span
-    if fence.kind == "lab" and words and words[0].value is None:
+    if words and words[0].value is None:
         kind, kind_span = words[0].key, words.pop(0).key_span
     session.diagnostics += read_keys(fence.kind, words).diagnostics
     if fence.nested:
-        message = f"a text of a quiz or lab cannot hold a {fence.kind}"
-        session.report(diagnose("fence-info", fence.head, message))
-        return fence.code()
-    if fence.kind == "lab":
-        from coursebuild.syntax.lab import parse_lab
+        return _nested(fence, session)
+    from coursebuild.syntax.lab import parse_lab
 
-        lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
-        session.diagnostics += lab.diagnostics
-        return lab.value or fence.code()
-    from coursebuild.syntax.quiz import parse_quiz
+    lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
+    session.diagnostics += lab.diagnostics
+    return lab.value or fence.code()
 
-    quiz = parse_quiz(fence.span, fence.body, texts)
-    session.diagnostics += quiz.diagnostics
-    return quiz.value or fence.code()
+
+def _of_feature(
+    kind: FenceKind[FeatureBlock], fence: Fence, session: Session, texts: TextParser
+) -> Block:
+    if fence.nested and not kind.nested:
+        return _nested(fence, session)
+    parsed = kind.parse(fence, texts)
+    session.diagnostics += parsed.diagnostics
+    return parsed.value or fence.code()
+
+
+def _nested(fence: Fence, session: Session) -> CodeBlock:
+    message = f"a text of a quiz or lab cannot hold a {fence.kind}"
+    session.report(diagnose("fence-info", fence.head, message))
+    return fence.code()

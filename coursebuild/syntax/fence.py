@@ -1,7 +1,7 @@
 """Fences: a code block of the text, and what makes one of ours out of it.
 
-Entry points: `read_fence` (a token into a `Fence`), `OURS` (the kinds of fences that are more than
-code), `near_kind` (a kind that looks misspelt).
+Entry points: `read_fence` (a token into a `Fence`), `near_kind` (a kind that looks misspelt),
+`missing_feature` (a kind that an installed feature would read).
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ import re
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
+from coursebuild.core.features import fence_names, missing_package
 from coursebuild.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.info import first_word, kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
 
-OURS = ("bench", "io", "lab", "mjcf", "python", "quiz", "text")
+_OWN = ("bench", "io", "lab", "mjcf", "python", "text")
+"""The kinds of fences that the core reads."""
 
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
@@ -54,6 +56,11 @@ class Fence(Struct, frozen=True):
         """It as a code block of no special kind."""
         language = unescaped(self.kind)
         return CodeBlock(self.span, language, unescaped(self.info.text), self.body)
+
+
+def is_ours(kind: str) -> bool:
+    """Whether a block of a kind is more than code."""
+    return kind in _OWN or kind in fence_names()
 
 
 def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
@@ -119,8 +126,17 @@ def near_kind(fence: Fence) -> Diagnostic | None:
         return diagnose("script-kind", kind.span(), message, help=help)
     if name in _LANGUAGES:
         return None
-    near = "lab simlab" if name == "simlab" else nearest(name, OURS, cutoff=0.75)
+    near = "lab simlab" if name == "simlab" else nearest(name, (*_OWN, *fence_names()), cutoff=0.75)
     if near is None:
         return None
     message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
     return diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
+
+
+def missing_feature(fence: Fence) -> Diagnostic | None:
+    """That a block would be more than code if its feature were installed."""
+    package = missing_package(fence.kind)
+    if not package:
+        return None
+    message = f"nothing that is installed reads a block of kind `{fence.kind}`"
+    return diagnose("feature-missing", fence.head, message, help=f"install {package}")

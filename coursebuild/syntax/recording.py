@@ -14,7 +14,7 @@ from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.model import Comparison, Inline, Mode, Recording, Table, plain_text
 from coursebuild.patterns import pattern
 from coursebuild.source import Span
-from coursebuild.syntax.fence import OURS, Fence
+from coursebuild.syntax.fence import Fence, is_ours
 from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
 from coursebuild.syntax.session import Session
 
@@ -63,7 +63,7 @@ def record_fence(
     if not fence.closed or fence.inner is not None:
         return None
     if fence.kind != "text":
-        if fence.kind in OURS:
+        if is_ours(fence.kind):
             session.diagnostics += nothing_recorded(caption, caption_span)
         else:
             what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"

@@ -1,6 +1,6 @@
 """JSON Schemas of what an author writes in JSON and TOML, for editors.
 
-Entry point: `json_schema(name)`.
+Entry points: `json_schema(name)`; `schema_roots`, what there are some of.
 
 They are made from the declarations that the decoder checks against, so that an editor and a build
 say the same; what only checks know (an answer that is one of the options) is not in them.
@@ -9,31 +9,33 @@ say the same; what only checks know (an answer that is one of the options) is no
 from __future__ import annotations
 
 import copy
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.features import features
 from coursebuild.syntax.course_schema import CourseFile
 from coursebuild.syntax.lab_schema import SimLab, Slider
-from coursebuild.syntax.quiz_schema import QuizFile
 from coursebuild.syntax.scenario_schema import ModelFile
-
-SchemaName: TypeAlias = Literal["quiz", "lab", "course", "model"]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
-_ROOTS: dict[SchemaName, tuple[type[Struct], str]] = {
-    "quiz": (QuizFile, "A quiz fence"),
+_ROOTS: dict[str, tuple[type[Struct], str]] = {
     "lab": (SimLab, "A lab fence of the kind simlab"),
     "course": (CourseFile, "The course map, content/course.toml"),
     "model": (ModelFile, "The file beside a model, models/NAME.toml"),
 }
 
 
-def json_schema(name: SchemaName) -> bytes:
+def schema_roots() -> dict[str, tuple[type[Struct], str]]:
+    """What there are schemas of, by name: the declared type, and its title."""
+    return _ROOTS | {name: root for each in features() for name, root in each.schemas.items()}
+
+
+def json_schema(name: str) -> bytes:
     """The JSON Schema (draft 2020-12), indented, keys in a fixed order, with a final newline."""
-    root, title = _ROOTS[name]
+    root, title = schema_roots()[name]
     made = copy.deepcopy(msgspec.json.schema(root))
     definitions: dict[str, Any] = made["$defs"]
     if Slider.__name__ in definitions:  # the tag that an author may leave out

@@ -14,8 +14,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from coursebuild.effects.v8 import MathEngine
+from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, OrderQuestion, Quiz
 from coursebuild.model import (
-    ChoiceQuestion,
     CodeBlock,
     CodeSpan,
     Course,
@@ -29,10 +29,7 @@ from coursebuild.model import (
     MathBlock,
     Mjcf,
     NumberBinding,
-    NumericQuestion,
-    OrderQuestion,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Table,

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from coursebuild.checks.course import check_course
-from coursebuild.checks.quizzes import check_output_lines
+from coursebuild.features.quiz.checks import check_output_lines
 from coursebuild.results import Outcome, ScriptRun
 from support.made_courses import make_course, said, told
 

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from coursebuild.features.quiz.model import Quiz
 from coursebuild.labs.compile import pieces
 from coursebuild.labs.reply import Failure, Trial, read_trial
 from coursebuild.labs.verdict import (
@@ -16,7 +17,7 @@ from coursebuild.labs.verdict import (
     reset_diagnostics,
     trial_diagnostics,
 )
-from coursebuild.model import Lab, Quiz, document_blocks
+from coursebuild.model import Lab, document_blocks
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from support.lab_values import BALL, make_lab

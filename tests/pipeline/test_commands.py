@@ -74,7 +74,7 @@ def test_a_folder_without_a_map_gives_1(make: Make, command: str) -> None:
         (["check", "--jobs", "²"], "'²' is no number of jobs"),
         (["serve", "--port", "65536"], "'65536' is no port"),
         (["serve", "--port", "http"], "'http' is no port"),
-        (["schema", "nosuch"], "invalid choice: 'nosuch'"),
+        (["schema", "nosuch"], "there is no schema 'nosuch': choose from course, lab, model, quiz"),
         (["-C"], "expected one argument"),
         (["-C", "no/such", "check"], "there is no folder no/such"),
         (["-C", "content/course.toml", "check"], "content/course.toml is not a folder"),

@@ -11,14 +11,13 @@ from msgspec.structs import replace
 
 from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.checks.course import check_course
-from coursebuild.checks.quizzes import check_output_lines
+from coursebuild.features.quiz.checks import check_output_lines
+from coursebuild.features.quiz.model import OutputQuestion, Quiz
 from coursebuild.model import (
     Course,
     Document,
     Lab,
     Mjcf,
-    OutputQuestion,
-    Quiz,
     Recording,
     Script,
     ThematicBreak,

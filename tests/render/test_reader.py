@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from coursebuild.features.quiz.keys import text_key
 from coursebuild.model import Document
 from coursebuild.model.skeleton import skeleton
 from coursebuild.render.asked import asked, count
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
-from coursebuild.syntax.question_keys import text_key
 from support.rendered_course import Make
 
 

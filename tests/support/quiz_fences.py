@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from coursebuild.diagnostics import Parsed, diagnose
-from coursebuild.model import Block, Inline, Paragraph, Quiz, Text
+from coursebuild.features.quiz.model import Quiz
+from coursebuild.features.quiz.parse import parse_quiz
+from coursebuild.model import Block, Inline, Paragraph, Text
 from coursebuild.source import Excerpt, Source, Span
-from coursebuild.syntax.quiz import parse_quiz
 from support.positioned_nodes import shown
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from markdown_it.common.utils import unescapeAll
 
 from coursebuild.diagnostics import Parsed
+from coursebuild.features.quiz.model import Quiz
 from coursebuild.model import (
     Block,
     CodeBlock,
@@ -28,7 +29,6 @@ from coursebuild.model import (
     NumberBinding,
     Paragraph,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Strikethrough,

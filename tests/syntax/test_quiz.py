@@ -9,23 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.model import (
-    Block,
+from coursebuild.features.quiz.model import (
     ChoiceQuestion,
-    Math,
     NumericQuestion,
     OpenQuestion,
     OrderQuestion,
     OutputQuestion,
-    Paragraph,
     Quiz,
-    Text,
-    document_blocks,
-    document_inlines,
 )
+from coursebuild.features.quiz.parse import parse_quiz
+from coursebuild.model import Block, Math, Paragraph, Text, document_blocks, document_inlines
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
-from coursebuild.syntax.quiz import parse_quiz
 from coursebuild.vocabulary import CALLOUTS
 from support.quiz_fences import MCQ, Plain, fence, parse
 

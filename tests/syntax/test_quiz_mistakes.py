@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.model import ChoiceQuestion, OutputQuestion
+from coursebuild.features.quiz.model import ChoiceQuestion, OutputQuestion
 from support.quiz_fences import MCQ, parse, told
 
 QUESTION = '{"id": "x", "questions": [\n%s]}'

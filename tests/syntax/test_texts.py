@@ -7,6 +7,7 @@ import json
 import pytest
 
 from coursebuild.diagnostics import Diagnostic
+from coursebuild.features.quiz.model import OpenQuestion, Quiz
 from coursebuild.model import (
     Block,
     CodeBlock,
@@ -15,9 +16,7 @@ from coursebuild.model import (
     Inline,
     Link,
     Math,
-    OpenQuestion,
     Paragraph,
-    Quiz,
     RawInline,
     SoftBreak,
     Text,

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.checks.links import Places, anchors, defined_terms
 from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.model import Course, Document, Lesson, Page, Quiz, Script, document_blocks
+from coursebuild.model import Course, Document, FeatureBlock, Lesson, Page, Script, document_blocks
 from coursebuild.render import urls
 from coursebuild.render.library import Library, Owner
 from coursebuild.render.lookup.references import owner_path
@@ -24,7 +24,7 @@ from coursebuild.source import Span
 def offered(document: Document) -> tuple[object, ...]:
     """What other documents may refer to, or clash with."""
     blocks = tuple(document_blocks(document))
-    quizzes = tuple(block.id for block in blocks if isinstance(block, Quiz))
+    quizzes = tuple(b.progress_keys() for b in blocks if isinstance(b, FeatureBlock))
     scripts = tuple((block.path, block.norun) for block in blocks if isinstance(block, Script))
     return anchors(document), quizzes, scripts
 

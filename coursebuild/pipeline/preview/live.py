@@ -205,14 +205,13 @@ class LiveCourse:
         course = with_owners(old, fresh)
         library = self.parts.renewed(before, course, fresh)
         known = renewed_places(known, fresh, library)
-        scripts = {path: script.norun for path, (script, _) in library.scripts.items()}
         documents = {o.path: o.document for o in fresh if o.document is not None}
         self.parts.typeset(documents.values())
         pairs = [(self._document(path), document) for path, document in documents.items()]
         stale = self._stale(pairs, course, library)
         drawn: dict[str, tuple[Drawn, bytes | None]] = {}
         for path, document in documents.items():
-            found[path] += check_document(course, document, known, scripts)
+            found[path] += check_document(course, document, known)
             if not has_errors(found[path]) and not has_errors(
                 self.parts.formula_mistakes(document)
             ):

@@ -20,13 +20,12 @@ from coursebuild.model import (
     Bench,
     Course,
     Document,
+    FeatureBlock,
     Lab,
     Lesson,
     Lexicon,
     Mjcf,
-    OutputQuestion,
     Page,
-    Quiz,
     Recording,
     Script,
     document_blocks,
@@ -370,6 +369,6 @@ def _leans_on(document: Document) -> tuple[str, ...]:
             found.add(block.path)
         elif isinstance(block, Recording) and block.script is not None:
             found.add(block.script)
-        elif isinstance(block, Quiz):
-            found |= {q.script for q in block.questions if isinstance(q, OutputQuestion)}
+        elif isinstance(block, FeatureBlock):
+            found |= {script for script, _ in block.quoted_lines()}
     return tuple(sorted(found))

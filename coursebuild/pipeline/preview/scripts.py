@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from msgspec.structs import replace
 
-from coursebuild.checks.quizzes import check_output_lines
+from coursebuild.core.features import check_runs
 from coursebuild.effects.runner import RunStoppedError, ScriptServer
 from coursebuild.model import Course
 from coursebuild.pipeline.options import Options
@@ -154,7 +154,7 @@ class Scripts:
         if len(self._held) > _HELD:
             self._held.clear()
         found = script_findings(course, chosen, tuple(runs.values()), verdicts, self._held)
-        live.behind["scripts"] = (*found, *check_output_lines(course, runs.values()))
+        live.behind["scripts"] = (*found, *check_runs(course, runs.values()))
         live.tell()
         drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
         once = {path for path, ran in live.parts.runs.items() if ran.again is None}

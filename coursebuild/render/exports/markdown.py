@@ -25,6 +25,7 @@ from coursebuild.model import (
     CodeBlock,
     CodeSpan,
     Emphasis,
+    FeatureBlock,
     Footnote,
     FootnoteRef,
     HardBreak,
@@ -44,7 +45,6 @@ from coursebuild.model import (
     NumberBinding,
     Paragraph,
     PlainCode,
-    Quiz,
     RawInline,
     Recording,
     Script,
@@ -140,7 +140,7 @@ def write_footnotes(
 
 
 _APART = (
-    *(HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Bench, Lab, Quiz),
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Bench, Lab, FeatureBlock),
     *(Table, MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
@@ -219,7 +219,7 @@ class _Writer:
                 return self._once(block, lambda: self._table(block))
             case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf():
                 return self.context.own(block)
-            case Bench() | Lab() | Quiz():
+            case Bench() | Lab() | FeatureBlock():
                 return self.context.own(block)
             case _:
                 assert_never(block)

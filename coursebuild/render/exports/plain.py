@@ -14,29 +14,22 @@ from typing import assert_never
 
 from msgspec import Struct, field
 
+from coursebuild.core.features import kind_of_block
 from coursebuild.model import (
-    AnyQuestion,
     Bench,
     Block,
     Callout,
-    ChoiceQuestion,
-    Heading,
+    FeatureBlock,
     Inline,
     Io,
     Lab,
     Mjcf,
     ModelTarget,
-    NumericQuestion,
-    OpenQuestion,
-    OrderQuestion,
-    OutputQuestion,
     PlainCode,
-    Quiz,
     Recording,
     Script,
     Table,
     Target,
-    plain_text,
 )
 from coursebuild.render.blocks import output_receipt, script_receipt
 from coursebuild.render.context import PageContext
@@ -46,7 +39,6 @@ from coursebuild.render.exports.marks import (
     escaped,
     fence,
     guarded,
-    hang,
     link,
     picture,
     quoted,
@@ -61,7 +53,6 @@ from coursebuild.render.labs import (
     start_name,
 )
 from coursebuild.render.look import OwnBlock
-from coursebuild.render.quizzes import letter, output_line
 
 
 class Plain(Struct, frozen=True):
@@ -120,8 +111,8 @@ class Plain(Struct, frozen=True):
                 return self._bench(block)
             case Lab():
                 return self._lab(block)
-            case Quiz():
-                return self._quiz(block)
+            case FeatureBlock():
+                return kind_of_block(block).markdown(self, block)
             case _:
                 assert_never(block)
 
@@ -257,93 +248,11 @@ class Plain(Struct, frozen=True):
             rows.append((words("lab.overlays"), names))
         return [f"- {escaped(label)}: {escaped(', '.join(names))}" for label, names in rows]
 
-    # --- quizzes
-
-    def _quiz(self, block: Quiz) -> str:
-        questions = (
-            hang(f"{at}. ", self._question(question))
-            for at, question in enumerate(block.questions, 1)
-        )
-        headings = (b for b in self.page.document.blocks if isinstance(b, Heading))
-        said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
-        title = "" if said else f"**{escaped(block.title)}**"
-        return "\n\n".join(filter(None, (title, *questions)))
-
-    def _question(self, question: AnyQuestion) -> str:
-        parts = [f"*{escaped(question.label)}*"] if question.label else []
-        parts.append(self.blocks(question.text))
-        parts += self._asked(question)
-        for at, hint in enumerate(question.hints, 1):
-            parts.append(self._folded(self.words("quiz.hint", n=at), self.blocks(hint)))
-        answer = "\n\n".join(filter(None, self._answer(question)))
-        parts.append(self._folded(self.words("quiz.answer"), answer))
-        return "\n\n".join(filter(None, parts))
-
-    def _folded(self, label: str, text: str) -> str:
+    def folded(self, label: str, text: str) -> str:
+        """A text behind its label, which a notebook shows on demand."""
         if self.notebook:
             return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
         return f"**{label}:** {text}" if _begins_as_text(text) else f"**{label}:**\n\n{text}"
-
-    def _asked(self, question: AnyQuestion) -> list[str]:
-        """What is said of how to answer, and what there is to choose from."""
-        match question:
-            case ChoiceQuestion():
-                how = "quiz.commit" if question.predict else ""
-                how = "quiz.choose_all" if question.several else how
-                options = (
-                    f"- {letter(at)}: {self.inlines(option.text)}"
-                    for at, option in enumerate(question.options)
-                )
-                return [f"*{self.words(how)}*" if how else "", "\n".join(options)]
-            case NumericQuestion():
-                unit = f"{self.words('quiz.unit')} {escaped(question.unit)}"
-                return [f"*{unit}*"] if question.unit else []
-            case OpenQuestion():
-                return []
-            case OutputQuestion():
-                asked = self.words("quiz.output_of", path=question.script, line=question.line)
-                return [f"*{asked}*"]
-            case OrderQuestion():
-                right = [self.inlines(item) for item in question.items]
-                items = sorted(right)
-                items = [*items[1:], items[0]] if items == right else items
-                return [
-                    f"*{self.words('quiz.order')}*",
-                    "\n".join(f"- {item}" for item in items),
-                ]
-            case _:
-                assert_never(question)
-
-    def _answer(self, question: AnyQuestion) -> list[str]:
-        explain = self.blocks(question.explain)
-        match question:
-            case ChoiceQuestion():
-                right = ", ".join(letter(at) for at in question.answers)
-                said = [
-                    f"- {self.words('quiz.feedback', option=letter(at))}: "
-                    + hang("", self.blocks(option.feedback), 2)
-                    for at, option in enumerate(question.options)
-                    if option.feedback
-                ]
-                sim = self._lab(question.sim) if question.sim is not None else ""
-                return [f"{right}.", explain, "\n".join(said), sim]
-            case NumericQuestion():
-                unit = f" {escaped(question.unit)}" if question.unit else ""
-                near = self.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
-                return [f"{escaped(question.answer_text)}{unit} ({near}).", explain]
-            case OpenQuestion():
-                return [self.blocks(question.reference), explain]
-            case OutputQuestion():
-                line = output_line(self.page, question.script, question.line)
-                shown = self.words("quiz.none") if line is None else fence("text", line)
-                return [shown, explain]
-            case OrderQuestion():
-                right = "\n".join(
-                    f"{at}. {self.inlines(item)}" for at, item in enumerate(question.items, 1)
-                )
-                return [right, explain]
-            case _:
-                assert_never(question)
 
 
 def _cell(text: str) -> str:

@@ -19,7 +19,7 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.model import (
+from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
     NumericQuestion,
@@ -28,6 +28,7 @@ from coursebuild.model import (
     OutputQuestion,
     Quiz,
 )
+from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.packages.flow import Flow, Places
@@ -47,7 +48,6 @@ from coursebuild.render.packages.processing import (
     response,
 )
 from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
-from coursebuild.render.quizzes import letter, output_line, shuffle, unit_html
 from coursebuild.source import Span
 
 NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"

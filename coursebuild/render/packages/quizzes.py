@@ -5,7 +5,8 @@ Entry point: `page_quizzes(sheet, document, tools, base_url)`.
 
 from __future__ import annotations
 
-from coursebuild.model import Document, Quiz, document_blocks
+from coursebuild.features.quiz.model import Quiz
+from coursebuild.model import Document, document_blocks
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.packages.items import MadeQuiz, made_items

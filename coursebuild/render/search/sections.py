@@ -14,15 +14,16 @@ from collections.abc import Iterable, Mapping
 from html import unescape
 from typing import assert_never
 
+from coursebuild.core.features import kind_of_block
 from coursebuild.model import (
     Bench,
     Block,
     BlockQuote,
     Callout,
-    ChoiceQuestion,
     CodeBlock,
     Document,
     Emphasis,
+    FeatureBlock,
     FootnoteRef,
     HardBreak,
     Heading,
@@ -38,10 +39,8 @@ from coursebuild.model import (
     MathBlock,
     Mjcf,
     NumberBinding,
-    OrderQuestion,
     Paragraph,
     PlainCode,
-    Quiz,
     RawInline,
     Recording,
     Script,
@@ -75,7 +74,7 @@ def document_sections(
         labels: of the kinds of callouts, by name.
         measured: what the reports that it shows are about, by their offset.
     """
-    reader = _Reader(labels, measured or {})
+    reader = SectionReader(labels, measured or {})
     for text in lead:
         reader.add("text", text)
     reader.blocks(document.blocks)
@@ -84,7 +83,9 @@ def document_sections(
     return reader.ended()
 
 
-class _Reader:
+class SectionReader:
+    """Collects the sections of a document."""
+
     def __init__(self, labels: Mapping[str, str], measured: Mapping[int, str]) -> None:
         self._labels = labels
         self._measured = measured
@@ -117,9 +118,9 @@ class _Reader:
     def _block(self, block: Block) -> None:
         match block:
             case Paragraph() | HtmlFlow():
-                self.add("text", self._text(block.children))
+                self.add("text", self.text(block.children))
             case Heading():
-                heading = _line(self._text(block.children))
+                heading = _line(self.text(block.children))
                 self.ended()
                 self._begin(block.anchor, heading, block.level)
             case ListBlock():
@@ -129,21 +130,23 @@ class _Reader:
                 self.blocks(block.blocks)
             case Callout():
                 label = self._labels.get(block.kind, block.kind)
-                self.add("text", f"{label}: {self._text(block.title)}" if block.title else label)
+                self.add("text", f"{label}: {self.text(block.title)}" if block.title else label)
                 self.blocks(block.blocks)
             case MathBlock():
                 self.add("formula", self._formula(block.tex.text))
             case Table():
                 for row in (block.header, *block.rows):
-                    self.add("text", " | ".join(self._text(cell.children) for cell in row))
+                    self.add("text", " | ".join(self.text(cell.children) for cell in row))
             case HtmlBlock():
                 self.add("text", unescape(_TAG.sub(" ", block.html)))
             case ThematicBreak():
                 pass
             case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
                 self._code(block)
-            case Bench() | Io() | Lab() | Quiz():
+            case Bench() | Io() | Lab():
                 self._card(block)
+            case FeatureBlock():
+                kind_of_block(block).index(self, block)
             case _:
                 assert_never(block)
 
@@ -162,14 +165,14 @@ class _Reader:
             case _:
                 assert_never(block)
 
-    def _card(self, block: Bench | Io | Lab | Quiz) -> None:
+    def _card(self, block: Bench | Io | Lab) -> None:
         match block:
             case Bench():
                 self._also[block.model] = None
                 self.add("text", self._measured.get(block.span.start, ""))
             case Io():
                 for part in (block.input, block.process, block.output):
-                    self.add("text", self._text(part))
+                    self.add("text", self.text(part))
             case Lab():
                 self.add("text", block.title)
                 self.blocks(block.note)
@@ -180,17 +183,6 @@ class _Reader:
                     self._also[block.model] = None
                 if block.xml is not None:
                     self.add("code", block.xml.text)
-            case Quiz():
-                self.add("text", block.title)
-                for question in block.questions:
-                    self.blocks(question.text)
-                    if isinstance(question, ChoiceQuestion):
-                        for option in question.options:
-                            self.add("text", self._text(option.text))
-                    elif isinstance(question, OrderQuestion):
-                        # In the order of their texts: how they are written is the answer.
-                        for text in sorted(map(self._text, question.items)):
-                            self.add("text", text)
             case _:
                 assert_never(block)
 
@@ -200,7 +192,8 @@ class _Reader:
             self._also[name] = None
         return text
 
-    def _text(self, inlines: Iterable[Inline]) -> str:
+    def text(self, inlines: Iterable[Inline]) -> str:
+        """The text of inlines, as the search has it."""
         parts: list[str] = []
         self._gather(inlines, parts)
         return "".join(parts)

@@ -17,21 +17,16 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.model import (
+from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
-    Comparison,
-    Heading,
-    Mode,
     NumericQuestion,
     OpenQuestion,
     OrderQuestion,
     OutputQuestion,
     Quiz,
-    Recording,
-    document_blocks,
-    plain_text,
 )
+from coursebuild.model import Comparison, Heading, Mode, Recording, document_blocks, plain_text
 from coursebuild.results import Outcome
 
 if TYPE_CHECKING:
@@ -97,7 +92,7 @@ def quiz(page: PageContext, block: Quiz) -> Markup:
     headings = [b for b in document_blocks(page.document) if isinstance(b, Heading)]
     said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
     return page.template(
-        "blocks/quiz.html",
+        "quiz/quiz.html",
         quiz=block,
         questions=questions,
         titled=bool(block.title) and not said,

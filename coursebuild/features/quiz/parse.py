@@ -1,6 +1,6 @@
 """`quiz` fences.
 
-Entry point: `parse_quiz`.
+Entry points: `parse_fence`; `parse_quiz`, from the text inside one.
 
 1. The JSON is read into nodes, and these into the declared fields.
 2. Each question whose own fields are right is checked for what no type can say: an answer that is
@@ -18,7 +18,8 @@ from typing import assert_never
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
-from coursebuild.model import (
+from coursebuild.features.quiz.keys import Keys
+from coursebuild.features.quiz.model import (
     AnyQuestion,
     Choice,
     ChoiceQuestion,
@@ -28,13 +29,7 @@ from coursebuild.model import (
     OutputQuestion,
     Quiz,
 )
-from coursebuild.source import Excerpt, Span
-from coursebuild.syntax.decode import Decoding, decode
-from coursebuild.syntax.json_text import parse_json
-from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
-from coursebuild.syntax.prose import Prose
-from coursebuild.syntax.question_keys import Keys
-from coursebuild.syntax.quiz_schema import (
+from coursebuild.features.quiz.schema import (
     AnyFields,
     MultipleChoice,
     Numeric,
@@ -44,12 +39,27 @@ from coursebuild.syntax.quiz_schema import (
     Predict,
     QuizFile,
 )
+from coursebuild.source import Excerpt, Span
+from coursebuild.syntax.decode import Decoding, decode
+from coursebuild.syntax.fence import Fence
+from coursebuild.syntax.info import parse_info, read_keys
+from coursebuild.syntax.json_text import parse_json
+from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.syntax.prose import Prose
 from coursebuild.syntax.relations import repeated
 from coursebuild.syntax.texts import TextParser
 from coursebuild.syntax.wording import JSON
 
 TOLERANCE = 0.02
 """Of the answer's size, where a numeric question gives no tolerance."""
+
+
+def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Quiz | None]:
+    """A `quiz` fence, which has no keys."""
+    info = parse_info(fence.info)
+    keys = read_keys("quiz", info.value.words)
+    quiz = parse_quiz(fence.span, fence.body, texts)
+    return Parsed(quiz.value, (*info.diagnostics, *keys.diagnostics, *quiz.diagnostics))
 
 
 def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:

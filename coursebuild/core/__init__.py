@@ -1,0 +1,1 @@
+"""What every course needs; it knows no single feature."""

@@ -1,0 +1,152 @@
+"""The interface of features: how a kind of fence, and all that belongs to it, enters the tool.
+
+Entry points: `Feature` and `FenceKind`, which say what a feature has; `features()`, those that
+there are; `fence_kind` and `kind_of_block`, which find one.
+
+A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
+points `coursebuild.features` of any installed package, or in a file that the course map names
+(`features = ["content/features/NAME.py"]`; see `use_course_features`). All three are alike.
+docs/features.md says how to write one.
+
+What the core asks of a block after it was parsed are the methods of `FeatureBlock`
+(`coursebuild.model`), so that a checked course can be looked at without its features being loaded.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.diagnostics import Diagnostic, Parsed
+from coursebuild.model import Course, Document, FeatureBlock
+from coursebuild.results import ScriptRun
+
+if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
+    from coursebuild.render.context import PageContext
+    from coursebuild.render.exports.plain import Plain
+    from coursebuild.render.search.sections import SectionReader
+    from coursebuild.syntax.fence import Fence
+    from coursebuild.syntax.texts import TextParser
+
+B = TypeVar("B", bound=FeatureBlock)
+
+GROUP = "coursebuild.features"
+"""The group of entry points under which packages offer features."""
+
+
+class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
+    """A kind of fence, from its text to a page."""
+
+    name: str
+    """The first word of its info string."""
+    block: type[B]
+    """What `parse` makes."""
+    parse: Callable[[Fence, TextParser], Parsed[B | None]]
+    """The block, and what is wrong in it. Without a block the text is shown as code."""
+    nested: bool = False
+    """Whether it may stand in a text of another block, where no lines can be updated."""
+    draw: Callable[[PageContext, B], Markup]
+    """The block in a page."""
+    markdown: Callable[[Plain, B], str]
+    """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
+    index: Callable[[SectionReader, B], None] = lambda reader, block: None
+    """Gives the search what can be found of the block."""
+
+
+class Feature(Struct, frozen=True, kw_only=True):
+    """What a lesson can hold, with all that belongs to it. Everything but the name is optional."""
+
+    name: str
+    fences: tuple[FenceKind[Any], ...] = ()
+    check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
+    """What is wrong in some documents of the course, beside what parsing found."""
+    check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
+    """What is wrong once the scripts have run."""
+    schemas: Mapping[str, tuple[type[Struct], str]] = {}
+    """JSON Schemas for editors, by the name that `coursebuild schema` takes: type and title."""
+    style: str = ""
+    """CSS that every page of the site gets."""
+    script: str = ""
+    """JavaScript of the pages that show a block of the feature. It runs when the page is parsed."""
+    mark: str = ""
+    """A piece of HTML by which such a page is known, as `data-tabs`; needed with a `script`."""
+
+
+_INSTALLED_BY = {
+    "mermaid": "coursebuild-mermaid",
+    "quiz": "coursebuild with its quizzes",
+    "tabs": "coursebuild-tabs",
+}
+"""What has to be installed for fences that a course written for coursebuild may have."""
+
+_of_course: tuple[Feature, ...] = ()
+
+
+def features() -> tuple[Feature, ...]:
+    """All features that a course can use, in the order of their names."""
+    return _sorted((*_installed(), *_of_course))
+
+
+def use_course_features(found: Iterable[Feature]) -> None:
+    """Set the features that the course at hand brings itself, in place of those of another."""
+    global _of_course
+    _of_course = _sorted(found)
+    _by_fence.cache_clear()
+    _by_block.cache_clear()
+
+
+def fence_kind(name: str) -> FenceKind[Any] | None:
+    """The kind of fence whose info string begins with a word."""
+    return _by_fence().get(name)
+
+
+def fence_names() -> tuple[str, ...]:
+    """The first words of the info strings that features read."""
+    return tuple(_by_fence())
+
+
+def kind_of_block(block: FeatureBlock) -> FenceKind[Any]:
+    """The kind of fence that a block came from."""
+    return _by_block()[type(block)]
+
+
+def missing_package(name: str) -> str:
+    """What would have to be installed for a fence that no feature reads; empty for other code."""
+    return "" if name in _by_fence() else _INSTALLED_BY.get(name, "")
+
+
+def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:
+    """What features find wrong once the scripts have run."""
+    runs = tuple(runs)
+    checks = (feature.check_runs for feature in features() if feature.check_runs is not None)
+    return tuple(found for check in checks for found in check(course, runs))
+
+
+@functools.cache
+def _installed() -> tuple[Feature, ...]:
+    package = importlib.import_module("coursebuild.features")
+    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
+    found = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
+    found += [point.load() for point in entry_points(group=GROUP)]
+    return _sorted(found)
+
+
+def _sorted(found: Iterable[Feature]) -> tuple[Feature, ...]:
+    return tuple(sorted(found, key=lambda feature: feature.name))
+
+
+@functools.cache
+def _by_fence() -> dict[str, FenceKind[Any]]:
+    return {kind.name: kind for feature in features() for kind in feature.fences}
+
+
+@functools.cache
+def _by_block() -> dict[type[FeatureBlock], FenceKind[Any]]:
+    return {kind.block: kind for feature in features() for kind in feature.fences}

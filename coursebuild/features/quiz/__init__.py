@@ -1,0 +1,31 @@
+"""Quizzes: questions that a learner answers in the page, and whose answers the build checks.
+
+A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `checks` compares it
+with the course and with what scripts printed, `page`, `markdown` and `search` show it.
+"""
+
+from coursebuild.core.features import Feature, FenceKind
+from coursebuild.features.quiz.checks import check_output_lines, check_quizzes
+from coursebuild.features.quiz.markdown import quiz_markdown
+from coursebuild.features.quiz.model import Quiz
+from coursebuild.features.quiz.page import quiz
+from coursebuild.features.quiz.parse import parse_fence
+from coursebuild.features.quiz.schema import QuizFile
+from coursebuild.features.quiz.search import index_quiz
+
+FEATURE = Feature(
+    name="quiz",
+    fences=(
+        FenceKind(
+            name="quiz",
+            block=Quiz,
+            parse=parse_fence,
+            draw=quiz,
+            markdown=quiz_markdown,
+            index=index_quiz,
+        ),
+    ),
+    check=check_quizzes,
+    check_runs=check_output_lines,
+    schemas={"quiz": (QuizFile, "A quiz fence")},
+)

@@ -1,0 +1,110 @@
+"""Quizzes as plain Markdown: a list of the questions, with their answers.
+
+Entry point: `quiz_markdown`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, assert_never
+
+from coursebuild.features.quiz.model import (
+    AnyQuestion,
+    ChoiceQuestion,
+    NumericQuestion,
+    OpenQuestion,
+    OrderQuestion,
+    OutputQuestion,
+    Quiz,
+)
+from coursebuild.features.quiz.page import letter, output_line
+from coursebuild.model import Heading, plain_text
+from coursebuild.render.exports.marks import escaped, fence, hang
+
+if TYPE_CHECKING:
+    from coursebuild.render.exports.plain import Plain
+
+
+def quiz_markdown(writer: Plain, block: Quiz) -> str:
+    """A quiz as a list of its questions, each with its answer."""
+    questions = (
+        hang(f"{at}. ", _question(writer, question))
+        for at, question in enumerate(block.questions, 1)
+    )
+    headings = (b for b in writer.page.document.blocks if isinstance(b, Heading))
+    said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
+    title = "" if said else f"**{escaped(block.title)}**"
+    return "\n\n".join(filter(None, (title, *questions)))
+
+
+def _question(writer: Plain, question: AnyQuestion) -> str:
+    parts = [f"*{escaped(question.label)}*"] if question.label else []
+    parts.append(writer.blocks(question.text))
+    parts += _asked(writer, question)
+    for at, hint in enumerate(question.hints, 1):
+        parts.append(writer.folded(writer.words("quiz.hint", n=at), writer.blocks(hint)))
+    answer = "\n\n".join(filter(None, _answer(writer, question)))
+    parts.append(writer.folded(writer.words("quiz.answer"), answer))
+    return "\n\n".join(filter(None, parts))
+
+
+def _asked(writer: Plain, question: AnyQuestion) -> list[str]:
+    """What is said of how to answer, and what there is to choose from."""
+    match question:
+        case ChoiceQuestion():
+            how = "quiz.commit" if question.predict else ""
+            how = "quiz.choose_all" if question.several else how
+            options = (
+                f"- {letter(at)}: {writer.inlines(option.text)}"
+                for at, option in enumerate(question.options)
+            )
+            return [f"*{writer.words(how)}*" if how else "", "\n".join(options)]
+        case NumericQuestion():
+            unit = f"{writer.words('quiz.unit')} {escaped(question.unit)}"
+            return [f"*{unit}*"] if question.unit else []
+        case OpenQuestion():
+            return []
+        case OutputQuestion():
+            asked = writer.words("quiz.output_of", path=question.script, line=question.line)
+            return [f"*{asked}*"]
+        case OrderQuestion():
+            right = [writer.inlines(item) for item in question.items]
+            items = sorted(right)
+            items = [*items[1:], items[0]] if items == right else items
+            return [
+                f"*{writer.words('quiz.order')}*",
+                "\n".join(f"- {item}" for item in items),
+            ]
+        case _:
+            assert_never(question)
+
+
+def _answer(writer: Plain, question: AnyQuestion) -> list[str]:
+    explain = writer.blocks(question.explain)
+    match question:
+        case ChoiceQuestion():
+            right = ", ".join(letter(at) for at in question.answers)
+            said = [
+                f"- {writer.words('quiz.feedback', option=letter(at))}: "
+                + hang("", writer.blocks(option.feedback), 2)
+                for at, option in enumerate(question.options)
+                if option.feedback
+            ]
+            sim = writer.own(question.sim) if question.sim is not None else ""
+            return [f"{right}.", explain, "\n".join(said), sim]
+        case NumericQuestion():
+            unit = f" {escaped(question.unit)}" if question.unit else ""
+            near = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
+            return [f"{escaped(question.answer_text)}{unit} ({near}).", explain]
+        case OpenQuestion():
+            return [writer.blocks(question.reference), explain]
+        case OutputQuestion():
+            line = output_line(writer.page, question.script, question.line)
+            shown = writer.words("quiz.none") if line is None else fence("text", line)
+            return [shown, explain]
+        case OrderQuestion():
+            right = "\n".join(
+                f"{at}. {writer.inlines(item)}" for at, item in enumerate(question.items, 1)
+            )
+            return [right, explain]
+        case _:
+            assert_never(question)

@@ -1,0 +1,155 @@
+"""A quiz as a value.
+
+Entry points: `Quiz`, the union `AnyQuestion`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.model import Block, FeatureBlock, Inline, Lab
+from coursebuild.source import Span
+
+
+class Choice(Struct, frozen=True):
+    """An option of a question, with what to say to a learner who takes it."""
+
+    span: Span
+    key: str
+    """Among the options of its question; it depends on the text alone."""
+    text: tuple[Inline, ...]
+    feedback: tuple[Block, ...]
+
+
+class Question(Struct, frozen=True):
+    """What every question has, whatever its kind."""
+
+    span: Span
+    key: str
+    """Among the questions of its quiz: a learner's answer hangs on it."""
+    label: str
+    text: tuple[Block, ...]
+    explain: tuple[Block, ...]
+    hints: tuple[tuple[Block, ...], ...]
+
+
+class ChoiceQuestion(Question, frozen=True):
+    """`mcq` and `predict`.
+
+    `answers` are indices of the right options; `several` when all right ones must be chosen.
+    """
+
+    options: tuple[Choice, ...]
+    answers: tuple[int, ...]
+    several: bool
+    sim: Lab | None
+    """For `predict`: opened once the learner has committed to an answer."""
+    predict: bool
+
+
+class NumericQuestion(Question, frozen=True):
+    """A number: right within `tolerance` (absolute) of `answer`, in `unit`."""
+
+    answer: float
+    answer_text: str
+    """As the author wrote it."""
+    tolerance: float
+    unit: str
+
+
+class OpenQuestion(Question, frozen=True):
+    """Free text, compared by the learner with `reference`."""
+
+    reference: tuple[Block, ...]
+
+
+class OutputQuestion(Question, frozen=True):
+    """What does the script print there? The key is the verified output's line `line` (from 1)."""
+
+    script: str
+    script_span: Span
+    line: int
+    line_span: Span
+
+
+class OrderQuestion(Question, frozen=True):
+    """Put the items in order; they are written in the right order."""
+
+    items: tuple[tuple[Inline, ...], ...]
+    item_keys: tuple[str, ...]
+    """Of each item; it depends on the item's text alone."""
+
+
+AnyQuestion: TypeAlias = (
+    ChoiceQuestion | NumericQuestion | OpenQuestion | OutputQuestion | OrderQuestion
+)
+
+
+class Quiz(FeatureBlock, frozen=True):
+    """A quiz; `id` is unique in the course and stable."""
+
+    id: str
+    id_span: Span
+    title: str
+    questions: tuple[AnyQuestion, ...]
+    keys: tuple[str, ...]
+    """Of all questions, also where `questions` holds only some of them."""
+
+    def anchor(self, key: str) -> str:
+        """The anchor of the question with a key; its dot parts it from the quiz's own."""
+        return f"{self.id}.{key}"
+
+    def child_blocks(self) -> tuple[Block, ...]:
+        """The texts of its questions."""
+        return tuple(block for question in self.questions for block in _blocks(question))
+
+    def child_inlines(self) -> tuple[Inline, ...]:
+        """Options, and items to be put in order."""
+        return tuple(inline for question in self.questions for inline in _inlines(question))
+
+    def summary(self) -> Quiz:
+        """The quiz with the questions whose answer a script gives, without their texts."""
+        bare = (
+            replace(question, text=(), explain=(), hints=())
+            for question in self.questions
+            if isinstance(question, OutputQuestion)
+        )
+        return replace(self, questions=tuple(bare))
+
+    def anchors(self) -> tuple[str, ...]:
+        """Those of the quiz and of its questions."""
+        return (self.id, *map(self.anchor, self.keys))
+
+    def quoted_lines(self) -> tuple[tuple[str, int], ...]:
+        """Those that questions ask for."""
+        return tuple((question.script, question.line) for question in self.output_questions())
+
+    def progress_keys(self) -> tuple[str, tuple[str, ...]]:
+        """What a reader's answers are kept under."""
+        return self.id, self.keys
+
+    def output_questions(self) -> Iterator[OutputQuestion]:
+        """The questions whose answer a script gives."""
+        return (question for question in self.questions if isinstance(question, OutputQuestion))
+
+
+def _blocks(question: AnyQuestion) -> tuple[Block, ...]:
+    blocks = [*question.text, *question.explain, *(b for hint in question.hints for b in hint)]
+    if isinstance(question, ChoiceQuestion):
+        blocks += [block for option in question.options for block in option.feedback]
+        blocks += [question.sim] if question.sim is not None else []
+    if isinstance(question, OpenQuestion):
+        blocks += question.reference
+    return tuple(blocks)
+
+
+def _inlines(question: AnyQuestion) -> tuple[Inline, ...]:
+    if isinstance(question, ChoiceQuestion):
+        return tuple(inline for option in question.options for inline in option.text)
+    if isinstance(question, OrderQuestion):
+        return tuple(inline for item in question.items for inline in item)
+    return ()
