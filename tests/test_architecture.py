@@ -72,10 +72,15 @@ def read(path: Path) -> Module:
     tree = ast.parse(text)
     imports: set[str] = set()
     calls: set[str] = set()
+    interface = (
+        path == PACKAGE / "core" / "features.py"
+    )  # which names the types that features are given
+    conditions = [node for node in tree.body if interface and isinstance(node, ast.If)]
+    for_types = [node for condition in conditions for node in condition.body]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imports |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
+        elif isinstance(node, ast.ImportFrom) and node not in for_types:
             imports.add("." * node.level + (node.module or ""))
             if node.module == "coursebuild":
                 imports |= {f"coursebuild.{alias.name}" for alias in node.names}
