@@ -92,7 +92,7 @@ class DietModel:
         import mujoco
 
         from coursebuild.numerics.pruning.ablation import Order, survey
-        from coursebuild.numerics.pruning.cases import cases
+        from coursebuild.numerics.pruning.compare import cases
         from coursebuild.numerics.pruning.markup import MarkupError
         from coursebuild.numerics.pruning.model_text import ModelTextError, open_model
         from coursebuild.numerics.scene import SceneError

@@ -91,7 +91,7 @@ def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
 
 def test_without_joint_damping_eulerdamp_makes_no_difference() -> None:
     free = replace(problem_named("damped-spring-0"), search=(0.1, 0.3), steps=100)
-    assert Integrator.EULER_EXPLICIT not in {one.integrator for one in boundaries(free)}
+    assert Integrator.EULER_EXPLICIT.value not in {one.integrator for one in boundaries(free)}
     damped = replace(problem_named("damped-spring-1"), search=(0.05, 0.1), steps=100)
     assert Integrator.EULER_EXPLICIT.value in {one.integrator for one in boundaries(damped)}
 

@@ -9,7 +9,7 @@ import mujoco
 
 from coursebuild.model.scenarios import Declarations
 from coursebuild.numerics.pruning.ablation import Order, Survey, survey
-from coursebuild.numerics.pruning.cases import cases
+from coursebuild.numerics.pruning.compare import cases
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import Reader, Readers
 from coursebuild.numerics.reports.diet import Finding

@@ -18,17 +18,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
-from coursebuild.numerics.pruning.cases import Case
-from coursebuild.numerics.pruning.collisions import collisions
-from coursebuild.numerics.pruning.compare import Comparison, Seen, watch
-from coursebuild.numerics.pruning.edits import Edit, joined
+from coursebuild.numerics.pruning.compare import Case, Comparison, Seen, watch
+from coursebuild.numerics.pruning.dynamics import collisions, idle, settings
+from coursebuild.numerics.pruning.edits import Edit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.meshes import meshes
 from coursebuild.numerics.pruning.model_text import ModelText
-from coursebuild.numerics.pruning.motion import idle
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.pruning.scenery import scenery
-from coursebuild.numerics.pruning.settings import settings
 from coursebuild.numerics.pruning.trials import NotTriedError, Ratio, Trial, Trials
 from coursebuild.numerics.pruning.unused import unused
 from coursebuild.numerics.reports.diet import (
@@ -294,7 +291,7 @@ class _Surveyor:
     def _texts(self, edits: Sequence[Edit]) -> tuple[TextEdit, ...]:
         by_path = {document.path: document for document in self.scene.documents}
         found = []
-        for edit in joined(edits):
+        for edit in merge_edits(edits):
             document = by_path[edit.path]
             old = document.data[edit.start : edit.end].decode("utf-8", "replace")
             line, column = document.position(edit.start)
@@ -322,7 +319,7 @@ class _Surveyor:
         """What everything found saves; `fixed` is what all that is to be fixed does."""
         if not self.faults:
             return None, None
-        if fixed is not None and {id(i) for i in self.faults} == {id(i) for i in self.fixed_items}:
+        if fixed is not None and set(self.faults) == set(self.fixed_items):
             return fixed, 0.0
         try:
             trial = self.trials.run(self.faults)

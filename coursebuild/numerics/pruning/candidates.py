@@ -1,6 +1,6 @@
 """What could be left out of a model, before anything is tried.
 
-Entry points: `Candidate`, `Item`, `Look`, `change`.
+Entry points: `Candidate`, `Item`, `Look`.
 
 A candidate is a kind of thing that may be in vain, with every place where the model has it. Why it
 must be in vain whatever happens is its `proof`; without one only runs speak for it.
@@ -8,14 +8,12 @@ must be in vain whatever happens is its `proof`; without one only runs speak for
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 from msgspec import Struct
 
 from coursebuild.numerics.pruning.compare import Seen
-from coursebuild.numerics.pruning.edits import Edit, drop_numbers, remove, set_options
-from coursebuild.numerics.pruning.mapping import Gone, mapping_without
+from coursebuild.numerics.pruning.edits import Edit
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.readers import Readers
@@ -82,58 +80,3 @@ class Look(Struct, frozen=True, eq=False):
 def named_item(element: Element, *more: Element) -> Item:
     """An element to take out, with others that go with it."""
     return Item(element.get("name") or place_of(element), element, (element, *more))
-
-
-def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[Edit, ...], Gone]:
-    """All the edits that items make together, and what they take out of the compiled model."""
-    some = list(items)
-    gone = list({id(one): one for item in some for one in item.gone}.values())
-    below = [one for element in gone for one in element.walk()]
-    lost = Gone(
-        scene.ids_of(below, "body"),
-        scene.ids_of(below, "geom"),
-        scene.ids_of(below, "sensor"),
-        scene.ids_of(below, "actuator"),
-    )
-    edits = [*remove(gone), *_keyframes(scene, lost, {id(one) for one in below})]
-    edits += [edit for item in some for edit in item.edits]
-    options = dict(pair for item in some for pair in item.options)
-    flags = dict(pair for item in some for pair in item.flags)
-    if options or flags:
-        edits += set_options(scene.main, tuple(options.items()), tuple(flags.items()))
-    return _outermost(edits), lost
-
-
-def _outermost(edits: Iterable[Edit]) -> tuple[Edit, ...]:
-    """Without those inside of what another one takes out."""
-    some = sorted(set(edits), key=lambda one: (one.path, one.start, -one.end))
-    found: list[Edit] = []
-    for edit in some:
-        last = found[-1] if found else None
-        inside = last is not None and last.path == edit.path and not last.new
-        if last is None or not (inside and last.start <= edit.start and edit.end <= last.end):
-            found.append(edit)
-    return tuple(found)
-
-
-def _keyframes(scene: ModelText, gone: Gone, removed: set[int]) -> Sequence[Edit]:
-    """Keyframes list a number for every coordinate: those of what is gone go too."""
-    if not (gone.bodies or gone.actuators):
-        return ()
-    model = scene.model
-    left = mapping_without(model, gone)
-
-    def lost(size: int, kept: Any) -> frozenset[int]:
-        return frozenset(range(size)) - frozenset(kept.tolist())
-
-    mocap = lost(model.nmocap, left.mocap)
-    places = {
-        "qpos": lost(model.nq, left.qpos),
-        "qvel": lost(model.nv, left.dof),
-        "act": lost(model.na, left.act),
-        "ctrl": lost(model.nu, left.ctrl),
-        "mpos": frozenset(3 * i + k for i in mocap for k in range(3)),
-        "mquat": frozenset(4 * i + k for i in mocap for k in range(4)),
-    }
-    keys = [one for one in scene.elements if one.tag == "key" and id(one) not in removed]
-    return [e for key in keys for name, at in places.items() for e in drop_numbers(key, name, at)]

@@ -1,6 +1,7 @@
 """Two models in the same scenario: whether they do the same, bit for bit or nearly.
 
-Entry points: `compare(base, changed, mapping, cases)`, `watch`.
+Entry points: `compare(base, changed, mapping, cases)`, `watch`; `cases(model, declared, quick=…)`,
+the scenarios that a smaller model is judged by, at the model's own timestep.
 
 1. Both begin in the same state and are stepped side by side. Positions, velocities, activations and
    the sensors that are left must be the same bits after every step; contacts, with their forces,
@@ -20,18 +21,64 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
+from coursebuild.model.scenarios import Declarations
 from coursebuild.numerics.detector import Judgement, Peaks, judge, peaks
 from coursebuild.numerics.engine import advance, initial_data
-from coursebuild.numerics.pruning.cases import Case
+from coursebuild.numerics.problem import Scenario, Setup, whole_number
 from coursebuild.numerics.pruning.mapping import Mapping, transfer
-from coursebuild.numerics.scene import thickness
+from coursebuild.numerics.scene import scenes, thickness
 
+QUICK = 0.5
+"""Seconds at most of a scenario where it should be quick."""
 TOLERANCE = 1e-8
 """What counts as equal: relative to a number's size, absolute where that is under 1."""
 SHOTS, SHOT = 0.1, 0.05
 """Seconds from one start to the next, and that each lasts."""
 _CONTACTS = 10
 """Steps from one look at the contacts to the next."""
+
+
+class Case(Struct, frozen=True):
+    """A scenario of a model."""
+
+    name: str
+    scenario: Scenario
+    steps: int
+    hold: int = 0
+    """Steps for which a command holds; 0 where there is one command at most."""
+    declared: bool = False
+
+    @property
+    def setup(self) -> Setup:
+        """What a run must know of it."""
+        return Setup(scenario=self.scenario)
+
+    def command(self, step: int) -> tuple[float, ...]:
+        """The command that begins with this step, from 0; empty where the last one holds."""
+        number, rest = divmod(step, self.hold or self.steps + 1)
+        rows = self.scenario.controls
+        return () if rest or number >= len(rows) else rows[number]
+
+
+def cases(model: Any, declared: Declarations | None, *, quick: bool) -> tuple[Case, ...]:
+    """What happens to a model, declared or by default.
+
+    Raises:
+        SceneError: a scenario does not fit the model.
+    """
+    found = []
+    for one in scenes(model, declared, quick=quick):
+        what, step = one.scenario, one.own
+        steps = whole_number(what.duration, step, "the duration", "the timestep")
+        if quick:
+            steps = min(steps, max(1, round(QUICK / step)))
+        hold = whole_number(what.hold, step, "the hold", "the timestep") if what.hold else 0
+        found.append(Case(one.name, what, steps, hold, one.declared is not None))
+    if found:
+        return tuple(found)
+    # In a model in which nothing moves there is nothing to measure, but things to be without.
+    step = float(model.opt.timestep)
+    return (Case("start", Scenario(10 * step, step), 10),)
 
 
 class Comparison(Struct, frozen=True):

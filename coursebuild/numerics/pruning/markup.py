@@ -18,15 +18,16 @@ from msgspec import Struct, field
 
 _ATTRIBUTE = re.compile(rb"([^\s=/>\"']+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 _NAME = re.compile(rb"<[^\s/>]+")
-_NEWLINE = re.compile(rb"\r\n|\r|\n")
+_NEWLINE = re.compile(r"\r\n|\r|\n")
 
 
 class MarkupError(Exception):
     """A text is no XML."""
 
-    def __init__(self, path: str, line: int, column: int, message: str) -> None:
-        super().__init__(f"{path}:{line}:{column}: {message}")
-        self.path, self.line, self.column, self.message = path, line, column, message
+    def __init__(self, document: Document, offset: int, message: str) -> None:
+        self.path, self.message = document.path, message
+        self.line, self.column = document.position(offset)
+        super().__init__(f"{self.path}:{self.line}:{self.column}: {message}")
 
 
 class Attribute(Struct, frozen=True):
@@ -38,14 +39,8 @@ class Attribute(Struct, frozen=True):
     start: int
     end: int
     """Past the closing quote."""
-
-    @property
-    def inner(self) -> tuple[int, int]:
-        """Where the value stands, without its quotes."""
-        return self._value, self.end - 1
-
-    _value: int
-    """Of the first byte of the value."""
+    inner: tuple[int, int]
+    """Where the value stands, without its quotes."""
 
 
 class Element(Struct, eq=False):
@@ -77,19 +72,11 @@ class Element(Struct, eq=False):
         """The attribute of this name."""
         return next((one for one in self.attributes if one.name == name), None)
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether it is one tag, `<a/>`."""
-        return self.tail == self.head == self.end
-
     def walk(self) -> Iterator[Element]:
         """It and all below it, in the order of the text; an `include` is what it includes."""
-        if self.included is not None:
-            for child in self.included.root.children:
-                yield from child.walk()
-            return
-        yield self
-        for child in self.children:
+        if self.included is None:
+            yield self
+        for child in self.spliced() if self.included is None else self.included.root.spliced():
             yield from child.walk()
 
     def spliced(self) -> Iterator[Element]:
@@ -121,14 +108,9 @@ class Document:
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of a byte, both from 1; columns count characters."""
-        before = self.data[:offset]
-        last = 0
-        line = 1
-        for match in _NEWLINE.finditer(before):
-            if match.end() == offset and self.data[offset - 1 : offset + 1] == b"\r\n":
-                break
-            line, last = line + 1, match.end()
-        return line, len(before[last:].decode("utf-8", "replace").lstrip("\ufeff")) + 1
+        before = self.data[:offset].decode("utf-8", "replace").lstrip("\ufeff")
+        lines = _NEWLINE.split(before)
+        return len(lines), len(lines[-1]) + 1
 
 
 def parse_markup(path: str, data: bytes) -> Document:
@@ -138,68 +120,55 @@ def parse_markup(path: str, data: bytes) -> Document:
         MarkupError: it is no XML, or declares entities of its own.
     """
     document = Document(path, data)
-    _Reader(document).read()
+    opened: list[Element] = []
+    parser = expat.ParserCreate("utf-8")
+    parser.ordered_attributes = True
+
+    def start(tag: str, given: list[str]) -> None:
+        begin = parser.CurrentByteIndex
+        found, at = _attributes(data, begin, given)
+        parent = opened[-1] if opened else None
+        head = data.index(b">", at) + 1
+        element = Element(document, tag, parent, found, begin, head)
+        if parent is None:
+            document.root = element
+        else:
+            parent.children.append(element)
+        opened.append(element)
+
+    def end(_: str) -> None:
+        element = opened.pop()
+        if data[element.head - 2 : element.head] == b"/>":
+            element.tail = element.end = element.head
+        else:
+            element.tail = parser.CurrentByteIndex
+            element.end = data.index(b">", element.tail) + 1
+
+    def entity(name: str, *_: object) -> None:
+        message = f"it declares the entity `{name}`, which MuJoCo would not replace"
+        raise MarkupError(document, parser.CurrentByteIndex, message)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.EntityDeclHandler = entity
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        message = expat.errors.messages[error.code]
+        raise MarkupError(document, parser.ErrorByteIndex, message) from None
     return document
 
 
-class _Reader:
-    """Builds elements while the parser goes through the text."""
-
-    def __init__(self, document: Document) -> None:
-        self._document = document
-        self._open: list[Element] = []
-        self._parser = parser = expat.ParserCreate("utf-8")
-        parser.ordered_attributes = True
-        parser.StartElementHandler = self._start
-        parser.EndElementHandler = self._end
-        parser.EntityDeclHandler = self._entity
-
-    def read(self) -> None:
-        data = self._document.data
-        try:
-            self._parser.Parse(data, True)
-        except expat.ExpatError as error:
-            line, column = self._document.position(self._parser.ErrorByteIndex)
-            message = expat.errors.messages[error.code]
-            raise MarkupError(self._document.path, line, column, message) from None
-
-    def _start(self, tag: str, given: list[str]) -> None:
-        data, start = self._document.data, self._parser.CurrentByteIndex
-        name = _NAME.match(data, start)
-        assert name is not None
-        values = dict(zip(given[::2], given[1::2], strict=True))
-        found: list[Attribute] = []
-        at = name.end()
-        for _ in values:
-            match = _ATTRIBUTE.search(data, at)
-            assert match is not None
-            key = match[1].decode()
-            found.append(
-                Attribute(key, values[key], match.start(), match.end(), match.start(2) + 1)
-            )
-            at = match.end()
-        head = data.index(b">", at) + 1
-        parent = self._open[-1] if self._open else None
-        element = Element(self._document, tag, parent, tuple(found), start, head)
-        if parent is None:
-            self._document.root = element
-        else:
-            parent.children.append(element)
-        self._open.append(element)
-
-    def _end(self, tag: str) -> None:
-        element = self._open.pop()
-        data = self._document.data
-        if data[element.head - 2 : element.head] == b"/>":
-            element.tail = element.end = element.head
-            return
-        element.tail = self._parser.CurrentByteIndex
-        element.end = data.index(b">", element.tail) + 1
-
-    def _entity(self, name: str, *rest: object) -> None:
-        line, column = self._document.position(self._parser.CurrentByteIndex)
-        message = f"it declares the entity `{name}`, which MuJoCo would not replace"
-        raise MarkupError(self._document.path, line, column, message)
+def _attributes(data: bytes, start: int, given: list[str]) -> tuple[tuple[Attribute, ...], int]:
+    """The attributes of a start tag, and where the last of them ends."""
+    name = _NAME.match(data, start)
+    assert name is not None
+    at, found = name.end(), []
+    for key, value in zip(given[::2], given[1::2], strict=True):
+        match = _ATTRIBUTE.search(data, at)
+        assert match is not None
+        at = match.end()
+        found.append(Attribute(key, value, match.start(), at, (match.start(2) + 1, at - 1)))
+    return tuple(found), at
 
 
 def place_of(element: Element) -> str:
@@ -208,10 +177,11 @@ def place_of(element: Element) -> str:
     here: Element | None = element
     while here is not None:
         above = here.above
+        key = "class" if here.tag == "default" else "name"
         name = here.get("name") or (here.get("class") if here.tag == "default" else None)
         part = here.tag
         if name:
-            part += f'[@{"class" if here.tag == "default" else "name"}="{name}"]'
+            part += f'[@{key}="{name}"]'
         elif above is not None:
             alike = [one for one in above.spliced() if one.tag == here.tag]
             if len(alike) > 1:

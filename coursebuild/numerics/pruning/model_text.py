@@ -11,16 +11,16 @@ Entry point: `open_model`; then `ModelText.compiled(edits)`, `ModelText.elements
 
 from __future__ import annotations
 
+import posixpath
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import PurePosixPath
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.edits import Edit, applied, set_attributes
+from coursebuild.numerics.pruning.edits import Edit, apply_edits, set_attributes
 from coursebuild.numerics.pruning.markup import Document, Element, parse_markup
 
 _DEEPEST = 32
@@ -70,7 +70,7 @@ class ModelText:
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
         self.model: Any = self._checked() if check else self.compiled()
-        self._things: dict[int, Thing] = self._named()
+        self._things = self._named()
 
     def compiled(self, edits: Iterable[Edit] = ()) -> Any:
         """A `mjModel` of the files with these changes.
@@ -78,43 +78,21 @@ class ModelText:
         Raises:
             ValueError: MuJoCo does not take it, or the changes contradict each other.
         """
-        return self._compile(self.text(edits))
-
-    def text(self, edits: Iterable[Edit] = ()) -> bytes:
-        """All files put together, with these changes."""
-        by_path: dict[str, list[Edit]] = {}
-        for edit in edits:
-            by_path.setdefault(edit.path, []).append(edit)
-        return _whole(self.main, by_path)
+        return self._compile(_whole(self.main, _by_path(edits)))
 
     def files(self, edits: Iterable[Edit]) -> dict[str, bytes]:
         """The new bytes of each file that these edits change."""
-        by_path: dict[str, list[Edit]] = {}
-        for edit in edits:
-            by_path.setdefault(edit.path, []).append(edit)
-        by_name = {document.path: document for document in self.documents}
-        return {path: applied(by_name[path].data, some) for path, some in by_path.items()}
+        data = {document.path: document.data for document in self.documents}
+        return {path: apply_edits(data[path], some) for path, some in _by_path(edits).items()}
 
     def ids(self, element: Element) -> Thing | None:
         """What an element becomes; `None` where that is not known."""
-        return self._things.get(id(element))
+        return self._things.get(element)
 
     def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
         """The numbers of one kind that elements become."""
-        found: set[int] = set()
-        for element in elements:
-            thing = self.ids(element)
-            if thing is not None and thing.kind == kind:
-                found |= set(thing.ids)
-        return frozenset(found)
-
-    def element_of(self, kind: str, number: int) -> Element | None:
-        """The element that became this thing."""
-        for element in self.elements:
-            thing = self.ids(element)
-            if thing is not None and thing.kind == kind and number in thing.ids:
-                return element
-        return None
+        things = (self.ids(element) for element in elements)
+        return frozenset(i for one in things if one and one.kind == kind for i in one.ids)
 
     def _checked(self) -> Any:
         model = self._compile(self.main.data)
@@ -127,11 +105,10 @@ class ModelText:
                 raise ModelTextError("what it includes cannot be put into one text")
         return model
 
-    def _named(self) -> dict[int, Thing]:
-        """What each element becomes, by its identity; nothing where names cannot be given."""
-        wanted: dict[int, tuple[str, str, bool]] = {}
+    def _named(self) -> dict[Element, Thing]:
+        """What each element becomes; nothing where names cannot be given."""
+        wanted: dict[Element, tuple[str, str]] = {}
         edits: list[Edit] = []
-        inside = self.main.data
         for number, element in enumerate(self.elements):
             kind = thing_kind(element)
             if kind is None:
@@ -139,10 +116,10 @@ class ModelText:
             name = element.get("name")
             if not name:
                 name = f"{_TAG}{number}_"
-                while name.encode() in inside:
+                while name.encode() in self.main.data:
                     name += "_"
                 edits += set_attributes(element, (("name", name),))
-            wanted[id(element)] = (kind, name, is_repeated(element))
+            wanted[element] = kind, name
         try:
             model = self.compiled(edits) if edits else self.model
         except ValueError:
@@ -176,45 +153,36 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
     main = parse_markup(path, data)
     if main.root.tag != "mujoco":
         raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
-    documents = [main]
-    _follow(main, str(PurePosixPath(path).parent), read, documents, 0)
-    return ModelText(documents, compile, check=check)
+    return ModelText(
+        [main, *_included(main, posixpath.dirname(path), read, 0)], compile, check=check
+    )
 
 
-def _follow(
-    document: Document, folder: str, read: Read, documents: list[Document], depth: int
-) -> None:
+def _included(document: Document, folder: str, read: Read, depth: int) -> list[Document]:
+    """The files that a file includes, from its folder or the model's, and those that they do."""
+    found: list[Document] = []
     for element in list(document.root.walk()):
-        if element.tag != "include" or element.included is not None:
+        if element.tag != "include":
             continue
         file = element.get("file") or ""
-        here = str(PurePosixPath(document.path).parent)
-        for candidate in dict.fromkeys(
-            _normal(f"{base}/{file}") if not file.startswith("/") else file
-            for base in (folder, here)
-        ):
-            data = read(candidate)
-            if data is not None:
-                break
-        else:
+        here = posixpath.dirname(document.path)
+        paths = [posixpath.normpath(posixpath.join(base, file)) for base in (folder, here)]
+        path = next((one for one in paths if read(one) is not None), None)
+        if path is None:
             raise ModelTextError(f"it includes {file}, which is not in the course")
         if depth >= _DEEPEST:
             raise ModelTextError("its includes are nested too deeply")
-        inner = parse_markup(candidate, data)
-        inner.at = element
-        element.included = inner
-        documents.append(inner)
-        _follow(inner, folder, read, documents, depth + 1)
+        inner = parse_markup(path, read(path) or b"")
+        inner.at, element.included = element, inner
+        found += [inner, *_included(inner, folder, read, depth + 1)]
+    return found
 
 
-def _normal(path: str) -> str:
-    parts: list[str] = []
-    for part in path.split("/"):
-        if part == ".." and parts and parts[-1] != "..":
-            parts.pop()
-        elif part not in ("", "."):
-            parts.append(part)
-    return "/".join(parts)
+def _by_path(edits: Iterable[Edit]) -> dict[str, list[Edit]]:
+    found: dict[str, list[Edit]] = {}
+    for edit in edits:
+        found.setdefault(edit.path, []).append(edit)
+    return found
 
 
 def _whole(document: Document, edits: Mapping[str, Sequence[Edit]]) -> bytes:
@@ -229,10 +197,10 @@ def _whole(document: Document, edits: Mapping[str, Sequence[Edit]]) -> bytes:
         text = _whole(inner, edits)
         root = parse_markup(inner.path, text).root
         own.append(Edit(document.path, element.start, element.end, text[root.head : root.tail]))
-    return applied(document.data, own)
+    return apply_edits(document.data, own)
 
 
-def _includes(element: Element) -> Iterable[Element]:
+def _includes(element: Element) -> Iterator[Element]:
     if element.included is not None:
         yield element
         return
@@ -269,25 +237,25 @@ def is_repeated(element: Element) -> bool:
 
 
 def _assigned(
-    wanted: Mapping[int, tuple[str, str, bool]], names: Mapping[str, Sequence[str]]
-) -> dict[int, Thing]:
+    wanted: Mapping[Element, tuple[str, str]], names: Mapping[str, Sequence[str]]
+) -> dict[Element, Thing]:
     """Elements by the names of what they became; nothing for those whose names two may mean."""
-    found: dict[int, Thing] = {}
-    taken: dict[tuple[str, int], list[int]] = {}
+    found: dict[Element, Thing] = {}
+    taken: dict[tuple[str, int], list[Element]] = {}
     places = {kind: {name: i for i, name in enumerate(all)} for kind, all in names.items()}
-    for key, (kind, name, repeated) in wanted.items():
+    for element, (kind, name) in wanted.items():
         ids: tuple[int, ...]
-        if repeated:
+        if is_repeated(element):
             shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
             ids = tuple(i for i, one in enumerate(names[kind]) if shape.fullmatch(one))
         else:
             ids = (places[kind][name],) if name in places[kind] else ()
         if ids:
-            found[key] = Thing(kind, ids)
+            found[element] = Thing(kind, ids)
             for number in ids:
-                taken.setdefault((kind, number), []).append(key)
-    for keys in taken.values():
-        if len(keys) > 1:
-            for key in keys:
-                found.pop(key, None)
+                taken.setdefault((kind, number), []).append(element)
+    for elements in taken.values():
+        if len(elements) > 1:
+            for element in elements:
+                found.pop(element, None)
     return found

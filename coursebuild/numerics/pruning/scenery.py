@@ -115,13 +115,13 @@ def _geoms(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Iter
     moving = [g for g in range(model.ngeom) if trees.of_body[int(model.geom_bodyid[g])] in focus]
     ball = moving_ball(model, moving) if focus == trees.roots else None
     items: list[Item] = []
-    done: set[int] = set()
+    done: set[Element] = set()
     for element in look.scene.elements:
-        if id(element) in done or not _is_scenery(look, trees, element, region, ball):
+        if element in done or not _is_scenery(look, trees, element, region, ball):
             continue
         refers = trees.references.of([element])
         if not refers.others:
-            done |= {id(below) for below in element.walk()}
+            done |= set(element.walk())
             items.append(Item(_name(element), element, (element, *refers.loose)))
     if items and not look.readers.whole("shape"):
         what = "the geom {}" if len(items) == 1 else "the geoms {}"

@@ -176,7 +176,7 @@ class References:
     """Which elements refer to which names."""
 
     def __init__(self, look: Look) -> None:
-        self._unread = {id(one) for one in unread_sensors(look)}
+        self._unread = set(unread_sensors(look))
         self._by_name: dict[str, list[Element]] = {}
         for element in look.scene.elements:
             for one in element.attributes:
@@ -196,14 +196,14 @@ class References:
     def of(self, elements: Iterable[Element]) -> Referring:
         """What refers to elements by their names, from outside of them."""
         below = [one for element in elements for one in element.walk()]
-        inside = {id(one) for one in below}
+        inside = set(below)
         loose: list[Element] = []
         others: list[Element] = []
         for one in below:
             for element in self._naming(one):
-                if id(element) in inside:
+                if element in inside:
                     continue
                 above = element.above
                 is_pair = above is not None and above.tag == "contact"
-                (loose if is_pair or id(element) in self._unread else others).append(element)
+                (loose if is_pair or element in self._unread else others).append(element)
         return Referring(tuple(loose), tuple(others))

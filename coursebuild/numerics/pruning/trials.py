@@ -13,12 +13,12 @@ import mujoco
 from msgspec import Struct
 
 from coursebuild.numerics.engine import initial_data
-from coursebuild.numerics.pruning.candidates import Item, change
-from coursebuild.numerics.pruning.cases import Case
-from coursebuild.numerics.pruning.compare import Comparison, compare
-from coursebuild.numerics.pruning.edits import Edit
+from coursebuild.numerics.pruning.candidates import Item
+from coursebuild.numerics.pruning.compare import Case, Comparison, compare
+from coursebuild.numerics.pruning.edits import Edit, drop_numbers, remove, set_options
+from coursebuild.numerics.pruning.mapping import Gone, fits, mapping_without, transfer
 from coursebuild.numerics.pruning.mapping import Mapping as Left
-from coursebuild.numerics.pruning.mapping import fits, mapping_without, transfer
+from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import ModelText, saved
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.timing import (
@@ -138,3 +138,61 @@ class Trials:
         if ratio is None:
             return Saving(None, None, False, memory, text)
         return Saving(ratio.value, ratio.spread, ratio.certain, memory, text)
+
+
+# ----------------------------------------------------------------------------------------- changes
+
+
+def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[Edit, ...], Gone]:
+    """All the edits that items make together, and what they take out of the compiled model."""
+    some = list(items)
+    gone = list(dict.fromkeys(one for item in some for one in item.gone))
+    below = [one for element in gone for one in element.walk()]
+    lost = Gone(
+        scene.ids_of(below, "body"),
+        scene.ids_of(below, "geom"),
+        scene.ids_of(below, "sensor"),
+        scene.ids_of(below, "actuator"),
+    )
+    edits = [*remove(gone), *_keyframes(scene, lost, set(below))]
+    edits += [edit for item in some for edit in item.edits]
+    options = dict(pair for item in some for pair in item.options)
+    flags = dict(pair for item in some for pair in item.flags)
+    if options or flags:
+        edits += set_options(scene.main, tuple(options.items()), tuple(flags.items()))
+    return _outermost(edits), lost
+
+
+def _outermost(edits: Iterable[Edit]) -> tuple[Edit, ...]:
+    """Without those inside of what another one takes out."""
+    some = sorted(set(edits), key=lambda one: (one.path, one.start, -one.end))
+    found: list[Edit] = []
+    for edit in some:
+        last = found[-1] if found else None
+        inside = last is not None and last.path == edit.path and not last.new
+        if last is None or not (inside and last.start <= edit.start and edit.end <= last.end):
+            found.append(edit)
+    return tuple(found)
+
+
+def _keyframes(scene: ModelText, gone: Gone, removed: set[Element]) -> Sequence[Edit]:
+    """Keyframes list a number for every coordinate: those of what is gone go too."""
+    if not (gone.bodies or gone.actuators):
+        return ()
+    model = scene.model
+    left = mapping_without(model, gone)
+
+    def lost(size: int, kept: Any) -> frozenset[int]:
+        return frozenset(range(size)) - frozenset(kept.tolist())
+
+    mocap = lost(model.nmocap, left.mocap)
+    places = {
+        "qpos": lost(model.nq, left.qpos),
+        "qvel": lost(model.nv, left.dof),
+        "act": lost(model.na, left.act),
+        "ctrl": lost(model.nu, left.ctrl),
+        "mpos": frozenset(3 * i + k for i in mocap for k in range(3)),
+        "mquat": frozenset(4 * i + k for i in mocap for k in range(4)),
+    }
+    keys = [one for one in scene.elements if one.tag == "key" and one not in removed]
+    return [e for key in keys for name, at in places.items() for e in drop_numbers(key, name, at)]

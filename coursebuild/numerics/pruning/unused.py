@@ -113,9 +113,9 @@ def _classes(look: Look) -> list[Item]:
         if value is not None
     }
     found: list[Item] = []
-    taken: set[int] = set()
+    taken: set[Element] = set()
     for element in look.scene.elements:
-        if element.tag != "default" or id(element) in taken:
+        if element.tag != "default" or element in taken:
             continue
         name, above = element.get("class"), element.above
         if not name or above is None or above.tag != "default":
@@ -123,7 +123,7 @@ def _classes(look: Look) -> list[Item]:
         inside = [one for one in element.walk() if one.tag == "default"]
         names = [one.get("class") or "" for one in inside]
         if used.isdisjoint(names) and not any(look.readers.named(one) for one in names):
-            taken |= {id(one) for one in inside}
+            taken |= set(inside)
             found.append(Item(name, element, (element,)))
     return found
 
@@ -137,14 +137,13 @@ def _sites(look: Look, gone: Collection[Element]) -> list[Item]:
         for attribute in one.attributes:
             if attribute.name in _SITE:
                 using.setdefault(attribute.value, []).append(one)
-    out = {id(one) for one in gone}
     found = []
     for one in look.scene.elements:
         name = one.get("name") or ""
         if one.tag != "site" or thing_kind(one) != "site" or look.readers.named(name):
             continue
         users = using.get(name, []) if name else []
-        if all(id(user) in out for user in users):
+        if all(user in gone for user in users):
             found.append(named_item(one, *users))
     return found
 

@@ -12,8 +12,7 @@ import pytest
 from coursebuild.model.scenarios import Declarations
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.cases import Case, cases
-from coursebuild.numerics.pruning.compare import TOLERANCE, compare, watch
+from coursebuild.numerics.pruning.compare import TOLERANCE, Case, cases, compare, watch
 from coursebuild.numerics.pruning.mapping import Gone, Mapping, fits, mapping_without, transfer
 from coursebuild.source import Source
 from coursebuild.syntax.scenarios import parse_declarations

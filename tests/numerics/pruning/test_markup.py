@@ -6,10 +6,10 @@ import pytest
 
 from coursebuild.numerics.pruning.edits import (
     Edit,
-    applied,
+    apply_edits,
     drop_attribute,
     drop_numbers,
-    joined,
+    merge_edits,
     remove,
     set_attributes,
     set_options,
@@ -22,7 +22,7 @@ def document(text: str) -> Document:
 
 
 def after(text: str, *edits: Edit) -> str:
-    return applied(text.encode(), edits).decode()
+    return apply_edits(text.encode(), edits).decode()
 
 
 def without(text: str, *tags: str) -> str:
@@ -245,12 +245,12 @@ def test_removals_that_follow_each_other_are_one() -> None:
         Edit("a", 6, 6, b"x"),
         Edit("b", 6, 7, b""),
     ]
-    assert joined(edits) == (Edit("a", 0, 6, b""), Edit("a", 6, 6, b"x"), Edit("b", 6, 7, b""))
+    assert merge_edits(edits) == (Edit("a", 0, 6, b""), Edit("a", 6, 6, b"x"), Edit("b", 6, 7, b""))
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:
     edits = (Edit("a", 0, 4, b"x"), Edit("a", 2, 6, b"y"))
     with pytest.raises(ValueError, match="two changes overlap at byte 2 of a"):
-        applied(b"0123456789", edits)
+        apply_edits(b"0123456789", edits)
     inside = (Edit("a", 2, 6, b""), Edit("a", 3, 4, b"y"))
-    assert applied(b"0123456789", inside) == b"016789"
+    assert apply_edits(b"0123456789", inside) == b"016789"

@@ -1,0 +1,288 @@
+"""What takes part in the motion and need not, and other ways to the same motion.
+
+Entry points: `idle(look)`, actuators, tendons and fluid without effect; `collisions(look)`,
+contacts that are searched for in vain; `settings(look)`, of the engine.
+
+1. Where a bound says that no two geoms can touch, contact can be off. Where it says so of single
+   geoms these need not take part. Where there is no such bound and nothing touched in the runs,
+   that is said too, as the weaker thing that it is.
+2. With settings nothing is in vain: each is another way to the same motion, and only the time that
+   it saves speaks for it. The integrator and the timestep are not among them: what they change is
+   an error, and is judged against a reference, never against the model as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item
+from coursebuild.numerics.pruning.edits import set_attributes
+from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.model_text import thing_kind
+from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
+
+_NO_BIAS = int(mujoco.mjtBias.mjBIAS_NONE)
+_NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)
+_FIXED_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED)
+_AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_AFFINE)
+
+
+def idle(look: Look) -> Iterator[Candidate]:
+    """Actuators that nobody commands, tendons without a force, fluid that nothing feels."""
+    yield from _actuators(look)
+    yield from _tendons(look)
+    yield from _fluid(look)
+
+
+def _tendons(look: Look) -> Iterator[Candidate]:
+    """Tendons along which nothing acts, and whose length nobody asks for."""
+    if look.readers.whole("tendon"):
+        return
+    used = {
+        attribute.value
+        for one in look.scene.elements
+        for attribute in one.attributes
+        if attribute.name in _TENDON
+    }
+    items: list[Item] = []
+    for element in look.scene.elements:
+        thing, name = look.scene.ids(element), element.get("name") or ""
+        if thing is None or thing.kind != "tendon" or name in used or look.readers.named(name):
+            continue
+        if all(_slack(look.model, number) for number in thing.ids):
+            items.append(named_item(element))
+    if items:
+        what = "the tendon {}, and nobody reads its length"
+        if len(items) > 1:
+            what = "the tendons {}, and nobody reads their lengths"
+        proof = "it has no stiffness, damping, friction, inertia or limit, and nothing refers to it"
+        yield Candidate("tendon-idle", f"nothing acts along {what}", tuple(items), proof)
+
+
+_TENDON = frozenset(("tendon", "tendon1", "tendon2", "objname", "refname"))
+"""Attributes that may name a tendon."""
+
+
+def _slack(model: Any, number: int) -> bool:
+    """Whether a tendon exerts no force of its own."""
+    return not any(
+        np.any(values[number])
+        for values in (
+            model.tendon_stiffness,
+            model.tendon_stiffnesspoly,
+            model.tendon_damping,
+            model.tendon_dampingpoly,
+            model.tendon_frictionloss,
+            model.tendon_armature,
+            model.tendon_limited,
+        )
+    )
+
+
+def _actuators(look: Look) -> Iterator[Candidate]:
+    if look.readers.whole("actuator"):
+        return
+    driven = _driven(look)
+    elements = [one for one in look.scene.elements if thing_kind(one) == "actuator"]
+    free: list[Item] = []
+    held: list[Item] = []
+    for element in elements:
+        thing = look.scene.ids(element)
+        if thing is None or look.readers.named(element.get("name") or ""):
+            continue
+        if any(number in driven for number in thing.ids):
+            continue
+        item = named_item(element)
+        (free if all(_forceless(look.model, i) for i in thing.ids) else held).append(item)
+    blocked = ""
+    if "controls" in look.numbered:
+        blocked = "scenarios give commands by number: their rows would have to be shortened"
+    said = "nobody commands the actuator{}"
+    if free:
+        proof = "its force is a multiple of a command that is always 0"
+        message = said.replace("{}", " {}" if len(free) == 1 else "s {}")
+        yield Candidate("actuator-idle", message, tuple(free), proof, blocked=blocked)
+    if held:
+        message = said.replace("{}", " {}" if len(held) == 1 else "s {}")
+        message += ", and no force came of " + ("it" if len(held) == 1 else "them")
+        yield Candidate("actuator-idle", message, tuple(held), blocked=blocked)
+
+
+def _driven(look: Look) -> set[int]:
+    """Actuators that get a command other than 0 in a scenario or a keyframe."""
+    model = look.model
+    found: set[int] = set()
+    for key in range(model.nkey):
+        found |= set(np.nonzero(model.key_ctrl[key])[0].tolist())
+    for seen in look.seen:
+        for row in seen.case.scenario.controls:
+            found |= set(np.nonzero(np.array(row))[0].tolist())
+    return found
+
+
+def _forceless(model: Any, number: int) -> bool:
+    """Whether a command of 0 gives no force, in any state."""
+    return bool(
+        model.actuator_biastype[number] == _NO_BIAS
+        and model.actuator_dyntype[number] == _NO_DYNAMICS
+        and model.actuator_gaintype[number] in (_FIXED_GAIN, _AFFINE_GAIN)
+        and not _excludes_zero(model, number)
+    )
+
+
+def _excludes_zero(model: Any, number: int) -> bool:
+    """Whether a range would raise a command or a force of 0."""
+    ranges = []
+    if model.actuator_ctrllimited[number]:
+        ranges.append(model.actuator_ctrlrange[number])
+    if model.actuator_forcelimited[number]:
+        ranges.append(model.actuator_forcerange[number])
+    return any(low > 0 or high < 0 for low, high in ranges)
+
+
+def _fluid(look: Look) -> Iterator[Candidate]:
+    model = look.model
+    options = [one for one in look.scene.elements if one.tag == "option"]
+    having = {
+        name: one for name in ("density", "viscosity", "wind") for one in options if _has(one, name)
+    }
+    if not having:
+        return
+    dense = model.opt.density != 0 or model.opt.viscosity != 0
+    windy = bool(np.any(model.opt.wind != 0))
+    if look.readers.named("density") or look.readers.named("viscosity"):
+        return
+    if look.readers.named("wind"):
+        return
+    if not dense and windy:
+        item = Item("wind", having["wind"], options=(("wind", None),))
+        proof = "wind acts through a density or a viscosity, and both are 0"
+        yield Candidate("fluid", "there is wind in a vacuum", (item,), proof)
+    elif dense:
+        names = tuple(having)
+        item = Item("fluid", having[names[0]], options=tuple((name, None) for name in names))
+        proof = "" if model.nv else "nothing moves"
+        yield Candidate("fluid", "no body feels the fluid", (item,), proof)
+
+
+def _has(element: Element, name: str) -> bool:
+    return element.attribute(name) is not None
+
+
+# --------------------------------------------------------------------------------------- collisions
+
+_OFF = (("contact", "disable"),)
+MOST_PAIRS = 100_000
+"""Pairs beyond which nothing is proved of them."""
+
+
+def collisions(look: Look) -> Iterator[Candidate]:
+    """Contact as a whole, or geoms that can touch nothing."""
+    model = look.model
+    pairs = frozenset(islice(each_pair(model), MOST_PAIRS))
+    if model.nflex or not pairs:
+        return
+    apart = separate(model, pairs) if len(pairs) < MOST_PAIRS else frozenset()
+    changed = look.readers.whole("shape")
+    proof = "" if changed else f"none of {_pairs(pairs)} can meet, whatever the joints do"
+    item = Item("contact", None, flags=_OFF)
+    if apart == pairs:
+        message = "contacts are searched for, and nothing can touch"
+        yield Candidate("contact-off", message, (item,), proof)
+        return
+    if look.seen and not any(seen.touching for seen in look.seen):
+        message = "contacts are searched for, and nothing touched"
+        yield Candidate("contact-off", message, (item,))
+    if not changed:
+        yield from _geoms(look, pairs, apart)
+
+
+def _pairs(pairs: frozenset[Pair]) -> str:
+    return f"{len(pairs)} pairs of geoms" if len(pairs) != 1 else "1 pair of geoms"
+
+
+def _geoms(look: Look, pairs: frozenset[Pair], apart: frozenset[Pair]) -> Iterator[Candidate]:
+    near = {geom for pair in pairs - apart for geom in pair}
+    far = {geom for pair in apart for geom in pair} - near
+    explicit = {int(g) for g in (*look.model.pair_geom1, *look.model.pair_geom2)}
+    items = []
+    for element in look.scene.elements:
+        thing = look.scene.ids(element)
+        if element.tag != "geom" or thing is None or not far.issuperset(thing.ids):
+            continue
+        if explicit.isdisjoint(thing.ids):
+            edits = set_attributes(element, (("contype", "0"), ("conaffinity", "0")))
+            name = element.get("name") or place_of(element)
+            items.append(Item(name, element, edits=edits))
+    if items:
+        what = "the geom {}" if len(items) == 1 else "the geoms {}"
+        yield Candidate(
+            "collision-unreachable",
+            f"contacts are searched for on {what}, which can touch nothing",
+            tuple(items),
+            "whatever the joints do, every geom that they could collide with is out of reach",
+        )
+
+
+# ----------------------------------------------------------------------------------------- settings
+
+_SOLVERS = {0: "PGS", 1: "CG", 2: "Newton"}
+_TOLERANCE = 1e-6
+
+
+def settings(look: Look) -> Iterator[Candidate]:
+    """Other settings, for a model in which a constraint was ever active."""
+    model = look.model
+    if not any(seen.constrained for seen in look.seen):
+        return
+    solver = _SOLVERS.get(int(model.opt.solver), "")
+    for other in ("Newton", "CG"):
+        if other != solver:
+            yield _option("solver", f"the solver {other} does", "solver", other)
+    if next(each_pair(model), None) is not None:
+        elliptic = int(model.opt.cone) == int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+        other = "pyramidal" if elliptic else "elliptic"
+        yield _option("cone", f"{other} friction cones do", "cone", other)
+        yield from _dimensions(look)
+    if float(model.opt.tolerance) < _TOLERANCE:
+        said = f"a solver tolerance of {_TOLERANCE:g} does"
+        yield _option("tolerance", said, "tolerance", f"{_TOLERANCE:g}")
+    most = max(seen.iterations for seen in look.seen)
+    if 0 < most < int(model.opt.iterations):
+        said = f"the solver never took more than {most} iterations"
+        yield _option("iterations", said, "iterations", str(most))
+    disabled = int(model.opt.disableflags)
+    if not disabled & int(mujoco.mjtDisableBit.mjDSBL_ISLAND):
+        said = "solving all constraints at once, without islands, does"
+        yield _flag("island", said, "island", "disable")
+    if not int(model.opt.enableflags) & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
+        yield _flag("sleep", "bodies at rest can sleep", "sleep", "enable")
+
+
+def _option(kind: str, message: str, name: str, value: str) -> Candidate:
+    return Candidate(kind, message, (Item(value, None, options=((name, value),)),), is_setting=True)
+
+
+def _flag(kind: str, message: str, name: str, value: str) -> Candidate:
+    return Candidate(kind, message, (Item(kind, None, flags=((name, value),)),), is_setting=True)
+
+
+def _dimensions(look: Look) -> Iterator[Candidate]:
+    """Contacts without rolling or torsional friction, and without any."""
+    having = [
+        one
+        for one in look.scene.elements
+        if one.tag in ("geom", "pair") and (one.get("condim") or "") in ("3", "4", "6")
+    ]
+    for least, said in (("3", "no torsional or rolling friction"), ("1", "no friction")):
+        chosen = [one for one in having if int(one.get("condim") or 0) > int(least)]
+        edits = tuple(e for one in chosen for e in set_attributes(one, (("condim", least),)))
+        if edits:
+            item = Item(f"condim {least}", chosen[0], edits=edits)
+            message = f"contacts with {said} do"
+            yield Candidate("condim", message, (item,), is_setting=True)
