@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+NOBODY = 65534
 STORES = ("fonts", "compressed")
 
 
@@ -81,3 +83,18 @@ def browsers() -> Iterator[Mapping[str, Browser]]:
         found = Browsers(playwright)
         yield found
         found.close()
+
+
+@pytest.fixture
+def held_back() -> Iterator[Path]:
+    """A folder of a user whom permissions hold back, as whom the test runs: root is not held."""
+    with tempfile.TemporaryDirectory() as name:
+        root = os.geteuid() == 0
+        if root:
+            os.chown(name, NOBODY, NOBODY)
+            os.seteuid(NOBODY)
+        try:
+            yield Path(name)
+        finally:
+            if root:
+                os.seteuid(0)

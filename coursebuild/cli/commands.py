@@ -13,10 +13,8 @@ from coursebuild.cli.output import CLEAN, USAGE, fail, print_report, report_text
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable
 
-    from coursebuild.effects.published import Entry
-    from coursebuild.effects.stamp import State
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
@@ -67,7 +65,7 @@ def check_command(arguments: argparse.Namespace) -> int:
     if arguments.format != "text" or parts or arguments.sensitivity:
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
-    return _leaving_a_stamp(arguments, "check", ("examples",), work)
+    return _once_while_unchanged(arguments, "check", ("examples",), work)
 
 
 def _against(arguments: argparse.Namespace) -> int:
@@ -94,34 +92,29 @@ def _against(arguments: argparse.Namespace) -> int:
 def build_command(arguments: argparse.Namespace) -> int:
     """Verify everything and publish the site."""
     out: str = arguments.out
-    known: dict[str, list[State]] = {}
-
-    def left(site: Mapping[str, Entry]) -> None:
-        known[out] = [(path, e.mode, e.size, e.modified, e.inode) for path, e in site.items()]
 
     def work(options: Options) -> Report:
         from pathlib import Path
 
         from coursebuild.pipeline.build import build
 
-        return build(options, Path(out), left)
+        return build(options, Path(out))
 
-    return _leaving_a_stamp(arguments, "build", ("examples", out), work, known)
+    return _once_while_unchanged(arguments, "build", ("examples", out), work)
 
 
-def _leaving_a_stamp(
+def _once_while_unchanged(
     arguments: argparse.Namespace,
     name: str,
     made: tuple[str, ...],
     work: Callable[[Options], Report],
-    known: Mapping[str, Iterable[State]] | None = None,
 ) -> int:
     """Do the work; where all is well, the same command has nothing to do as long as all stays so.
 
-    `made` is what the command leaves behind, `known` the files in such folders as the work knows.
+    `made` is what the command leaves behind.
     """
     from coursebuild.cli.unchanged import command_of
-    from coursebuild.effects.stamp import Watcher
+    from coursebuild.core.engine.up_to_date import Watcher
 
     options = options_of(arguments)
     command = command_of(arguments.given)
@@ -133,7 +126,7 @@ def _leaving_a_stamp(
 
         remark = f"nothing has changed since the last {name}"
         said = report_text(unchanged_report(report, remark), options)
-        watcher.keep(said, report.depends, made, known or {})
+        watcher.keep(said, report.depends, made)
     return status
 
 

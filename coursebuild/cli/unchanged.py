@@ -1,10 +1,10 @@
 """A command with nothing to do: known before its arguments are read.
 
-Entry points: `said_before`, what it says then; `command_of`, the name of its stamp.
+Entry points: `said_before`, what it says then; `command_of`, the name under which that is kept.
 
-The stamp goes by the arguments as they were given, and by what else decides what is printed. To
-read arguments takes longer than to look at the files of a course; a command that is spelled in
-another way has another stamp.
+It goes by the arguments as they were given, and by what else decides what is printed. To read
+arguments takes longer than to look at the files of a course; a command that is spelled in another
+way is another command here.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import os
 import sys
 
 from coursebuild.cli.output import look
+from coursebuild.core.engine.up_to_date import unchanged
 from coursebuild.effects.place import course_above
-from coursebuild.effects.stamp import unchanged
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 COMMANDS = ("build", "check")
-"""Those that may leave a stamp."""
+"""Those that may have nothing to do."""
 _ALL_ANEW = "--no-cache"
 _VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")
 """Of the environment: what says the same as arguments."""
@@ -40,9 +40,9 @@ def said_before(given: Sequence[str]) -> str | None:
 
 
 def command_of(given: Sequence[str]) -> tuple[str, ...] | None:
-    """The name of a command's stamp; `None` where it leaves none, or may be said elsewhere.
+    """The name of a command; `None` where it always works.
 
-    Which course is meant is no part of it, since the stamp lies there.
+    Which course is meant is no part of it, since what was said is kept there.
     """
     own = given[2:] if given and given[0] == "-C" else given
     if not own or own[0] not in COMMANDS:

@@ -15,8 +15,8 @@ import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from coursebuild.core.engine.manifest import MARKER
 from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
-from coursebuild.effects.site_swap import MARKER
 from coursebuild.results import OutputFile, SiteFile
 
 _DATE = (1980, 1, 1, 0, 0, 0)

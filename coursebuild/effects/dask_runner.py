@@ -23,10 +23,10 @@ from typing import Any
 
 import msgspec
 
+from coursebuild.core.engine.manifest import MARKER
 from coursebuild.effects import dask_task
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.runner import RunEvent, RunFinished, RunStarted
-from coursebuild.effects.site_swap import MARKER
 from coursebuild.results import Outcome, ScriptJob, ScriptRun
 
 _SCHEMES = {"dask": "tcp", "dask+tls": "tls"}

@@ -1,7 +1,8 @@
 """One writer at a time: locks that vanish with the process that holds them.
 
-Entry points: `project_lock`, held by a command that writes into a course; `try_lock` and
-`is_abandoned`, by which a temporary file or folder shows whether whoever made it is alive.
+Entry points: `project_lock`, held by a command that writes into a course; `folder_lock`, held while
+a site is swapped; `try_lock` and `is_abandoned`, by which a temporary file shows whether whoever
+writes it is alive.
 
 A lock is an flock, so that killing its holder frees it at once and nothing can be stale. Where a
 file system knows no locks, or the project cannot be written, the work goes on alone: every write of
@@ -42,7 +43,7 @@ def try_lock(fd: int) -> bool | None:
 
 
 def is_abandoned(fd: int) -> bool:
-    """Whether a temporary file or folder has lost its writer, who would hold it locked."""
+    """Whether a temporary file has lost its writer, who would hold it locked."""
     locked = try_lock(fd)
     if locked is None:
         return time.time() - os.fstat(fd).st_mtime > _LONG_AGO
@@ -75,6 +76,28 @@ def project_lock(
         yield
     finally:
         _held.pop(path, None)
+        os.close(fd)
+
+
+@contextlib.contextmanager
+def folder_lock(folder: Path, *, wait: bool = True) -> Iterator[bool]:
+    """Hold a folder locked while something in it is replaced; without leaving a file there.
+
+    Gives whether nobody else holds it; so it is, for all that can be known, where there are no
+    locks or no such folder.
+    """
+    try:
+        fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        yield True
+        return
+    try:
+        free = try_lock(fd) is not False
+        if not free and wait:
+            fcntl.flock(fd, fcntl.LOCK_EX)
+            free = True
+        yield free
+    finally:
         os.close(fd)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.effects.locks import project_lock
-from coursebuild.effects.site_swap import check_out, publish
 from coursebuild.pipeline.check import no_lessons, scripts_ahead
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
@@ -32,7 +32,6 @@ from coursebuild.results import FileList, Results, SiteFile
 
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
-    from coursebuild.effects.published import Entry
     from coursebuild.model import Course
     from coursebuild.numerics.reports.shown import Reports
     from coursebuild.pipeline.site import Site
@@ -61,13 +60,8 @@ class Prepared(Struct, frozen=True):
     """The list of all files."""
 
 
-def build(
-    options: Options, out: Path, left: Callable[[Mapping[str, Entry]], object] = len
-) -> Report:
-    """Publish the course into `out` (relative to the course's folder), or nothing.
-
-    `left` is given what is known of the files, if the site is a new one.
-    """
+def build(options: Options, out: Path) -> Report:
+    """Publish the course into `out` (relative to the course's folder), or nothing."""
     progress = Progress(quiet=options.quiet)
     check_out(options.root, options.root / out)
     with project_lock(options.root, progress.say), prepare(options, progress) as prepared:
@@ -80,7 +74,6 @@ def build(
             prepared.listed,
             jobs=options.jobs,
             stage=functools.partial(progress.stage, "publishing"),
-            left=left,
         )
     count = len(prepared.files) + (prepared.listed is not None)
     return replace(prepared.report, remarks=(f"published {count} files in {out}",))

@@ -1,9 +1,7 @@
-"""Servers that run scripts, shared by all tests of a session, and a user who may little."""
+"""Servers that run scripts, shared by all tests of a session."""
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,23 +10,6 @@ import pytest
 from coursebuild.effects.runner import ScriptServer
 from coursebuild.results import ScriptRun
 from support.runners import Run, job
-
-NOBODY = 65534
-
-
-@pytest.fixture
-def held_back() -> Iterator[Path]:
-    """A folder of a user whom permissions hold back, as whom the test runs: root is not held."""
-    with tempfile.TemporaryDirectory() as name:
-        root = os.geteuid() == 0
-        if root:
-            os.chown(name, NOBODY, NOBODY)
-            os.seteuid(NOBODY)
-        try:
-            yield Path(name)
-        finally:
-            if root:
-                os.seteuid(0)
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,8 @@ from typing import NoReturn
 
 import pytest
 
-from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import publish
 from coursebuild.results import OutputFile
 from support.killed_writers import SCENARIOS, Extract, Publish, Update, deaths
 

@@ -87,7 +87,7 @@ def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_importing_effects_loads_nothing_heavy() -> None:
     code = (
         "import sys\n"
-        "from coursebuild.effects import (examples, mjcf, read, resources, runner, site_swap, v8,"
+        "from coursebuild.effects import (examples, mjcf, read, resources, runner, v8,"
         " versions, write)\n"
         "versions.engine_version()\n"
         "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"

@@ -19,7 +19,7 @@ Make = Callable[..., Folder]
 
 
 def aged(folder: Folder) -> None:
-    """Let all that was written be long ago: what was saved this very moment leaves no stamp."""
+    """Let all that was written be long ago: of what was saved this very moment nothing is known."""
     for path in folder.root.rglob("*"):
         if not path.is_symlink() and ".coursebuild" not in path.parts:
             os.utime(path, (1_000_000_000.1234567, 1_000_000_000.1234567))
@@ -48,8 +48,8 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
     )
     assert done.stderr == (
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
-        "'coursebuild.effects', "
-        "'coursebuild.effects.place', 'coursebuild.effects.stamp']\n"
+        "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
+        "'coursebuild.effects', 'coursebuild.effects.place']\n"
     )
 
 

@@ -24,7 +24,7 @@ import coursebuild.render.fonts
 import coursebuild.render.site
 import coursebuild.render.zips  # noqa: F401  # loaded once, for all children
 from coursebuild.cli import main
-from coursebuild.effects import site_swap
+from coursebuild.core.engine import publish as publishing
 
 BY_PATH = ("open", "rename", "replace", "link", "unlink", "rmdir", "mkdir")
 BY_FD = ("write", "fsync", "ftruncate", "fchmod")
@@ -94,14 +94,14 @@ def run(folder: Path, arguments: list[str], fatal: int, report: int) -> None:
     doom = Doom(folder, fatal)
     for name in (*BY_PATH, *BY_FD):
         setattr(os, name, doom.wrap(name, getattr(os, name)))
-    really = site_swap.exchange
+    really = publishing.exchange
 
     def exchange(a: Path, b: Path) -> bool:
         if doom.meets("exchange"):
             os._exit(DIED)
         return really(a, b)
 
-    site_swap.exchange = exchange
+    publishing.exchange = exchange
     status = 70
     try:
         status = main(arguments)

@@ -20,10 +20,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from coursebuild.effects import site_swap
+from coursebuild.core.engine import publish as publishing
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.effects.examples import write_examples
 from coursebuild.effects.locks import project_lock
-from coursebuild.effects.site_swap import MARKER, publish, recover
 from coursebuild.effects.write import write_atomic
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 
@@ -68,7 +69,7 @@ def arm(fatal: int) -> None:
         setattr(os, name, deadly(getattr(os, name)))
     os.open, os.write = deadly_open, deadly_write
     io.open = builtins.open = deadly_io_open  # type: ignore[assignment]
-    site_swap.exchange = deadly(site_swap.exchange)
+    publishing.exchange = deadly(publishing.exchange)
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -122,12 +123,12 @@ class PublishByRenames(Publish):
     """The same where there is no exchange: then the place is empty for an instant, and mended."""
 
     def run(self, root: Path) -> None:
-        really, site_swap.exchange = site_swap.exchange, lambda a, b: False
+        really, publishing.exchange = publishing.exchange, lambda a, b: False
         super().run(root)
-        site_swap.exchange = really
+        publishing.exchange = really
 
     def whole(self, root: Path) -> None:
-        recover(root / "public")
+        check_out(root, root / "public")
         super().whole(root)
 
 

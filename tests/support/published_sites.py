@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import publish
 from coursebuild.results import KeptFile, SiteFile
 
 SPARE = ".coursebuild/published/spare"

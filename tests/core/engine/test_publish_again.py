@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects.published import Published
-from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import publish
 from coursebuild.results import KeptFile, OutputFile, SiteFile
 from support.published_sites import root as root
 from support.published_sites import texts
@@ -126,27 +126,17 @@ def test_a_file_somebody_put_there_by_our_marker_goes(root: Path, pages: Pages) 
     assert texts(out) == {"a/index.html": "a 1"}
 
 
-@pytest.mark.parametrize("where", range(0, 200, 7))
-def test_a_damaged_record_is_not_believed(root: Path, pages: Pages, where: int) -> None:
+def test_a_damaged_record_is_not_believed(root: Path, pages: Pages) -> None:
     out = root / "public"
     publish(root, out, pages(a="1", b="1"))
-    [record] = (root / ".coursebuild/published").iterdir()
-    data = bytearray(record.read_bytes())
-    data[where % len(data)] ^= 1
-    record.write_bytes(data)
-    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html", "b/index.html")
-
-
-def test_a_cut_record_is_not_believed(root: Path, pages: Pages) -> None:
-    out = root / "public"
-    publish(root, out, pages(a="1"))
-    [record] = (root / ".coursebuild/published").iterdir()
-    whole = record.read_bytes()
-    for length in (0, 1, 64, 65, len(whole) - 1):
-        record.write_bytes(whole[:length])
-        assert Published.read(root, out).entries == {}
-    record.write_bytes(b"\xff" * 99)
-    assert Published.read(root, out).entries == {}
+    [record] = (p for p in (root / ".coursebuild/published").iterdir() if p.is_file())
+    for where in range(0, 200, 7):
+        data = bytearray(record.read_bytes())
+        data[where % len(data)] ^= 1
+        for damaged in (data, data[: where % len(data)], b"\xff" * 99):
+            record.write_bytes(damaged)
+            written = publish(root, out, pages(a="1", b="1"))
+            assert written == ("a/index.html", "b/index.html"), where
 
 
 def test_a_project_that_moves_with_its_site_keeps_it(tmp_path: Path, pages: Pages) -> None:

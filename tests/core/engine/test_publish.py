@@ -13,14 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from coursebuild.effects import locks, site_swap
+from coursebuild.core.engine import publish as publishing
+from coursebuild.core.engine.exchange import exchange
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.effects.errors import EffectError, PublishRefusedError
-from coursebuild.effects.exchange import exchange
-from coursebuild.effects.site_staging import Staging
-from coursebuild.effects.site_swap import MARKER, check_out, publish, recover
 from coursebuild.results import OutputFile
 
 
@@ -58,7 +56,7 @@ def root(tmp_path: Path) -> Path:
 @pytest.fixture(params=[True, False], ids=["exchange", "two renames"])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[bool]:
     if not request.param:
-        monkeypatch.setattr(site_swap, "exchange", lambda a, b: False)
+        monkeypatch.setattr(publishing, "exchange", lambda a, b: False)
     yield request.param
 
 
@@ -70,18 +68,6 @@ def test_this_system_exchanges_in_one_step(tmp_path: Path) -> None:
     assert (tmp_path / "a/b").exists() and (tmp_path / "b/a").exists()
     with pytest.raises(FileNotFoundError):
         exchange(tmp_path / "a", tmp_path / "none")
-
-
-@given(st.text(alphabet="a./\\\n\x1f\x7f \u2028é", max_size=8))
-def test_which_paths_a_site_may_have(path: str) -> None:
-    parts = path.split("/")
-    bad = any(part in ("", ".", "..") for part in parts) or any(c < " " or c == "\\" for c in path)
-    try:
-        site_swap._check_path(path, ())
-    except ValueError:
-        assert bad
-    else:
-        assert not bad
 
 
 @pytest.mark.usefixtures("way")
@@ -183,31 +169,21 @@ class TestPublish:
         assert tree(root / "public") == as_tree(site("one"))
         assert names(root) == ["content", "models", "public"]
 
-    def test_what_killed_builds_left_goes(self, root: Path) -> None:
+    def test_what_a_killed_build_left_is_used(self, root: Path) -> None:
         publish(root, root / "public", site("one"))
-        for name in (".public.new-0123abcd", ".public.old-0123abcd"):
-            (root / name / "x").mkdir(parents=True)
-            (root / name / "x/y").touch()
-        (root / ".public.new-notours-at-all").mkdir()
-        (root / ".public.new-12345678").write_text("a file")
+        left = root / ".public.coursebuild-new"
+        (left / "x").mkdir(parents=True)
+        (left / "x/y").touch()
         publish(root, root / "public", site("two"))
-        assert names(root) == [
-            ".public.new-12345678",
-            ".public.new-notours-at-all",
-            "content",
-            "models",
-            "public",
-        ]
+        assert tree(root / "public") == as_tree(site("two"))
+        assert names(root) == ["content", "models", "public"]
 
-    def test_what_a_running_build_writes_stays(self, root: Path) -> None:
-        running = Staging.make(root / "public")
-        try:
-            publish(root, root / "public", site("one"))
-            assert running.path.is_dir()
-        finally:
-            os.close(running.fd)
-        publish(root, root / "public", site("two"))
-        assert not running.path.exists()
+    def test_killed_between_two_renames(self, root: Path) -> None:
+        publish(root, root / "public", site("one"))
+        (root / "public").rename(root / ".public.coursebuild-old")
+        check_out(root, root / "public")
+        assert tree(root / "public") == as_tree(site("one"))
+        assert names(root) == ["content", "models", "public"]
 
     @pytest.mark.parametrize(
         "path",
@@ -319,83 +295,23 @@ class TestRefusal:
         monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "public")
         assert "is a mount point" in self.refused(root, root / "public")
 
-    def test_a_site_that_another_build_renames_away(
-        self, root: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """At each look at it, it is there, or away, or is replaced just then."""
-        publish(root, root / "public", site("one"))
-        place, away = root / "public", root / "away"
-        real_stat, real_read, looks = os.stat, Path.read_text, 0
-
-        def rename(path: object) -> None:
-            nonlocal looks
-            if os.fspath(path) in (str(place), str(place / MARKER)):  # type: ignore[call-overload]
-                looks += 1
-                if looks == gone:
-                    place.rename(away)
-                elif looks == gone + 1:
-                    away.rename(place)
-
-        def look(path: object, **options: object) -> os.stat_result:
-            rename(path)
-            return real_stat(path, **options)  # type: ignore[arg-type, call-overload]
-
-        def read(path: Path, *rest: str, **options: str) -> str:
-            rename(path)
-            return real_read(path, *rest, **options)
-
-        monkeypatch.setattr(os, "stat", look)
-        monkeypatch.setattr(Path, "read_text", read)
-        for gone in range(1, 7):
-            looks = 0
-            assert check_out(root, place) == place
-            assert looks >= gone or gone > 3
-            if away.exists():
-                away.rename(place)
-
     def test_said_before_the_work(self, root: Path) -> None:
         assert check_out(root, root / "public") == root / "public"
         with pytest.raises(PublishRefusedError):
             check_out(root, root)
 
 
-class TestRecover:
-    def test_nothing_to_do(self, root: Path) -> None:
-        recover(root / "public")
-        publish(root, root / "public", site("one"))
-        (root / ".public.old-0123abcd").mkdir()
-        recover(root / "public")
-        assert tree(root / "public") == as_tree(site("one"))
-
-    def test_killed_between_two_renames(self, root: Path) -> None:
-        publish(root, root / "public", site("one"))
-        (root / "public").rename(root / ".public.old-0123abcd")
-        (root / ".public.old-ffffffff").mkdir()  # half removed
-        recover(root / "public")
-        assert tree(root / "public") == as_tree(site("one"))
-
-    def test_not_while_another_build_is_between_them(self, root: Path) -> None:
-        publish(root, root / "public", site("one"))
-        running = Staging.make(root / "public")
-        (root / "public").rename(root / ".public.old-0123abcd")
-        recover(root / "public")
-        assert not (root / "public").exists()
-        os.close(running.fd)
-        recover(root / "public")
-        assert (root / "public").exists()
-
-
 BUILD = """
 import sys
 from pathlib import Path
-from coursebuild.effects import site_swap
+from coursebuild.core.engine import publish
 from coursebuild.results import OutputFile
 root, name, way = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
 if way == "renames":
-    site_swap.exchange = lambda a, b: False
+    publish.exchange = lambda a, b: False
 for i in range(40):
     files = [OutputFile(f"{name}{k}/index.html", name.encode()) for k in range(20)]
-    site_swap.publish(root, root / "public", files)
+    publish.publish(root, root / "public", files)
 """
 
 
@@ -405,7 +321,7 @@ def test_two_builds_at_once(root: Path, way: str) -> None:
     builds = [
         subprocess.Popen(
             [sys.executable, "-c", BUILD, str(root), name, way],
-            cwd=Path(locks.__file__).parents[2],
+            cwd=Path(publishing.__file__).parents[3],
             stderr=subprocess.PIPE,
             text=True,
         )

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects.site_swap import MARKER, publish
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import publish
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
 from support.published_sites import links as links
 from support.published_sites import pages as pages
@@ -154,14 +155,3 @@ def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, 
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
     assert texts(elsewhere) == before
     assert beside(spared) == ["public"]
-
-
-@pytest.mark.parametrize("removed", [".", MARKER])
-def test_a_site_that_was_removed_is_made_anew(spared: Path, pages: Pages, removed: str) -> None:
-    shutil.rmtree(spared / "public")
-    if removed != ".":
-        (spared / "public").mkdir()
-    publish(spared, spared / "public", pages(**MANY))
-    assert sorted(pages.made) == sorted(TEXTS)
-    assert texts(spared / "public") == TEXTS
-    assert not (spared / SPARE).exists()

@@ -1,0 +1,157 @@
+"""What was published last: by its key and its stat, a file of the site that need not be made again.
+
+Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list of its files that a
+site itself has, `holds` and `foreign_files`, by which nobody's files are published over.
+
+The manifest lies in `.coursebuild/`, since a site holds nothing that changes from build to build
+without need. It is only believed of a file that is, by size, time of change and inode, the one
+that was written; where it is missing or damaged everything is made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import stat
+import unicodedata
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from coursebuild.effects.locks import make_private_folder
+
+FOLDER = ".coursebuild/published"
+"""Where a course has its manifests."""
+MARKER = ".coursebuild-site"
+"""A file in every site: a line that says what it is, then the path of every file of the site."""
+_HEADER = "site built by coursebuild; every file listed here may be replaced"
+_JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+"""What file managers strew about."""
+
+
+class Entry(Struct, frozen=True, array_like=True):
+    """A published file."""
+
+    key: str
+    """A hash of all that its bytes depend on."""
+    digest: str
+    """SHA-256 of its bytes, in hexadecimal digits."""
+    size: int
+    """Bytes."""
+    modified: int
+    """ns."""
+    inode: int
+
+    @classmethod
+    def of(cls, key: str, digest: str, status: os.stat_result) -> Entry:
+        """The entry of a file that was just written."""
+        return cls(key, digest, status.st_size, status.st_mtime_ns, status.st_ino)
+
+    def fits(self, status: os.stat_result) -> bool:
+        """Whether a file is the one that was written, as it was then."""
+        return (
+            status.st_ino == self.inode
+            and status.st_mtime_ns == self.modified
+            and status.st_size == self.size
+            and stat.S_ISREG(status.st_mode)
+        )
+
+
+class Manifest(Struct, frozen=True):
+    """The files of one site, by path."""
+
+    place: Path
+    entries: Mapping[str, Entry]
+
+    @classmethod
+    def read(cls, root: Path, place: Path) -> Manifest:
+        """What is known of the site at this place: nothing, where there is no sound manifest."""
+        with contextlib.suppress(OSError, ValueError):
+            digest, _, body = _file(root, place).read_bytes().partition(b"\n")
+            if digest.decode() == hashlib.sha256(body).hexdigest():
+                return cls(place, msgspec.json.decode(body, type=dict[str, Entry]))
+        return cls(place, {})
+
+    def entry(self, path: str, key: str) -> Entry | None:
+        """What was published at a path under a key."""
+        found = self.entries.get(path)
+        return found if found is not None and found.key == key else None
+
+    def is_whole(self, path: str, key: str) -> bool:
+        """Whether the file there was published under this key, and is as it was."""
+        entry = self.entry(path, key)
+        try:
+            return entry is not None and entry.fits(os.lstat(f"{self.place}/{path}"))
+        except OSError:
+            return False
+
+    def write(self, root: Path) -> None:
+        """Keep it for the next build; one that cannot be written only costs time."""
+        body = msgspec.json.encode(self.entries)
+        path = _file(root, self.place)
+        new = path.with_name(f".new-{os.getpid()}")
+        with contextlib.suppress(OSError):
+            make_private_folder(root / ".coursebuild")
+            path.parent.mkdir(exist_ok=True)
+            for left in path.parent.glob(".new-*"):  # by a run that was killed
+                left.unlink(missing_ok=True)
+            new.write_bytes(hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
+            new.replace(path)
+
+
+def _file(root: Path, place: Path) -> Path:
+    """One for each place; it is kept when the project is moved with the site in it."""
+    named = place.relative_to(root) if place.is_relative_to(root) else place
+    return root / FOLDER / hashlib.sha256(os.fsencode(named)).hexdigest()
+
+
+# --- the files of a site
+
+
+def marker(paths: Iterable[str]) -> bytes:
+    """What is in the marker of a site with these files."""
+    return "\n".join([_HEADER, *sorted(paths), ""]).encode()
+
+
+def holds(folder: Path, paths: Collection[str]) -> bool:
+    """Whether a folder has these files and the marker, and no other."""
+    found, wanted = set(_files(folder)), {MARKER, *paths}
+    if found == wanted:
+        return True
+    found, wanted = set(map(_composed, found)), set(map(_composed, wanted))
+    return found <= wanted and all(p.rpartition("/")[2] in _JUNK for p in wanted - found)
+
+
+def foreign_files(place: Path) -> list[str]:
+    """Files at the place that no build of ours put there; sorted."""
+    if not os.path.lexists(place):
+        return []
+    listed: list[str] = []
+    with contextlib.suppress(FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
+        header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
+        listed = [MARKER, *listed] if header == _HEADER else []
+    other = set(_files(place)).difference(listed)
+    ours = {_composed(path) for path in listed} if other else set[str]()
+    return sorted(path for path in other if _composed(path) not in ours)
+
+
+def _composed(path: str) -> str:
+    """The path with its letters composed: some file systems of macOS take them apart."""
+    return path if path.isascii() else unicodedata.normalize("NFC", path)
+
+
+def _files(folder: Path) -> list[str]:
+    """The paths of all files in a folder, but for junk."""
+    found: list[str] = []
+    folders = [""]
+    for prefix in folders:
+        with os.scandir(f"{folder}/{prefix}") as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(f"{prefix}{entry.name}/")
+                elif entry.name not in _JUNK:
+                    found.append(prefix + entry.name)
+    return found

@@ -1,0 +1,88 @@
+"""The files of a site made and written, on several cores where there are many.
+
+Entry points: `writing`; `write_file`, for one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from coursebuild.core.engine.manifest import Entry
+from coursebuild.results import OutputFile, SiteFile
+
+_MANY = 128
+"""Files for which copies of this process are worth their start."""
+_SHARE = 16
+"""Files that a copy writes for one request."""
+_MOST = 4
+"""Copies: more would wait for the disk."""
+
+
+@contextmanager
+def writing(
+    folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int
+) -> Iterator[Callable[[], dict[str, Entry]]]:
+    """Gives what writes files with their keys into a folder; its own folders are there.
+
+    What that gives is the entries of the files, by path.
+    """
+
+    def write(file: SiteFile, key: str) -> Entry:
+        target = f"{folder}/{file.path}"
+        Path(target).unlink(missing_ok=True)  # half of it, by a copy that died
+        digest = write_file(target, _pieces(file))
+        return Entry.of(key, digest, os.lstat(target))
+
+    def share(start: int) -> list[Entry]:
+        return [write(*found) for found in files[start : start + _SHARE]]
+
+    starts = range(0, len(files), _SHARE)
+    with _answers(share, starts, jobs if len(files) >= _MANY else 1) as answers:
+
+        def written() -> dict[str, Entry]:
+            entries = (entry for part in answers() for entry in part)
+            return {file.path: entry for (file, _), entry in zip(files, entries, strict=True)}
+
+        yield written
+
+
+@contextmanager
+def _answers(
+    share: Callable[[int], list[Entry]], starts: Iterable[int], jobs: int
+) -> Iterator[Callable[[], Iterable[list[Entry]]]]:
+    if jobs > 1:
+        from coursebuild.effects.pool import Pool, can_fork
+
+        jobs = jobs if can_fork() else 1
+    if jobs == 1:
+        yield lambda: map(share, starts)
+        return
+    with Pool(share, min(jobs, _MOST)) as pool:
+        yield lambda: pool.run((None, start) for start in starts)[0]
+
+
+def _pieces(file: SiteFile) -> Iterable[bytes]:
+    """The bytes of a file, at once or one after the other."""
+    if isinstance(file, OutputFile):
+        return (file.data,)
+    return (file.make(),) if file.pieces is None else file.pieces()
+
+
+def write_file(path: str, pieces: Iterable[bytes]) -> str:
+    """Write a file that is not there; gives the hash of its bytes."""
+    digest = hashlib.sha256()
+    fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+    try:
+        for piece in pieces:
+            digest.update(piece)
+            rest = memoryview(piece)
+            while rest:
+                rest = rest[os.write(fd, rest) :]
+        os.fchmod(fd, 0o644)  # whatever the umask is
+    finally:
+        os.close(fd)
+    return digest.hexdigest()

@@ -1,0 +1,181 @@
+"""The folder of the site before last: it saves work, whatever becomes of it or of its builder."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.engine import publish as publishing
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.engine.publish import publish
+from coursebuild.effects import locks
+from coursebuild.effects.errors import EffectError
+from coursebuild.results import KeptFile, OutputFile, SiteFile
+from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
+from support.published_sites import links as links
+from support.published_sites import pages as pages
+from support.published_sites import root as root
+from support.published_sites import spared as spared
+
+
+def test_what_did_not_change_is_neither_made_nor_linked(
+    spared: Path, pages: Pages, links: list[str]
+) -> None:
+    assert publish(spared, spared / "public", pages(**MANY | {"b__d": "2"})) == ("b/d.html",)
+    assert links == ["a.html"]  # which changed the time before
+    assert texts(spared / "public") == TEXTS | {"b/d.html": "b/d.html 2"}
+    assert texts(spared / SPARE) == TEXTS
+    assert publish(spared, spared / "public", pages(**MANY | {"b__d": "3"})) == ("b/d.html",)
+    assert links == ["a.html"]
+    assert pages.made == ["b/d.html", "b/d.html"]
+    assert beside(spared) == ["public"]
+
+
+@pytest.mark.site
+@pytest.mark.parametrize("way", ["slot", "fresh", "two renames"])
+def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    """Edit after edit the site is what it should be, and only what changed is made."""
+    chance = random.Random(7)
+    if way == "two renames":
+        monkeypatch.setattr(publishing, "exchange", lambda a, b: False)
+    site = dict.fromkeys(["a", "b", "c/a", "c/b", "c/d/a", "c/d/b", "d/a", "é/a"], "0")
+    before: dict[str, str] = {}
+    for _ in range(60):
+        pages = Pages()
+        written = publish(
+            tmp_path, tmp_path / "public", [pages.one(*item) for item in site.items()]
+        )
+        assert sorted(written) == sorted(pages.made)
+        assert set(written) == {path for path, key in site.items() if before.get(path) != key}
+        assert texts(tmp_path / "public") == {path: f"{path} {key}" for path, key in site.items()}
+        assert (tmp_path / "public" / MARKER).read_text().split("\n")[1:-1] == sorted(site)
+        assert all(any(p.iterdir()) for p in (tmp_path / "public").rglob("*") if p.is_dir())
+        if way == "fresh":
+            spare = tmp_path / SPARE
+            if spare.exists():
+                spare.rename(tmp_path / f"away{chance.random()}")
+        before = dict(site)
+        for name in chance.sample(sorted(site), chance.choice([0, 1, 1, 2])):
+            if chance.random() < 0.3 and len(site) > 4:
+                del site[name]
+            else:
+                site[name] = str(chance.randrange(4))
+
+
+def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
+    for key in "234":
+        for out in ("public", "other"):
+            publish(spared, spared / out, pages(**MANY | {"a": key}))
+            assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
+    assert beside(spared) == ["other", "public"]
+
+
+def test_a_file_system_without_locks(
+    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(locks, "try_lock", lambda fd: None)
+    assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
+    assert texts(spared / "public") == TEXTS | {"a.html": "a.html 2"}
+
+
+def test_a_place_on_another_file_system_than_the_course(
+    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    really = Path.rename
+
+    def rename(path: Path, target: Path) -> Path:
+        if (".coursebuild" in path.parts) != (".coursebuild" in target.parts):
+            raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
+        return really(path, target)
+
+    monkeypatch.setattr(Path, "rename", rename)
+    for key in "23":
+        assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
+        assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
+        assert beside(spared) == ["public"]
+
+
+def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages: Pages) -> None:
+    def broken() -> bytes:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "2", broken)])
+    assert texts(spared / "public") == TEXTS
+    assert beside(spared) == ["public"]
+    assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
+
+
+@pytest.mark.parametrize("removes", [True, False])
+def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool) -> None:
+    def make() -> bytes:
+        slot = spared / ".public.coursebuild-new"
+        if removes:
+            (slot / "b/c.html").unlink()
+        else:
+            (slot / "b/more.html").write_text("more")
+        return b"new"
+
+    pages = Pages()
+    with pytest.raises(EffectError, match="somebody else changes what is being written"):
+        publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "1", make)])
+    assert texts(spared / "public") == TEXTS
+    assert beside(spared) == ["public"]
+    publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "2", lambda: b"new")])
+    assert texts(spared / "public") == TEXTS | {"x.html": "new"}
+
+
+def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) -> None:
+    out, pages = held_back / "public", Pages()
+    publish(held_back, out, pages(**MANY))
+    out.chmod(0o555)
+    for number in range(2, 5):
+        publish(held_back, out, pages(**MANY | {"a": str(number)}))
+        assert beside(held_back) == ["public"]
+        assert texts(out) == TEXTS | {"a.html": f"a.html {number}"}
+        assert (held_back / SPARE).is_dir()
+        assert out.stat().st_mode & 0o777 == 0o555
+    assert pages.made[len(MANY) :] == ["a.html"] * 3
+    out.chmod(0o755)
+
+
+@pytest.mark.site
+def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others(
+    tmp_path: Path,
+) -> None:
+    here = os.getpid()
+
+    def die() -> bytes:
+        if os.getpid() != here:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return b"written in the end"
+
+    def pieces() -> Iterator[bytes]:
+        return (b"%d\n" % n for n in range(1000))
+
+    def files(last: bytes) -> list[SiteFile]:
+        found: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
+        found += [KeptFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]  # type: ignore[misc]
+        found += [KeptFile(f"died {n}", "k", die) for n in range(2)]
+        found.append(KeptFile("pieces", "k", lambda: b"", pieces))
+        return [*found, OutputFile("last", last)]
+
+    for jobs in (1, 3):
+        (tmp_path / str(jobs)).mkdir()
+        publish(tmp_path / str(jobs), tmp_path / str(jobs) / "public", files(b"x"), jobs=jobs)
+    assert texts(tmp_path / "1/public") == texts(tmp_path / "3/public")
+    assert publish(tmp_path / "3", tmp_path / "3/public", files(b"y"), jobs=3) == ("last",)
+
+    def full() -> bytes:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    more: list[SiteFile] = [KeptFile(f"c/{n}", "k", full) for n in range(150)]
+    with pytest.raises(EffectError, match="no space left"):
+        publish(tmp_path / "3", tmp_path / "3/public", [*files(b"z"), *more], jobs=3)
+    assert (tmp_path / "3/public/last").read_bytes() == b"y"
