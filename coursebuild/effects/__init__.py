@@ -3,8 +3,7 @@
 The course's files:
 
 - `place`, `read`: where a course is, and its files as sources
-- `examples`, `write`, `site_swap` (with `site_listing`, `site_staging`, `site_files`, `exchange`,
-  `published`), `locks`: what the tool writes, so that killing it at any instant loses nothing
+- `examples`, `write`, `locks`: what the tool writes, so that killing it at any instant loses nothing
 - `errors`: what can go wrong with all that
 
 Scripts:
@@ -21,7 +20,6 @@ What is kept:
 
 - `store` (with `prune`), `shared`: results, here and for others
 - `conditions`, `digests`, `installed`, `code`, `tool`: what results depend on, as it is now
-- `stamp`: whether there is anything to do
 - `prepared`: fonts that come cut with the tool
 
 Engines and processes:

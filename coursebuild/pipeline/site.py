@@ -3,7 +3,7 @@
 Entry point: `site_files(…)`.
 
 A file that is the same as in the site of before need not be made: it has a key, a hash of all that
-its bytes depend on, and `effects.site_swap.publish` makes it only where it was not published under
+its bytes depend on, and `core.engine.publish` makes it only where it was not published under
 this key.
 """
 
