@@ -155,11 +155,11 @@ TO_MEND: dict[Rule, str] = {
         "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py "
         "render/test_browser.py"
     ),
-    waits_for_time: "effects/test_pool.py",
+    waits_for_time: "core/engine/test_workers.py",
     patches_of_private_names: (
         "effects/test_code.py effects/test_examples.py "
         ""
-        "effects/test_resources.py effects/test_stamp.py "
+        "effects/test_resources.py "
         "effects/test_write.py pipeline/test_behind.py "
         "pipeline/test_memory_files.py pipeline/test_noted.py"
     ),

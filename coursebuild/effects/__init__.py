@@ -3,7 +3,7 @@
 The course's files:
 
 - `place`, `read`: where a course is, and its files as sources
-- `examples`, `write`, `locks`: what the tool writes, so that killing it at any instant loses nothing
+- `examples`, `write`, `locks`: what the tool writes; killing it at any instant loses nothing
 - `errors`: what can go wrong with all that
 
 Scripts:
@@ -28,7 +28,7 @@ Engines and processes:
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
 - `lab_engine` (with `lab_pieces.js`), `lab_files`, `native` (with `native_worker`): labs in the
   browser's engine and natively
-- `child`, `pool`: processes that answer, and copies of this one
+- `child`: processes that answer
 - `leaving`: the end of this process
 
 The preview: `server`, `watch`.

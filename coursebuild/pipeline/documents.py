@@ -27,7 +27,7 @@ from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Drawn, Later, 
 from coursebuild.source import Source, key_of
 
 if TYPE_CHECKING:
-    from coursebuild.effects.pool import Pool
+    from coursebuild.core.engine.workers import Workers
     from coursebuild.pipeline.reading import Reader
 
 Value = TypeVar("Value")
@@ -72,7 +72,7 @@ class Documents:
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
         self._reader: Reader | None = None
-        self._pool: Pool[Request, Answer] | None = None
+        self._workers: Workers[Request, Answer] | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -139,7 +139,7 @@ class Documents:
 
     def _requests(self, tasks: Sequence[Task]) -> Iterator[tuple[int | None, Request]]:
         yield from ((None, Read(task)) for task in tasks)
-        if self._pool is not None:
+        if self._workers is not None:
             for name in self._following:
                 importlib.import_module(name)
             self._following = ()
@@ -211,12 +211,12 @@ class Documents:
     ) -> tuple[list[Answer], list[int | None]]:
         """The answers to requests, from copies of this process where there are many requests."""
         reader = self._here()
-        if self._pool is None:
+        if self._workers is None:
             first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
             requests = chain(first, requests)
             few = len(first) < _MANY or self._jobs == 1
             if not few:
-                from coursebuild.effects.pool import Pool, can_fork
+                from coursebuild.core.engine.workers import Workers, can_fork
 
             if few or not can_fork():
                 with self._stage(name):
@@ -224,15 +224,15 @@ class Documents:
                 return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
             count = min(self._jobs, -(-2 * len(first) // _MANY))
-            self._pool = Pool(reader.answer, count)
+            self._workers = Workers(reader.answer, count)
         with self._stage(name):
-            return self._pool.run(requests)
+            return self._workers.map(requests)
 
     def rest(self) -> None:
         """End the copies; what they remember is gone, and the room is free that they took."""
-        if self._pool is not None:
-            self._pool.close()
-            self._pool = None
+        if self._workers is not None:
+            self._workers.close()
+            self._workers = None
             self._readers.clear()
 
     def _here(self) -> Reader:

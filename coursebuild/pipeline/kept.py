@@ -1,14 +1,12 @@
 """Cut fonts and small findings, kept in the store from run to run.
 
-Entry points: `kept_font`, `fonts_beside`; `KeptBindings`.
+Entry points: `kept_font`; `KeptBindings`.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
@@ -24,9 +22,9 @@ if TYPE_CHECKING:
 _FONTS, _BINDINGS = "fonts", "bindings"
 
 
-def kept_font(store: Store, job: FontJob, cut: Callable[[FontJob], bytes] | None = None) -> bytes:
-    """A cut font: cut already, or cut now, by `cut` if not by `cut_font`."""
-    make = functools.partial(cut or cut_font, job)
+def kept_font(store: Store, job: FontJob) -> bytes:
+    """A cut font: cut already, or cut now."""
+    make = functools.partial(cut_font, job)
     return prepared_cut(job.key) or store.kept(_FONTS, job.key, make)
 
 
@@ -36,36 +34,6 @@ def cut_font(job: FontJob) -> bytes:
 
     source = prepared_source(job.data, job.characters, VERSION)
     return subset_font(job if source is None else replace(job, data=source))
-
-
-@contextmanager
-def fonts_beside(store: Store, jobs: Iterable[FontJob]) -> Iterator[Callable[[FontJob], bytes]]:
-    """Gives `kept_font`; the largest that has to be cut is cut in a copy of this process meanwhile.
-
-    Cutting one for mathematics takes longer than cutting all others, which are cut here and now.
-    """
-    missing = [job for job in jobs if prepared_cut(job.key) is None and not _has(store, job)]
-    if not missing:
-        yield functools.partial(kept_font, store)
-        return
-    from coursebuild.effects.pool import beside
-
-    missing.sort(key=lambda job: len(job.characters))
-    if store.fresh:  # of what is kept nothing is asked for
-        del missing[:-1]
-    largest = missing[-1].key
-    with beside(functools.partial(cut_font, missing.pop())) as made:
-        while missing:  # of none more is held than what was cut
-            kept_font(store, missing.pop())
-
-        def cut(job: FontJob) -> bytes:
-            return made() if job.key == largest else cut_font(job)
-
-        yield functools.partial(kept_font, store, cut=cut)
-
-
-def _has(store: Store, job: FontJob) -> bool:
-    return store.load(_FONTS, job.key) is not None
 
 
 class KeptBindings:

@@ -12,12 +12,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -32,7 +31,7 @@ from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.numerics.reports.shown import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.kept import fonts_beside, kept_font
+from coursebuild.pipeline.kept import kept_font
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import all_imports
 from coursebuild.pipeline.pages import Pages
@@ -44,13 +43,12 @@ from coursebuild.render.library import Library
 from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.sheet import search_words
-from coursebuild.render.shared import PageFacts, common_characters, needed_fonts
+from coursebuild.render.shared import PageFacts, common_characters
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
 
 if TYPE_CHECKING:
     from coursebuild.render.exports.chapters import Note
-    from coursebuild.render.fonts import FontJob
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
@@ -104,11 +102,10 @@ class _Site:
     def made(self) -> Site:
         pages = Pages(self.library, self.documents, self.store)
         self.documents.rest()
-        with self._shared_data(pages.facts) as data:
-            files = [*self._labs(), *self._downloads()]
-            files += offline_files(self.course, self.assets)
-            files += self._search(pages)
-            names, shared = self._shared(data)
+        names, shared = self._shared(pages.facts)
+        files = [*self._labs(), *self._downloads()]
+        files += offline_files(self.course, self.assets)
+        files += self._search(pages)
         files += shared
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
         if self.course.base_url:
@@ -125,25 +122,12 @@ class _Site:
 
     # --- what all pages share
 
-    @contextmanager
-    def _shared_data(self, facts: PageFacts) -> Iterator[_Data]:
-        """The shared files, made only for characters and styles for which they were not made.
-
-        Where they are to be made, a font is cut for them until they are asked for.
-        """
+    def _shared(self, facts: PageFacts) -> tuple[Names, list[SiteFile]]:
+        """The shared files, made only for characters and styles for which they were not made."""
         facts = replace(facts, text=facts.text | common_characters(self.library))
         parts = (facts.text, facts.mathematics, facts.declarations)
         key = key_of(tool_digest(), *("\0".join(sorted(part)) for part in parts))
-        make = functools.partial(self._make_shared, facts)
-        data = _Data(self.store, key, lambda: make(functools.partial(kept_font, self.store)))
-        if self.options.jobs > 1 and data.known is None:
-            with fonts_beside(self.store, needed_fonts(self.assets, facts)) as subset:
-                yield _Data(self.store, key, lambda: make(subset))
-            return
-        data.listing()  # at once, since making them takes memory: nothing else is held yet
-        yield data
-
-    def _shared(self, data: _Data) -> tuple[Names, list[SiteFile]]:
+        data = _Data(self.store, key, functools.partial(self._make_shared, facts))
         names, paths = data.listing()
         files = [KeptFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
         # Those of the style sheet, which is another in every course, are made where files are made
@@ -154,12 +138,10 @@ class _Site:
             files.append(KeptFile(path, key_of(data.key, path), make))
         return names, [*files]
 
-    def _make_shared(
-        self, facts: PageFacts, subset: Callable[[FontJob], bytes]
-    ) -> tuple[Names, dict[str, bytes]]:
+    def _make_shared(self, facts: PageFacts) -> tuple[Names, dict[str, bytes]]:
         from coursebuild.render.shared import shared_files
 
-        made, names = shared_files(self.assets, subset, facts)
+        made, names = shared_files(self.assets, functools.partial(kept_font, self.store), facts)
         copies = self._copies(file for file in made if file.path != names.style)
         return names, {file.path: file.data for file in (*made, *copies)}
 
@@ -288,20 +270,14 @@ class _Data:
         self._make = make
         self._files: dict[str, bytes] | None = None
 
-    @property
-    def known(self) -> tuple[Names, tuple[str, ...]] | None:
-        """Their names, where they were made before."""
-        found: tuple[Names, tuple[str, ...]] | None = self._load(_SHARED)
-        return found
-
     def listing(self) -> tuple[Names, tuple[str, ...]]:
         """Their names."""
-        return self.known or self._made()
+        return self._load(_SHARED, tuple[Names, tuple[str, ...]]) or self._made()
 
     def file(self, path: str) -> bytes:
         """The bytes of one."""
         if self._files is None:
-            self._files = self._load(_SHARED_DATA)
+            self._files = self._load(_SHARED_DATA, dict[str, bytes])
         if self._files is None:
             self._made()
         assert self._files is not None
@@ -310,15 +286,15 @@ class _Data:
     def _made(self) -> tuple[Names, tuple[str, ...]]:
         names, self._files = self._make()
         listing = names, tuple(self._files)
-        self._store.keep(_SHARED_DATA, self.key, pickle.dumps(self._files), local=True)
-        self._store.keep(_SHARED, self.key, pickle.dumps(listing), local=True)
+        self._store.keep(_SHARED_DATA, self.key, msgspec.msgpack.encode(self._files), local=True)
+        self._store.keep(_SHARED, self.key, msgspec.msgpack.encode(listing), local=True)
         return listing
 
-    def _load(self, kind: str) -> Any:
+    def _load(self, kind: str, type: Any) -> Any:
         data = None if self._store.fresh else self._store.peek(kind, self.key)
         try:
-            return None if data is None else pickle.loads(data)
-        except Exception:  # whatever damaged bytes make of it
+            return None if data is None else msgspec.msgpack.decode(data, type=type)
+        except msgspec.MsgspecError:
             return None
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import pool
+from coursebuild.core.engine import workers
 from coursebuild.effects.store import Store
 from coursebuild.pipeline import kept
 from coursebuild.pipeline.kept import fonts_beside
@@ -33,7 +33,7 @@ def test_the_largest_font_is_cut_beside(
         return job.characters.upper().encode()
 
     monkeypatch.setattr(cutting, "subset_font", cut)
-    monkeypatch.setattr(pool, "can_fork", lambda: forks)
+    monkeypatch.setattr(workers, "can_fork", lambda: forks)
     jobs = [job("ab"), job("abcd"), job("c")]
     with fonts_beside(store, jobs) as subset:
         assert [subset(job) for job in jobs] == [b"AB", b"ABCD", b"C"]

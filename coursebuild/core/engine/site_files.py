@@ -10,9 +10,13 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from coursebuild.core.engine.manifest import Entry
 from coursebuild.results import OutputFile, SiteFile
+
+if TYPE_CHECKING:
+    from coursebuild.core.engine.workers import Workers
 
 _MANY = 128
 """Files for which copies of this process are worth their start."""
@@ -41,28 +45,29 @@ def writing(
         return [write(*found) for found in files[start : start + _SHARE]]
 
     starts = range(0, len(files), _SHARE)
-    with _answers(share, starts, jobs if len(files) >= _MANY else 1) as answers:
+    with _workers(share, jobs if len(files) >= _MANY else 1) as workers:
 
         def written() -> dict[str, Entry]:
-            entries = (entry for part in answers() for entry in part)
+            tasks = ((None, start) for start in starts)
+            parts = map(share, starts) if workers is None else workers.map(tasks)[0]
+            entries = (entry for part in parts for entry in part)
             return {file.path: entry for (file, _), entry in zip(files, entries, strict=True)}
 
         yield written
 
 
 @contextmanager
-def _answers(
-    share: Callable[[int], list[Entry]], starts: Iterable[int], jobs: int
-) -> Iterator[Callable[[], Iterable[list[Entry]]]]:
+def _workers(
+    share: Callable[[int], list[Entry]], jobs: int
+) -> Iterator[Workers[int, list[Entry]] | None]:
     if jobs > 1:
-        from coursebuild.effects.pool import Pool, can_fork
+        from coursebuild.core.engine.workers import Workers, can_fork
 
-        jobs = jobs if can_fork() else 1
-    if jobs == 1:
-        yield lambda: map(share, starts)
-        return
-    with Pool(share, min(jobs, _MOST)) as pool:
-        yield lambda: pool.run((None, start) for start in starts)[0]
+        if can_fork():
+            with Workers(share, min(jobs, _MOST)) as workers:
+                yield workers
+            return
+    yield None
 
 
 def _pieces(file: SiteFile) -> Iterable[bytes]:

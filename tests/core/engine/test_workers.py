@@ -1,0 +1,235 @@
+"""Work in forked processes: done in order, whatever the workers do, and none of them stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.engine.workers import Workers, can_fork
+from coursebuild.effects.errors import EffectError
+
+pytestmark = pytest.mark.site
+
+ROOT = Path(__file__).parents[3]
+HERE = os.getpid()
+
+
+def alive(process: int) -> bool:
+    return Path(f"/proc/{process}").exists()
+
+
+def where(task: object) -> tuple[object, int]:
+    return task, os.getpid()
+
+
+def test_answers_come_in_the_order_of_the_tasks() -> None:
+    def slow_at_first(number: int) -> int:
+        time.sleep(0.05 if number < 2 else 0.0)
+        return number * number
+
+    with Workers(slow_at_first, 3) as workers:
+        answers, by = workers.map([(None, n) for n in range(40)])
+    assert answers == [n * n for n in range(40)]
+    assert set(by) == {0, 1, 2}
+
+
+def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers() -> None:
+    seen: list[int] = []
+
+    def remember(number: int) -> tuple[int, list[int]]:
+        seen.append(number)
+        return os.getpid(), list(seen)
+
+    with Workers(remember, 2) as workers:
+        first, by = workers.map([(None, n) for n in range(8)])
+        again, _ = workers.map([(by[n], n) for n in range(8)])
+    for n in range(8):
+        assert first[n][0] == again[n][0]
+        assert again[n][1].count(n) == 2
+    assert seen == []
+
+
+def test_large_answers_and_tasks() -> None:
+    with Workers(lambda text: text * 3, 2) as workers:
+        answers, _ = workers.map([(None, "x" * n * 100_000) for n in range(1, 20)])
+    assert [len(answer) for answer in answers] == [n * 300_000 for n in range(1, 20)]
+
+
+def test_what_a_worker_did_not_answer_is_answered_here() -> None:
+    def dies(number: int) -> tuple[int, int]:
+        if number % 5 == 3 and os.getpid() != HERE:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return where(number)  # type: ignore[return-value]
+
+    with Workers(dies, 2) as workers:
+        answers, by = workers.map([(n % 2, n) for n in range(20)])
+    assert [answer[0] for answer in answers] == list(range(20))
+    assert {answers[n][1] for n in range(20) if by[n] is None} == {HERE}
+
+
+def test_what_is_raised_in_a_worker_is_raised_here() -> None:
+    def refuse(number: int) -> int:
+        if number == 3:
+            raise EffectError("no", help="never")
+        return number
+
+    with Workers(refuse, 2) as workers, pytest.raises(EffectError, match="no") as caught:
+        workers.map([(None, n) for n in range(6)])
+    assert caught.value.help == "never"
+    assert "refuse" in "".join(caught.value.__notes__)
+
+
+def test_what_cannot_be_sent_is_told_as_a_text() -> None:
+    class HereError(Exception):
+        pass
+
+    def refuse(number: int) -> int:
+        raise HereError("local")
+
+    with Workers(refuse, 1) as workers, pytest.raises(RuntimeError, match="HereError: local"):
+        workers.map([(None, 1)])
+
+
+def test_no_worker_stays() -> None:
+    with Workers(where, 3) as workers:
+        answers, _ = workers.map([(None, n) for n in range(9)])
+    processes = {process for _, process in answers}
+    assert HERE not in processes
+    assert not any(alive(process) for process in processes)
+
+
+def test_where_standard_input_is_closed() -> None:
+    """A pipe of the worker may then have its number."""
+    code = (
+        "import os\n"
+        "from coursebuild.core.engine.workers import Workers\n"
+        "with Workers(lambda task: os.getpid(), 2) as workers:\n"
+        "    print(os.getpid() not in workers.map([(None, 1), (None, 2)])[0])\n"
+    )
+    shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, code]
+    done = subprocess.run(shell, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n", done.stderr
+
+
+def test_without_workers_all_is_answered_here() -> None:
+    with Workers(where, 0) as workers:
+        assert workers.map([(None, 1), (0, 2)])[0] == [(1, HERE), (2, HERE)]
+        assert workers.map([])[0] == []
+
+
+def test_tasks_are_made_while_workers_answer(tmp_path: Path) -> None:
+    made = tmp_path / "made"
+
+    def waits(number: int) -> int:
+        while not made.exists():  # for ever, if the others were only made when this is answered
+            time.sleep(0.001)
+        return number
+
+    def tasks() -> Iterator[tuple[int | None, int]]:
+        yield from ((None, number) for number in range(10))
+        made.touch()
+        yield None, 10
+
+    with Workers(waits, 2) as workers:
+        assert workers.map(tasks())[0] == list(range(11))
+
+
+def test_workers_that_die_while_tasks_come() -> None:
+    def dies(number: int) -> tuple[object, int]:
+        if os.getpid() != HERE:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return where(number)
+
+    def tasks() -> Iterator[tuple[int | None, int]]:
+        for number in range(30):
+            yield number % 3, number
+            time.sleep(0.005)
+
+    with Workers(dies, 3) as workers:
+        assert workers.map(tasks()) == ([(n, HERE) for n in range(30)], [None] * 30)
+
+
+def test_after_a_failure_no_answer_is_taken_for_another() -> None:
+    def answer(task: str) -> tuple[str, int]:
+        if task == "bad":
+            raise EffectError("no answer")
+        time.sleep(0.1)
+        return task, os.getpid()
+
+    with Workers(answer, 2) as workers:
+        with pytest.raises(EffectError, match="no answer"):
+            workers.map([(0, "slow"), (1, "bad")])
+        assert workers.map([(None, "later")])[0] == [("later", HERE)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """As one that a terminal sends to all of its processes comes to both, in the worker at once."""
+    code = (
+        "import os, signal, sys\n"
+        "from coursebuild.core.engine.workers import Workers\n"
+        "number = int(sys.argv[1])\n"
+        "def heard(*_): print('heard by', os.getpid() == here, flush=True)\n"
+        "here = os.getpid()\n"
+        "signal.signal(number, heard)\n"
+        "os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), number),\n"
+        "                    after_in_parent=lambda: os.kill(os.getpid(), number))\n"
+        "with Workers(lambda task: (task, os.getpid() == here), 1) as workers:\n"
+        "    print(workers.map([(None, 1)])[0], signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(int(number))], cwd=ROOT, capture_output=True, text=True
+    )
+    # SIGTERM ends the worker, as it would a moment later: what it was to answer is answered here.
+    answered_here = number == signal.SIGTERM
+    assert done.stdout == f"heard by True\n[(1, {answered_here})] set()\n"
+    assert (done.stderr, done.returncode) == ("", 0)
+
+
+def test_a_process_with_threads_is_not_copied() -> None:
+    stop = threading.Event()
+    thread = threading.Thread(target=stop.wait)
+    thread.start()
+    try:
+        assert not can_fork()
+    finally:
+        stop.set()
+        thread.join()
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_the_process(how: signal.Signals, tmp_path: Path) -> None:
+    """Also where it cannot say so, and one that works ends when it is done."""
+    script = tmp_path / "p.py"
+    script.write_text(
+        "import os, time\n"
+        "from coursebuild.core.engine.workers import Workers\n"
+        "def work(n):\n"
+        "    os.write(1, b'%d\\n' % os.getpid())\n"
+        "    time.sleep(1.0)\n"
+        "with Workers(work, 2) as workers: workers.map([(None, n) for n in range(99)])\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    ) as process:
+        assert process.stdout is not None
+        workers = [int(process.stdout.readline()) for _ in range(2)]
+        process.send_signal(how)
+        process.wait()
+        until = time.monotonic() + 120
+        while any(map(alive, workers)):
+            assert time.monotonic() < until
+            time.sleep(0.02)
