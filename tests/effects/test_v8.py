@@ -395,15 +395,15 @@ class TestIsolate:
 
     def test_a_copy_of_a_process_in_which_v8_was_started_has_its_own(self) -> None:
         code = (
-            "from coursebuild.effects.pool import Pool, can_fork\n"
+            "from coursebuild.core.engine.workers import Workers, can_fork\n"
             "from coursebuild.effects.v8 import MathEngine, start\n"
             "from coursebuild.results import Formula\n"
             "def typeset(tex):\n"
             "    with MathEngine() as engine: return engine.typeset([Formula(tex, False)])\n"
             "before = typeset('x')\n"
             "print(can_fork())\n"
-            "with Pool(typeset, 2) as pool:\n"
-            "    made, numbers = pool.run((None, 'x') for _ in range(8))\n"
+            "with Workers(typeset, 2) as workers:\n"
+            "    made, numbers = workers.map((None, 'x') for _ in range(8))\n"
             "print(all(one == before for one in made), None in numbers)\n"
             "with MathEngine() as engine:\n"
             "    engine.typeset([Formula('x', False)])\n"
