@@ -22,7 +22,7 @@ from coursebuild.syntax.escapes import escaped_string, odd_character, tex_word
 from coursebuild.syntax.nodes import (
     ArrayNode,
     BoolNode,
-    BrokenNode,
+    ErrorNode,
     Member,
     Node,
     NullNode,
@@ -189,7 +189,7 @@ class _Reader:
     # ---------------------------------------------------------------------------------- scalars
 
     def scalar(self, start: int, written: str) -> Node:
-        """A number or word; `BrokenNode` for one that is not JSON."""
+        """A number or word; `ErrorNode` for one that is not JSON."""
         end = self.at
         if written in ("true", "false"):
             return BoolNode(self.body, start, end, written == "true")
@@ -213,7 +213,7 @@ class _Reader:
             self.at = start
             self.expected("a value")
         self.report(start, end, message, help)
-        return BrokenNode(self.body, start, end)
+        return ErrorNode(self.body, start, end)
 
     def string(self) -> StringNode:
         match = _STRING.match(self.text, self.at)

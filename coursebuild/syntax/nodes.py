@@ -87,7 +87,7 @@ class DateNode(_Placed, frozen=True, eq=False):
     """TOML's dates and times. No field takes one; `raw` says what was written."""
 
 
-class BrokenNode(_Placed, frozen=True, eq=False):
+class ErrorNode(_Placed, frozen=True, eq=False):
     """What stands in the place of a value and was already reported."""
 
 
@@ -151,5 +151,5 @@ class Member(Struct, frozen=True):
 
 
 Node: TypeAlias = (
-    ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode | BrokenNode
+    ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode | ErrorNode
 )

@@ -1,7 +1,7 @@
 """How messages call types and the author's values.
 
-Entry points: `Takes` (the types that a field takes) and its constants, `Words` (`JSON`, `TOML`),
-`named`, `quoted`, `wrong_type`, `type_help`.
+Entry points: `Words` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`, `quoted`,
+`short`.
 """
 
 from __future__ import annotations
@@ -9,14 +9,15 @@ from __future__ import annotations
 import re
 from typing import assert_never
 
+import msgspec.inspect as inspect
 from msgspec import Struct
 
 from coursebuild.patterns import pattern
 from coursebuild.syntax.nodes import (
     ArrayNode,
     BoolNode,
-    BrokenNode,
     DateNode,
+    ErrorNode,
     Node,
     NullNode,
     NumberNode,
@@ -38,67 +39,86 @@ JSON = Words("an object", "objects")
 TOML = Words("a table", "tables")
 
 
-class Takes(Struct, frozen=True):
-    """The types that a field takes, for the decoder and in words."""
-
-    kinds: frozenset[str]
-    """Of `string`, `integer`, `float`, `bool`, `null`, `array`, `object`."""
-    one: str
-    many: str
-    items: frozenset[str] = frozenset()
-    """The kinds of the items, where it takes an array."""
-
-    def __or__(self, other: Takes) -> Takes:
-        """Either of two."""
-        kinds = self.kinds | other.kinds
-        if "null" in (self.one, other.one):  # that a field can be left out need not be said
-            main = other if self.one == "null" else self
-            return Takes(kinds, main.one, main.many, self.items | other.items)
-        one, many = f"{self.one} or {other.one}", f"{self.many} or {other.many}"
-        return Takes(kinds, one, many, self.items | other.items)
+_SIMPLE = {
+    "string": ("a string", "strings"),
+    "integer": ("an integer", "integers"),
+    "number": ("a number", "numbers"),
+    "bool": ("`true` or `false`", "`true` or `false`"),
+    "object": ("an object", "objects"),
+}
 
 
-STRING = Takes(frozenset({"string"}), "a string", "strings")
-INTEGER = Takes(frozenset({"integer"}), "an integer", "integers")
-NUMBER = Takes(frozenset({"integer", "float"}), "a number", "numbers")
-BOOL = Takes(frozenset({"bool"}), "`true` or `false`", "`true` or `false`")
-NULL = Takes(frozenset({"null"}), "null", "null")
-OBJECT = Takes(frozenset({"object"}), "an object", "objects")
+def _single(type: inspect.Type) -> list[inspect.Type]:
+    """The types of a union, without remarks and `null`: that a field can be left out is clear."""
+    while isinstance(type, inspect.Metadata):
+        type = type.type
+    if not isinstance(type, inspect.UnionType):
+        return [type]
+    types = [one for inner in type.types for one in _single(inner)]
+    structs = [one for one in types if isinstance(one, inspect.StructType)]
+    return [
+        one for one in types if not isinstance(one, inspect.NoneType) and one not in structs[1:]
+    ]
 
 
-def array_of(item: Takes) -> Takes:
-    """An array of any length."""
-    array = frozenset({"array"})
-    return Takes(array, f"an array of {item.many}", f"arrays of {item.many}", item.kinds)
-
-
-def tuple_of(length: int) -> Takes:
-    """An array with a place for each item."""
-    words = f"of {length} values"
-    return Takes(frozenset({"array"}), f"an array {words}", f"arrays {words}")
-
-
-def kind_of(node: Node) -> str:
-    """The type of a node."""
-    match node:
-        case StringNode():
+def _kind(type: inspect.Type) -> str:
+    """What a type is called that is neither a union nor `null`."""
+    match type:
+        case inspect.StrType() | inspect.LiteralType():
             return "string"
-        case NumberNode():
-            return "float" if isinstance(node.value, float) else "integer"
-        case BoolNode():
+        case inspect.IntType():
+            return "integer"
+        case inspect.FloatType():
+            return "number"
+        case inspect.BoolType():
             return "bool"
-        case NullNode():
-            return "null"
-        case ArrayNode():
-            return "array"
-        case ObjectNode():
+        case inspect.DictType() | inspect.StructType():
             return "object"
-        case DateNode():
-            return "date"
-        case BrokenNode():
-            return "broken"
+        case inspect.VarTupleType() | inspect.TupleType():
+            return "array"
         case _:
-            assert_never(node)
+            raise TypeError(f"no value of a lesson is of {type}")
+
+
+def _in_words(type: inspect.Type) -> tuple[str, str]:
+    """What a field takes: one of it, and several."""
+    ones, many = [], []
+    for single in _single(type):
+        if isinstance(single, inspect.VarTupleType):
+            items = _in_words(single.item_type)[1]
+            words = (f"an array of {items}", f"arrays of {items}")
+        elif isinstance(single, inspect.TupleType):
+            length = f"of {len(single.item_types)} values"
+            words = (f"an array {length}", f"arrays {length}")
+        else:
+            words = _SIMPLE[_kind(single)]
+        ones.append(words[0])
+        many.append(words[1])
+    return " or ".join(ones), " or ".join(many)
+
+
+_NODES: dict[str, type[Node]] = {
+    "string": StringNode,
+    "integer": NumberNode,
+    "number": NumberNode,
+    "bool": BoolNode,
+    "object": ObjectNode,
+    "array": ArrayNode,
+}
+
+
+def accepts(type: inspect.Type, node: Node) -> bool:
+    """Whether a node is of a type, whatever its value."""
+    if isinstance(type, inspect.Metadata):
+        return accepts(type.type, node)
+    if isinstance(type, inspect.UnionType):
+        return any(accepts(one, node) for one in type.types)
+    if isinstance(type, inspect.NoneType):
+        return isinstance(node, NullNode)
+    kind = _kind(type)
+    if kind == "integer" and isinstance(node, NumberNode) and isinstance(node.value, float):
+        return False
+    return isinstance(node, _NODES[kind])
 
 
 def short(text: str, limit: int = 40) -> str:
@@ -117,9 +137,10 @@ def quoted(node: Node) -> str:
     return f"`{short(node.value if isinstance(node, StringNode) else node.raw)}`"
 
 
-def wrong_type(node: Node, name: str, takes: Takes, words: Words) -> str:
+def wrong_type(node: Node, name: str, type: inspect.Type, words: Words) -> str:
     """The message for a value of a type that its field does not take."""
-    expected = takes.one.replace("an object", words.object).replace("objects", words.objects)
+    expected = _in_words(type)[0].replace("an object", words.object)
+    expected = expected.replace("objects", words.objects)
     return f"{named(name)} must be {expected}, not {_found(node, words)}"
 
 
@@ -135,32 +156,35 @@ def _found(node: Node, words: Words) -> str:
             return f"the number {short(node.raw)}"
         case DateNode():
             return "a date or time"
-        case BoolNode() | NullNode() | BrokenNode():
+        case BoolNode() | NullNode() | ErrorNode():
             return f"`{short(node.raw)}`"
         case _:
             assert_never(node)
 
 
-def type_help(node: Node, takes: Takes) -> str:
+def type_help(node: Node, type: inspect.Type) -> str:
     """How to mend a value of the wrong type, where that is clear."""
     raw = node.raw
+    kinds = {_kind(single) for single in _single(type)}
+    arrays = [one for one in _single(type) if isinstance(one, inspect.VarTupleType)]
+    items = {_kind(single) for array in arrays for single in _single(array.item_type)}
     if isinstance(node, NullNode):
         return "leave the field out"
-    if isinstance(node, ObjectNode) and "object" in takes.items and raw.startswith("["):
+    if isinstance(node, ObjectNode) and "object" in items and raw.startswith("["):
         return f"write its header with two brackets: `[{node.mark.text}]`"
     if len(raw) > 40 or "\n" in raw:
         return ""
     if isinstance(node, NumberNode | DateNode | BoolNode):
-        plain = not isinstance(node, BoolNode) or takes.kinds <= {"string", "null"}
-        if "string" in takes.kinds and plain:
+        plain = not isinstance(node, BoolNode) or kinds == {"string"}
+        if "string" in kinds and plain:
             return f'put it between quotes: `"{raw}"`'
-        if "string" in takes.items:
+        if "string" in items:
             return f'put it between brackets and quotes: `["{raw}"]`'
     if isinstance(node, StringNode):
-        if takes.kinds & {"integer", "float"} and _NUMBER.fullmatch(node.value):
+        if kinds & {"integer", "number"} and _NUMBER.fullmatch(node.value):
             return f"write it without quotes: `{node.value}`"
-        if "bool" in takes.kinds and node.value.lower() in ("true", "false"):
+        if "bool" in kinds and node.value.lower() in ("true", "false"):
             return f"write it without quotes: `{node.value.lower()}`"
-    if kind_of(node) in takes.items:
+    if any(accepts(array.item_type, node) for array in arrays):
         return f"put it between brackets: `[{raw}]`"
     return ""
