@@ -33,7 +33,7 @@ from coursebuild.results import FileList, Results, SiteFile
 if TYPE_CHECKING:
     from coursebuild.effects.foresight import RunAll
     from coursebuild.model import Course
-    from coursebuild.numerics.reports.shown import Reports
+    from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
 

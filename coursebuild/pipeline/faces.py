@@ -28,7 +28,7 @@ from coursebuild.model import (
     document_blocks,
     walk_inlines,
 )
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.results import Results
 from coursebuild.source import Excerpt, Source, Span
 

@@ -29,7 +29,7 @@ from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.model import Block, Course, document_blocks
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options

@@ -18,7 +18,7 @@ from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import Course
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.source import Source
 
 if TYPE_CHECKING:  # a course without reports needs none of it

@@ -29,7 +29,7 @@ from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.kept import kept_font
 from coursebuild.pipeline.options import Options

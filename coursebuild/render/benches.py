@@ -49,8 +49,7 @@ def bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_text(page: PageContext, block: Bench) -> tuple[Markup, str]:
     """The block without its plot, and what is to be seen in the plot."""
-    from coursebuild.numerics.reports.points import chart, telling
-    from coursebuild.numerics.reports.words import described
+    from coursebuild.numerics.reports.points import chart, described, telling
 
     report = _shown(page, block).report
     quantity = None if report is None or "plot" not in block.shows else telling(report)

@@ -31,7 +31,7 @@ from coursebuild.model import (
     document_inlines,
 )
 from coursebuild.model import document_scripts as document_scripts
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.patterns import pattern
 from coursebuild.render.asked import AskedBy
 from coursebuild.render.asked import asked as asked_in

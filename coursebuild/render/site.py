@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from msgspec import Struct, field
 
 from coursebuild.model import Course
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible

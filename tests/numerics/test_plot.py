@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.drawing.marks import text_width
-from coursebuild.drawing.symbols import colour, cross, dash, mark
 from coursebuild.numerics.reports.bench import ScenarioReport, StableRow
 from coursebuild.numerics.reports.plot import STYLE, plot_svg
 from coursebuild.numerics.reports.points import chart, quantities, telling
+from coursebuild.numerics.reports.strokes import colour, cross, dash, mark
 from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")

@@ -109,7 +109,7 @@ def test_where_a_report_is() -> None:
         ),
         (
             GOOD.replace(b'{"attitude"', b'{"x": 1, "attitude"', 1),
-            "is damaged: unknown field at `$.scene.scenarios[0].orders[0].x`",
+            "is damaged: object contains unknown field `x` - at `$.scene.scenarios[0].orders[0]`",
         ),
         (
             GOOD.replace(b'"better": 13', b'"better": 18'),

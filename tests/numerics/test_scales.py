@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coursebuild.drawing.marks import Box, apart, clear_place, markup_text, text_width
 from coursebuild.drawing.scales import decades, log_ticks, number_text, power_text
-from coursebuild.drawing.symbols import cross, dash, mark
+from coursebuild.numerics.reports.strokes import cross, dash, mark
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.problem import INTEGRATORS, Integrator, Problem
 from coursebuild.numerics.problems import all_problems, problem_named
-from coursebuild.numerics.problems.damped_spring import rk4_factor, rk4_limit
+from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.stability import attempt, boundaries, boundary
 
 pytestmark = pytest.mark.site

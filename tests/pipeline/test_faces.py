@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.checks.course import check_course
 from coursebuild.model import Course, Document
 from coursebuild.model.skeleton import skeleton
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.faces import course_face, outline_face, results_face
 from coursebuild.render.lookup.lexicon import lexicon
 from coursebuild.render.page_list import page_list
@@ -139,7 +139,7 @@ _PRINTED = """
 import sys
 {first}
 from coursebuild.pipeline.faces import results_face
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.results import Outcome, Results, ScriptRun
 run = ScriptRun("a.py", Outcome.OK, 0, "one", "", 0.0)
 print(results_face(Results((run,), (), (), (), "3", "3"), Reports()))

@@ -7,7 +7,7 @@ import re
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.render import SiteOptions
 from coursebuild.render.figures import bounded, exact, factor, percent, power, sentence, size
 from support.model_reports import box, case, diet, finding, reports, row, scenario, scene

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from coursebuild.numerics.reports import Reports
 from coursebuild.numerics.reports.bench import OrderRow, SceneCard, SceneReport
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
@@ -19,7 +20,6 @@ from coursebuild.numerics.reports.diet import (
     Place,
     Saving,
 )
-from coursebuild.numerics.reports.shown import Reports
 from support.bench_reports import MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

@@ -10,17 +10,14 @@ from functools import cache
 from coursebuild.numerics.problem import Problem
 from coursebuild.numerics.problems import (
     chains,
-    damped_spring,
     double_pendulum,
-    heavy_top,
     impact,
     incline,
+    oscillators,
     pendulum,
     projectile,
     scales,
-    soft_equality,
     stack,
-    stiff_servo,
     tops,
     touching_cradle,
     tumbling_box,
@@ -30,23 +27,21 @@ from coursebuild.numerics.problems import (
 @cache
 def all_problems() -> tuple[Problem, ...]:
     """Every hard case, by its number."""
-    return (
+    found = (
         tumbling_box.problem(),
         *pendulum.problems(),
         *tops.problems(),
-        heavy_top.problem(),
         projectile.problem(),
-        *damped_spring.problems(),
-        *stiff_servo.problems(),
         *incline.problems(),
         *impact.problems(),
         touching_cradle.problem(),
         *stack.problems(),
         double_pendulum.problem(),
         *chains.problems(),
-        *soft_equality.problems(),
+        *oscillators.problems(),
         *scales.problems(),
     )
+    return tuple(sorted(found, key=lambda problem: problem.case))
 
 
 def problem_names() -> tuple[str, ...]:

@@ -20,8 +20,8 @@ from msgspec import Struct
 from coursebuild.numerics.forward import forward_motion
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario
-from coursebuild.numerics.problems.common import NO_CONTACT, motion_without_attitude
-from mjcourse.spatial import quat_conj, quat_mul, quat_rotate
+from coursebuild.numerics.problems.common import NO_CONTACT, model_text, motion_without_attitude
+from mjcourse.spatial import quat_conj, quat_mul, quat_rotate, skew
 
 GRAVITY = 9.81
 
@@ -56,10 +56,7 @@ class Chain(Struct, frozen=True):
                 f'<inertial pos="0 0 -{self.length!r}" mass="{mass!r}" diaginertia="{i}"/>'
                 f"{body}</body>\n"
             )
-        return (
-            f'<mujoco>\n<option gravity="0 0 -{GRAVITY}">{NO_CONTACT}</option>\n'
-            f"<worldbody>\n{body}</worldbody>\n</mujoco>\n"
-        )
+        return model_text(body, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
 
     def scenario(self, duration: float, sample: float) -> Scenario:
         """Bent at the first joint, and for ball joints spinning there."""
@@ -141,7 +138,7 @@ def _spatial_accelerations(chain: Chain, masses: Array, arm: Array, omega: Array
     known = np.zeros(3 * count)
     for i in range(count):
         at = slice(3 * i, 3 * i + 3)
-        cross = _cross(arm[i])
+        cross = skew(arm[i])
         matrix[at, at] += np.eye(3) / masses[i] - cross @ cross / chain.inertia
         if i + 1 < count:
             matrix[at, slice(3 * i + 3, 3 * i + 6)] -= np.eye(3) / masses[i]
@@ -155,11 +152,6 @@ def _spatial_accelerations(chain: Chain, masses: Array, arm: Array, omega: Array
     force = np.linalg.solve(matrix, known).reshape(count, 3)
     alpha: Array = np.cross(-arm, force) / chain.inertia
     return alpha
-
-
-def _cross(v: Array) -> Array:
-    x, y, z = v.tolist()
-    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 CHAINS = {

@@ -31,7 +31,7 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import NO_CONTACT, motion_without_attitude
+from coursebuild.numerics.problems.common import NO_CONTACT, model_text, motion_without_attitude
 
 START = (2.0, 0.5)
 """Angle of the upper joint and of the lower one relative to it, rad."""
@@ -40,21 +40,15 @@ _GRAVITY, _INERTIA = "9.81", "0.01"
 """m/s², and kg m² of each bob about its centre; masses are 1 kg, lengths 1 m."""
 _HORIZON_ERROR = 0.1
 
-MJCF = f"""\
-<mujoco>
-  <option gravity="0 0 -{_GRAVITY}">{NO_CONTACT}</option>
-  <worldbody>
-    <body>
-      <joint type="hinge" axis="0 1 0"/>
-      <inertial pos="0 0 -1" mass="1" diaginertia="{_INERTIA} {_INERTIA} {_INERTIA}"/>
-      <body pos="0 0 -1">
-        <joint type="hinge" axis="0 1 0"/>
-        <inertial pos="0 0 -1" mass="1" diaginertia="{_INERTIA} {_INERTIA} {_INERTIA}"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+_LINK = (
+    '<joint type="hinge" axis="0 1 0"/>'
+    f'<inertial pos="0 0 -1" mass="1" diaginertia="{_INERTIA} {_INERTIA} {_INERTIA}"/>'
+)
+MJCF = model_text(
+    f'    <body>{_LINK}<body pos="0 0 -1">{_LINK}</body></body>',
+    f'gravity="0 0 -{_GRAVITY}"',
+    NO_CONTACT,
+)
 
 
 def exact(times: Array) -> Motion:

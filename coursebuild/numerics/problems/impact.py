@@ -15,7 +15,6 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
@@ -26,7 +25,13 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import NO_GRAVITY, motion_without_attitude
+from coursebuild.numerics.problems.common import (
+    NO_GRAVITY,
+    divisions,
+    model_text,
+    motion_without_attitude,
+    simulated,
+)
 
 RATE = 1000.0
 """√stiffness, rad/s."""
@@ -42,38 +47,25 @@ _LENGTHS = 4
 not."""
 
 _GEOM = f'condim="1" solref="{-(RATE**2)!r} 0" solimp="{IMPEDANCE} {IMPEDANCE} 0.001 0.5 2"'
-_OPTION = f'<option {NO_GRAVITY} tolerance="0"/>'
+_OPTION = f'{NO_GRAVITY} tolerance="0"'
 
 
 def _ball(at: float) -> str:
-    return f"""\
-    <body pos="{at!r} 0 0">
-      <joint type="slide" axis="1 0 0"/>
-      <geom size="{RADIUS}" mass="1" {_GEOM}/>
-    </body>
-"""
+    joint, geom = '<joint type="slide" axis="1 0 0"/>', f'<geom size="{RADIUS}" mass="1" {_GEOM}/>'
+    return f'    <body pos="{at!r} 0 0">{joint}{geom}</body>'
 
 
-BOUNCE = f"""\
-<mujoco>
-  {_OPTION}
-  <worldbody>
-    <geom type="plane" size="1 1 1" pos="{RADIUS + GAP!r} 0 0" zaxis="-1 0 0" {_GEOM}/>
-{_ball(0.0)}  </worldbody>
-</mujoco>
-"""
+BOUNCE = model_text(
+    f'    <geom type="plane" size="1 1 1" pos="{RADIUS + GAP!r} 0 0" zaxis="-1 0 0" {_GEOM}/>\n'
+    + _ball(0.0),
+    _OPTION,
+)
 
 
 def cradle_mjcf(gaps: tuple[float, ...]) -> str:
     """Balls on one line, with these gaps (m) between them."""
     starts = [sum(gaps[:index]) + 2 * RADIUS * index for index in range(len(gaps) + 1)]
-    return f"""\
-<mujoco>
-  {_OPTION}
-  <worldbody>
-{"".join(_ball(at) for at in starts)}  </worldbody>
-</mujoco>
-"""
+    return model_text("\n".join(_ball(at) for at in starts), _OPTION)
 
 
 CRADLE = cradle_mjcf((GAP, GAP))
@@ -206,21 +198,17 @@ def restitution(integrator: Integrator, steps: int) -> float:
 def _back(integrator: Integrator, length: float, phase: float) -> float:
     """The restitution where a contact lasts `length` steps and begins at `phase` of one."""
     timestep = CONTACT / length
-    model = compiled(BOUNCE, integrator, timestep)
-    data = initial_data(problems()[0], model)
-    data.qpos[0] = GAP - SPEED * timestep * (2 + phase)
-    advance(model, data, 3 * math.ceil(length) + 8)
+    start = GAP - SPEED * timestep * (2 + phase)
+    scenario = Scenario(0.1, 0.01, (start,), (SPEED,))
+    data = simulated(BOUNCE, scenario, integrator, timestep, 3 * math.ceil(length) + 8)
     return -float(data.qvel[0]) / SPEED
 
 
 def passed_on(integrator: Integrator, steps: int) -> float:
     """The velocity of the cradle's last ball after everything, m/s."""
-    one = problems()[1]
     timestep = CONTACT / steps
-    model = compiled(CRADLE, integrator, timestep)
-    data = initial_data(one, model)
-    advance(model, data, round(0.13 / timestep))
-    return float(data.qvel[2])
+    scenario = problems()[1].scenario
+    return float(simulated(CRADLE, scenario, integrator, timestep, round(0.13 / timestep)).qvel[2])
 
 
 def _restitutions() -> tuple[ScalarCheck, ...]:
@@ -253,7 +241,7 @@ def problems() -> tuple[Problem, ...]:
             second=Reference(
                 "ode", "Bulirsch–Stoer until the force ends", bounce_integrated, floor=1e-12
             ),
-            timesteps=tuple(0.01 / n for n in (16, 32, 64, 128, 256, 512)),
+            timesteps=divisions(0.01, 16, 32, 64, 128, 256, 512),
             checks=_restitutions(),
             smooth=False,
             note="an impact begins within a step: no order is to be expected",
@@ -272,7 +260,7 @@ def problems() -> tuple[Problem, ...]:
             second=Reference(
                 "ode", "from contact to contact, Bulirsch–Stoer", cradle_integrated, floor=1e-12
             ),
-            timesteps=tuple(0.01 / n for n in (16, 32, 64, 128, 256, 512)),
+            timesteps=divisions(0.01, 16, 32, 64, 128, 256, 512),
             checks=(
                 ScalarCheck(
                     "velocity of the last ball, 20 steps in a contact",

@@ -16,7 +16,6 @@ from typing import Literal
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
@@ -27,6 +26,7 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
+from coursebuild.numerics.problems.common import model_text, simulated
 
 GRAVITY = 9.81
 SLIDING, STICKING, ROLLING = math.radians(45), math.radians(15), math.radians(20)
@@ -36,6 +36,7 @@ _CONES: tuple[Cone, ...] = ("elliptic", "pyramidal")
 _HALF, _WIDE = 0.05, 0.2
 """m; a block as high as it is wide would rock."""
 _STEP = 1e-3
+_SCENARIO = Scenario(1.0, 0.1)
 
 
 def mjcf(shape: str, slope: float, across: bool, cone: Cone, friction: float) -> str:
@@ -45,35 +46,27 @@ def mjcf(shape: str, slope: float, across: bool, cone: Cone, friction: float) ->
     z = -GRAVITY * math.cos(slope)
     size = f"{_WIDE} {_WIDE} {_HALF}" if shape == "box" else f"{_HALF}"
     contact = f'condim="3" friction="{friction} 0.005 0.0001"'
-    return f"""\
-<mujoco>
-  <option gravity="{x!r} {y!r} {z!r}" cone="{cone}" tolerance="0" iterations="100"/>
-  <worldbody>
-    <geom type="plane" size="10 10 1" {contact}/>
-    <body pos="0 0 {_HALF}">
-      <freejoint/>
-      <geom type="{shape}" size="{size}" mass="1" {contact}/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+    option = f'gravity="{x!r} {y!r} {z!r}" cone="{cone}" tolerance="0" iterations="100"'
+    plane = f'    <geom type="plane" size="10 10 1" {contact}/>'
+    geom = f'<geom type="{shape}" size="{size}" mass="1" {contact}/>'
+    body = f'    <body pos="0 0 {_HALF}"><freejoint/>{geom}</body>'
+    return model_text(f"{plane}\n{body}", option)
 
 
 def acceleration(text: str, integrator: Integrator) -> float:
     """Along the slope, m/s²: from 0.5 s, when the contact has settled, to 1 s, at 1 ms."""
-    model = compiled(text, integrator, _STEP)
-    data = initial_data(_sliding("elliptic", False), model)
-    advance(model, data, round(0.5 / _STEP))
-    before = math.hypot(data.qvel[0], data.qvel[1])
-    advance(model, data, round(0.5 / _STEP))
-    return (math.hypot(data.qvel[0], data.qvel[1]) - before) / 0.5
+    half, whole = (_speed(text, integrator, seconds) for seconds in (0.5, 1.0))
+    return (whole - half) / 0.5
 
 
 def creep(text: str, integrator: Integrator) -> float:
     """The velocity at which a block slips that should stick, m/s: after two seconds at 1 ms."""
-    model = compiled(text, integrator, _STEP)
-    data = initial_data(_sliding("elliptic", False), model)
-    advance(model, data, round(2.0 / _STEP))
+    return _speed(text, integrator, 2.0)
+
+
+def _speed(text: str, integrator: Integrator, seconds: float) -> float:
+    """Along the slope after so many seconds from rest, m/s."""
+    data = simulated(text, _SCENARIO, integrator, _STEP, round(seconds / _STEP))
     return math.hypot(data.qvel[0], data.qvel[1])
 
 
@@ -156,7 +149,7 @@ def _sliding(cone: Cone, across: bool) -> Problem:
         else f"Block sliding {said} of a {cone} cone",
         case=7,
         mjcf=text,
-        scenario=Scenario(1.0, 0.1),
+        scenario=_SCENARIO,
         position_bound=20.0,
         velocity_bound=20.0,
         reference=reference,
@@ -200,7 +193,7 @@ def _rolling(cone: Cone) -> Problem:
         title=f"Ball rolling, {cone} cone",
         case=7,
         mjcf=text,
-        scenario=Scenario(1.0, 0.1),
+        scenario=_SCENARIO,
         position_bound=20.0,
         velocity_bound=200.0,
         reference=reference,

@@ -19,7 +19,13 @@ import numpy as np
 from coursebuild.numerics.elliptic import jacobi
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario
-from coursebuild.numerics.problems.common import motion_without_attitude
+from coursebuild.numerics.problems.common import (
+    NO_CONTACT,
+    divisions,
+    model_text,
+    motion_without_attitude,
+    turning_at_rest,
+)
 from mjcourse.spatial import axis_angle_to_quat
 
 GRAVITY, LENGTH, MASS, INERTIA = 9.81, 1.0, 1.0, 0.01
@@ -37,18 +43,15 @@ def mjcf(kind: Kind) -> str:
         "ball": '<joint type="ball"/>',
         "connect": "<freejoint/>",
     }[kind]
+    inertia = f'diaginertia="{INERTIA} {INERTIA} {INERTIA}"'
+    inertial = f'<inertial pos="0 0 -{LENGTH}" mass="{MASS}" {inertia}/>'
     equality = '  <equality><connect body1="bob" anchor="0 0 0"/></equality>\n'
-    return f"""\
-<mujoco>
-  <option gravity="0 0 -{GRAVITY}"><flag contact="disable"/></option>
-  <worldbody>
-    <body name="bob">
-      {joint}
-      <inertial pos="0 0 -{LENGTH}" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>
-    </body>
-  </worldbody>
-{equality if kind == "connect" else ""}</mujoco>
-"""
+    return model_text(
+        f'    <body name="bob">{joint}{inertial}</body>',
+        f'gravity="0 0 -{GRAVITY}"',
+        NO_CONTACT,
+        equality if kind == "connect" else "",
+    )
 
 
 def swing(begin: float, times: Array) -> tuple[Array, Array]:
@@ -81,8 +84,7 @@ def _motion(
         turning = rate[:, None] * _AXIS
         if kind == "ball":
             return Motion(times, np.empty((len(times), 0)), attitude, turning)
-        still = np.zeros((len(times), 3))
-        return Motion(times, still, attitude, np.concatenate([still, turning], axis=1))
+        return turning_at_rest(times, attitude[:, 0], turning)
 
     return motion
 
@@ -118,7 +120,7 @@ def _problem(kind: Kind, degrees: int) -> Problem:
             _motion(kind, begin, integrated),
             floor=1e-13 * worse,
         ),
-        timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160)),
+        timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         search=None if kind == "connect" else (1e-3, 3.0),
         smooth=kind != "connect",
         energy_conserved=True,

@@ -7,10 +7,8 @@ Source: with v ← v + gh before x ← x + vh, x after n steps is x₀ + v₀nh 
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
@@ -21,25 +19,17 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import NO_CONTACT
+from coursebuild.numerics.problems.common import NO_CONTACT, divisions, model_text, simulated
 
 GRAVITY = 9.81
 """m/s²."""
 LAUNCH = (3.0, 0.0, 4.0)
 """m/s."""
 _STEP = 0.01
+_SCENARIO = Scenario(1.0, 0.1, qvel=(*LAUNCH, 0, 0, 0))
 
-MJCF = f"""\
-<mujoco>
-  <option gravity="0 0 -{GRAVITY}">{NO_CONTACT}</option>
-  <worldbody>
-    <body>
-      <freejoint/>
-      <geom size="0.05" mass="1"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+_STONE = '    <body><freejoint/><geom size="0.05" mass="1"/></body>'
+MJCF = model_text(_STONE, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
 
 
 def _motion(times: Array, place: Array, speed: Array) -> Motion:
@@ -67,13 +57,8 @@ def integrated(times: Array) -> Motion:
 
 def fall_error(integrator: Integrator) -> float:
     """Error of the height after a second at 10 ms, m: simulated less exact."""
-    one = problem()
-    model = compiled(MJCF, integrator, _STEP)
-    data = initial_data(one, model)
-    advance(model, data, round(one.scenario.duration / _STEP))
-    mujoco.mj_forward(model, data)
-    exact = parabola(np.array([one.scenario.duration])).position[0, 2]
-    return float(data.qpos[2] - exact)
+    data = simulated(MJCF, _SCENARIO, integrator, _STEP, round(1.0 / _STEP))
+    return float(data.qpos[2] - parabola(np.ones(1)).position[0, 2])
 
 
 def exact_error(integrator: Integrator) -> float:
@@ -88,12 +73,12 @@ def problem() -> Problem:
         title="Projectile",
         case=4,
         mjcf=MJCF,
-        scenario=Scenario(1.0, 0.1, qvel=(*LAUNCH, 0, 0, 0)),
+        scenario=_SCENARIO,
         position_bound=100.0,
         velocity_bound=100.0,
         reference=Reference("closed", "x = v₀t + gt²/2", parabola, floor=1e-15),
         second=Reference("ode", "Bulirsch–Stoer", integrated, floor=1e-14),
-        timesteps=tuple(0.1 / n for n in (5, 10, 20, 40, 80, 160)),
+        timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         energy_conserved=True,
         checks=(
             ScalarCheck(

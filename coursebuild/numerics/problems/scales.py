@@ -9,8 +9,8 @@ import math
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
@@ -24,8 +24,12 @@ from coursebuild.numerics.problem import (
 from coursebuild.numerics.problems.common import (
     NO_CONTACT,
     NO_GRAVITY,
+    divisions,
     free_body_motion,
+    model_text,
     motion_without_attitude,
+    simulated,
+    turning_at_rest,
 )
 from coursebuild.numerics.problems.tops import FreeTop
 from mjcourse.spatial import axis_angle_to_quat
@@ -37,61 +41,31 @@ FAR, CRAWL = 1e9, 1e-3
 _TURN = (3.0, 4.0, 12.0)
 """rad/s."""
 _GRAVITY = 9.81
+_FAR_AWAY = Scenario(1.0, 0.1, (FAR,), (CRAWL,))
 
-CUBE = f"""\
-<mujoco>
-  <option {NO_GRAVITY}>{NO_CONTACT}</option>
-  <worldbody>
-    <body>
-      <freejoint/>
-      <geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-RESTING = f"""\
-<mujoco>
-  <option gravity="0 0 -{_GRAVITY}"/>
-  <worldbody>
-    <geom type="plane" size="1 1 1"/>
-    <body pos="0 0 {EDGE / 2!r}">
-      <freejoint/>
-      <geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-DISTANT = f"""\
-<mujoco>
-  <option {NO_GRAVITY}>{NO_CONTACT}</option>
-  <worldbody>
-    <body>
-      <joint type="slide" axis="1 0 0"/>
-      <geom size="0.1" mass="1"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+_CUBE = f'<geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>'
+CUBE = model_text(f"    <body><freejoint/>{_CUBE}</body>", NO_GRAVITY, NO_CONTACT)
+RESTING = model_text(
+    '    <geom type="plane" size="1 1 1"/>\n'
+    f'    <body pos="0 0 {EDGE / 2!r}"><freejoint/>{_CUBE}</body>',
+    f'gravity="0 0 -{_GRAVITY}"',
+)
+DISTANT = model_text(
+    '    <body><joint type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>',
+    NO_GRAVITY,
+    NO_CONTACT,
+)
 PLATE_MOMENTS = (0.0833, 0.0833, 0.1667)
 """A square plate of 1 kg and 1 m: 1/12, 1/12, 1/6, with four digits; A + B is less than C."""
 
 
 def plate(moments: tuple[float, float, float], *, balance: bool = False) -> str:
     """A plate of 1 kg with these moments, kg m²."""
-    compiler = '<compiler balanceinertia="true"/>' if balance else ""
     a, b, c = moments
-    return f"""\
-<mujoco>
-  {compiler}
-  <option {NO_GRAVITY}>{NO_CONTACT}</option>
-  <worldbody>
-    <body>
-      <freejoint/>
-      <inertial pos="0 0 0" mass="1" diaginertia="{a!r} {b!r} {c!r}"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+    inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{a!r} {b!r} {c!r}"/>'
+    compiler = '  <compiler balanceinertia="true"/>\n' if balance else ""
+    world = f"    <body><freejoint/>{inertial}</body>"
+    return model_text(world, NO_GRAVITY, NO_CONTACT, compiler)
 
 
 def plate_error() -> str:
@@ -111,26 +85,19 @@ def _axial_moment(_: Integrator) -> float:
 def steady(times: Array) -> Motion:
     """A cube turns about any axis at a constant rate."""
     omega = np.array(_TURN)
-    rate = float(np.linalg.norm(omega))
-    still = np.zeros((len(times), 3))
-    attitude = axis_angle_to_quat(omega / rate, rate * times)
-    velocity = np.concatenate([still, still + omega], axis=1)
-    return Motion(times, still, attitude[:, None], velocity)
+    attitude = axis_angle_to_quat(omega, float(np.linalg.norm(omega)) * times)
+    return turning_at_rest(times, attitude, np.tile(omega, (len(times), 1)))
 
 
 def sunk(integrator: Integrator) -> float:
     """How deep the resting cube lies in the floor, relative to its edge, after 1 s at 1 ms."""
-    model = compiled(RESTING, integrator, 1e-3)
-    data = mujoco.MjData(model)
-    advance(model, data, 1000)
+    data = simulated(RESTING, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
     return float((EDGE / 2 - data.qpos[2]) / EDGE)
 
 
 def crawled(integrator: Integrator, timestep: float) -> float:
     """How far the distant body went in a second, m."""
-    model = compiled(DISTANT, integrator, timestep)
-    data = initial_data(problems()[1], model)
-    advance(model, data, round(1.0 / timestep))
+    data = simulated(DISTANT, _FAR_AWAY, integrator, timestep, round(1.0 / timestep))
     return float(data.qpos[0] - FAR)
 
 
@@ -170,7 +137,7 @@ def _cube() -> Problem:
             lambda times: free_body_motion(np.full(3, moment), np.array(_TURN), times),
             floor=1e-13,
         ),
-        timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
+        timesteps=divisions(0.05, 10, 20, 40, 80),
         checks=(
             ScalarCheck(
                 "how deep it rests in the floor, in edges",
@@ -193,13 +160,13 @@ def _distant() -> Problem:
         title="Body 1e9 m away",
         case=13,
         mjcf=DISTANT,
-        scenario=Scenario(1.0, 0.1, (FAR,), (CRAWL,)),
+        scenario=_FAR_AWAY,
         position_bound=2 * FAR,
         velocity_bound=1.0,
         reference=Reference("closed", "a uniform motion", _line, floor=spacing),
         second=Reference("ode", "Bulirsch–Stoer", _line_integrated, floor=spacing),
         agreement=10 * spacing,
-        timesteps=tuple(0.1 / n for n in (10, 100, 1000)),
+        timesteps=divisions(0.1, 10, 100, 1000),
         checks=tuple(
             ScalarCheck(
                 f"distance gone in 1 s at 1 mm/s, {timestep:g} s a step",
@@ -217,26 +184,19 @@ def _distant() -> Problem:
 
 
 def _plate() -> Problem:
-    exact = (1 / 12, 1 / 12, 1 / 6)
-    turn = (1.0, 2.0, 3.0)
+    exact = FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))
+    reference, second = exact.references()
     return Problem(
         name="flat-plate",
         title="Flat plate, A + B = C",
         case=13,
-        mjcf=plate(exact),
-        scenario=Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *turn)),
+        mjcf=plate((1 / 12, 1 / 12, 1 / 6)),
+        scenario=exact.scenario(),
         position_bound=1.5,
         velocity_bound=100.0,
-        reference=Reference(
-            "closed", "Goldstein, 5.6", FreeTop(exact[0], exact[2], turn).motion, floor=1e-13
-        ),
-        second=Reference(
-            "ode",
-            "Euler's equations and quaternions, Bulirsch–Stoer",
-            lambda times: free_body_motion(np.array(exact), np.array(turn), times),
-            floor=1e-13,
-        ),
-        timesteps=tuple(0.05 / n for n in (10, 20, 40, 80)),
+        reference=reference,
+        second=replace(second, floor=1e-13),
+        timesteps=divisions(0.05, 10, 20, 40, 80),
         checks=(
             ScalarCheck(
                 "axial moment of the plate with four digits, after balanceinertia",

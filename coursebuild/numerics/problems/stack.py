@@ -11,9 +11,10 @@ Source: MuJoCo documentation, Computation, Constraint model.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -23,7 +24,7 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import motion_without_attitude
+from coursebuild.numerics.problems.common import model_text, motion_without_attitude, simulated
 
 GRAVITY, RADIUS = 9.81, 0.1
 IMPEDANCE, TIMECONST = 0.99, 0.004
@@ -35,23 +36,14 @@ _SETTLED = 3.0
 def mjcf(ratio: float) -> str:
     """Two balls that slide up and down over a floor."""
     contact = f'condim="1" solref="{TIMECONST} 1" solimp="{IMPEDANCE} {IMPEDANCE} 0.001 0.5 2"'
-    balls = "".join(
-        f"""\
-    <body pos="0 0 {(2 * index + 1) * RADIUS!r}">
-      <joint type="slide" axis="0 0 1"/>
-      <geom size="{RADIUS}" mass="{mass!r}" {contact}/>
-    </body>
-"""
+    plane = f'    <geom type="plane" size="1 1 1" {contact}/>'
+    balls = [
+        f'    <body pos="0 0 {(2 * index + 1) * RADIUS!r}"><joint type="slide" axis="0 0 1"/>'
+        f'<geom size="{RADIUS}" mass="{mass!r}" {contact}/></body>'
         for index, mass in enumerate((1.0, ratio))
-    )
-    return f"""\
-<mujoco>
-  <option gravity="0 0 -{GRAVITY}" tolerance="0" iterations="200"/>
-  <worldbody>
-    <geom type="plane" size="1 1 1" {contact}/>
-{balls}  </worldbody>
-</mujoco>
-"""
+    ]
+    option = f'gravity="0 0 -{GRAVITY}" tolerance="0" iterations="200"'
+    return model_text("\n".join((plane, *balls)), option)
 
 
 def depths(ratio: float) -> Array:
@@ -81,23 +73,19 @@ def _resting(found: Array, times: Array) -> Motion:
     return motion_without_attitude(times, still + place, still)
 
 
-def _measured(integrator: Integrator, ratio: float) -> float:
-    one = _problem(ratio)
-    model = compiled(one.mjcf, integrator, 1e-3)
-    data = initial_data(one, model)
-    data.qpos[:] = 0
-    advance(model, data, round(_SETTLED / 1e-3))
+def _settled(integrator: Integrator, ratio: float) -> Any:
+    """`mjData` of the stack, let go without overlap and left to itself for a while."""
+    scenario = Scenario(1.0, 0.1, (0.0, 0.0))
+    return simulated(mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLED / 1e-3))
+
+
+def _sunk(integrator: Integrator, ratio: float) -> float:
     # Not what the contacts say, which the collision of balls that passed each other would hide.
-    return float(-data.qpos[1])
+    return float(-_settled(integrator, ratio).qpos[1])
 
 
 def _speed(integrator: Integrator, ratio: float) -> float:
-    one = _problem(ratio)
-    model = compiled(one.mjcf, integrator, 1e-3)
-    data = initial_data(one, model)
-    data.qpos[:] = 0
-    advance(model, data, round(_SETTLED / 1e-3))
-    return float(np.max(np.abs(data.qvel)))
+    return float(np.max(np.abs(_settled(integrator, ratio).qvel)))
 
 
 def problems() -> tuple[Problem, ...]:
@@ -133,7 +121,7 @@ def _problem(ratio: float) -> Problem:
                 f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
                 "m",
                 lambda _: float(rest.sum()),
-                lambda integrator: _measured(integrator, ratio),
+                lambda integrator: _sunk(integrator, ratio),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
             ScalarCheck(

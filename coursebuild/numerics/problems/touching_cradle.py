@@ -21,7 +21,6 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
@@ -32,7 +31,7 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import motion_without_attitude
+from coursebuild.numerics.problems.common import divisions, motion_without_attitude, simulated
 from coursebuild.numerics.problems.impact import (
     CONTACT,
     GAP,
@@ -159,12 +158,9 @@ def _event(depth: Array, rate: Array, touching: Array, within: float) -> float:
 
 def last_velocity(integrator: Integrator, ball: int, steps: int = 80) -> float:
     """The velocity of a ball after everything, m/s."""
-    one = problem()
-    timestep = CONTACT / steps
-    model = compiled(one.mjcf, integrator, timestep)
-    data = initial_data(one, model)
-    advance(model, data, round(one.scenario.duration / timestep))
-    return float(data.qvel[ball])
+    one, timestep = problem(), CONTACT / steps
+    count = round(one.scenario.duration / timestep)
+    return float(simulated(one.mjcf, one.scenario, integrator, timestep, count).qvel[ball])
 
 
 def _figure(ball: int, name: str) -> ScalarCheck:
@@ -193,7 +189,7 @@ def problem() -> Problem:
         second=Reference(
             "closed", "from event to event, by eigenvectors", from_event_to_event, floor=1e-12
         ),
-        timesteps=tuple(0.002 / n for n in (16, 32, 64, 128)),
+        timesteps=divisions(0.002, 16, 32, 64, 128),
         checks=(_figure(0, "first"), _figure(1, "middle"), _figure(2, "last")),
         smooth=False,
         note="all contacts act at once: the last ball does not take over the whole velocity",

@@ -1,4 +1,36 @@
-"""What was measured on MuJoCo, as values: they are kept, printed and drawn, and shown on pages.
+"""What was measured, as values: it is kept, printed and drawn, and shown on pages.
 
-`cases`: the hard cases. `bench`: speed against error of a model's scenarios. Nothing here measures.
+Entry points: `Reports`, those that a course's pages may show. `bench`: speed against error of a
+model; `cases`: the hard cases; `diet`: what a model can be without. `records`: reports as files;
+`departures`: how two differ; `points`, `layout`, `plot`: the work–precision plot. Nothing here
+measures.
 """
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from msgspec import Struct, field
+
+if TYPE_CHECKING:  # a course without reports needs none of it
+    from coursebuild.numerics.reports.bench import SceneReport
+    from coursebuild.numerics.reports.cases import CaseReport
+    from coursebuild.numerics.reports.diet import DietReport
+
+
+class Record(Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of a report, which can be kept as JSON.
+
+    No number is infinite or missing by a code of its own: `None` stands for what is not there, and
+    a field beside it says why.
+    """
+
+
+class Reports(Struct, frozen=True):
+    """What was recorded of a course, and fits it as it is."""
+
+    scenes: Mapping[str, SceneReport] = field(default_factory=dict)
+    """By the model's name, as `diets`."""
+    diets: Mapping[str, DietReport] = field(default_factory=dict)
+    cases: tuple[CaseReport, ...] = ()

@@ -1,17 +1,14 @@
 """What was measured on a model: speed against error in each of its scenarios.
 
 Entry point: `SceneReport`.
-
-No number is infinite or missing by a code of its own: `None` stands for what is not there, and a
-field beside it says why, so that it can be kept as JSON.
 """
 
 from __future__ import annotations
 
-from msgspec import Struct
+from coursebuild.numerics.reports import Record
 
 
-class Machine(Struct, frozen=True):
+class Machine(Record, frozen=True):
     """Where it was measured; times mean nothing without it."""
 
     engine: str
@@ -24,7 +21,7 @@ class Machine(Struct, frozen=True):
     """What the processor calls itself; empty where it does not say."""
 
 
-class Setting(Struct, frozen=True):
+class Setting(Record, frozen=True):
     """What can be chosen without changing the scene."""
 
     integrator: str
@@ -39,7 +36,7 @@ class Setting(Struct, frozen=True):
     """As MJCF names it; empty where nothing can touch."""
 
 
-class WorkPrecisionRow(Struct, frozen=True):
+class WorkPrecisionRow(Record, frozen=True):
     """One setting in one scenario. Errors are the largest over the horizon, and at its end."""
 
     setting: Setting
@@ -94,7 +91,7 @@ class WorkPrecisionRow(Struct, frozen=True):
     """Relative standard error of the cost."""
 
 
-class OrderRow(Struct, frozen=True):
+class OrderRow(Record, frozen=True):
     """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
 
     integrator: str
@@ -103,7 +100,7 @@ class OrderRow(Struct, frozen=True):
     velocity: float | None
 
 
-class StableRow(Struct, frozen=True):
+class StableRow(Record, frozen=True):
     """The largest stable timestep of an integrator in a scenario."""
 
     integrator: str
@@ -115,7 +112,7 @@ class StableRow(Struct, frozen=True):
     """The timesteps between which was looked, s."""
 
 
-class Verdict(Struct, frozen=True):
+class Verdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
     on_front: bool
@@ -131,7 +128,7 @@ class Verdict(Struct, frozen=True):
     """The same in a sentence or two."""
 
 
-class ScenarioReport(Struct, frozen=True):
+class ScenarioReport(Record, frozen=True):
     """Everything that was measured in a scenario."""
 
     name: str
@@ -169,7 +166,7 @@ class ScenarioReport(Struct, frozen=True):
     """What to know when reading the figures, in words."""
 
 
-class SceneCard(Struct, frozen=True):
+class SceneCard(Record, frozen=True):
     """What a model is made of, and how fast the browser's engine runs it."""
 
     bodies: int
@@ -190,7 +187,7 @@ class SceneCard(Struct, frozen=True):
     begins; `None` where it was not measured."""
 
 
-class SceneReport(Struct, frozen=True):
+class SceneReport(Record, frozen=True):
     """Everything that was measured on a model."""
 
     model: str

@@ -1,19 +1,15 @@
 """What was measured on a hard case.
 
 Entry point: `CaseReport`.
-
-No number is infinite or missing by a code of its own: `None` stands for what is not there, and a
-field beside it says why, so that it can be kept as JSON.
 """
 
 from __future__ import annotations
 
-from msgspec import Struct
-
+from coursebuild.numerics.reports import Record
 from coursebuild.numerics.reports.bench import OrderRow
 
 
-class BoundaryLine(Struct, frozen=True):
+class BoundaryLine(Record, frozen=True):
     """The largest stable timestep of an integrator."""
 
     integrator: str
@@ -37,7 +33,7 @@ class BoundaryLine(Struct, frozen=True):
     """The timesteps between which was looked, s."""
 
 
-class FigureLine(Struct, frozen=True):
+class FigureLine(Record, frozen=True):
     """A quantity that was measured and is known."""
 
     name: str
@@ -50,7 +46,7 @@ class FigureLine(Struct, frozen=True):
     source: str
 
 
-class ErrorLine(Struct, frozen=True):
+class ErrorLine(Record, frozen=True):
     """One run against the reference. Errors are the largest over the duration, and at its end."""
 
     integrator: str
@@ -73,7 +69,7 @@ class ErrorLine(Struct, frozen=True):
     """Whether constraints were softened because the timestep is long: it is another model."""
 
 
-class ReferenceLine(Struct, frozen=True):
+class ReferenceLine(Record, frozen=True):
     """What the errors were measured against."""
 
     kind: str
@@ -86,7 +82,7 @@ class ReferenceLine(Struct, frozen=True):
     """The largest difference of the two."""
 
 
-class CaseReport(Struct, frozen=True):
+class CaseReport(Record, frozen=True):
     """Everything that was measured on a hard case."""
 
     name: str

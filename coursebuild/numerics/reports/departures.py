@@ -19,6 +19,7 @@ from msgspec import Struct
 
 from coursebuild.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import (
+    OrderRow,
     ScenarioReport,
     SceneReport,
     Setting,
@@ -194,10 +195,7 @@ def _scenario(comparing: _Comparing, old: ScenarioReport, new: ScenarioReport) -
         one = comparing.of(setting_text(setting))
         if one.both("setting", before, after) and before is not None and after is not None:
             _row(one, before, after, least, known=known)
-    for name, first, last in _pairs(old.orders, new.orders, lambda row: row.integrator):
-        for part in ("position", "attitude", "velocity"):
-            a, b = (None if row is None else getattr(row, part) for row in (first, last))
-            comparing.of(name).order(part, a, b)
+    _orders(comparing, old.orders, new.orders)
     for name, limit, now in _pairs(old.stable, new.stable, lambda row: row.integrator):
         one = comparing.of(name)
         if one.both("largest stable timestep", limit, now) and limit and now:
@@ -232,6 +230,13 @@ def _row(
     comparing.near("slip", old.slip, new.slip, share, _ROUNDING)
 
 
+def _orders(comparing: _Comparing, old: Sequence[OrderRow], new: Sequence[OrderRow]) -> None:
+    for name, first, last in _pairs(old, new, lambda row: row.integrator):
+        for part in ("position", "attitude", "velocity"):
+            a, b = (None if row is None else getattr(row, part) for row in (first, last))
+            comparing.of(name).order(part, a, b)
+
+
 def _largest(
     comparing: _Comparing, old: StableRow | BoundaryLine, new: StableRow | BoundaryLine
 ) -> None:
@@ -263,10 +268,7 @@ def _case(comparing: _Comparing, old: CaseReport, new: CaseReport) -> None:
         one = comparing.of(name)
         if one.both(figure, first, last) and first and last:
             _figure(one, first, last, least)
-    for name, fitted, again in _pairs(old.orders, new.orders, lambda line: line.integrator):
-        for part in ("position", "attitude", "velocity"):
-            a, b = (None if line is None else getattr(line, part) for line in (fitted, again))
-            comparing.of(name).order(part, a, b)
+    _orders(comparing, old.orders, new.orders)
 
     def run_of(line: ErrorLine) -> tuple[str, float]:
         return line.integrator, line.timestep

@@ -1,15 +1,11 @@
 """What a model holds that its scenarios do not need.
 
 Entry point: `DietReport`.
-
-No number is infinite or missing by a code of its own: `None` stands for what is not there, so that
-it can be kept as JSON.
 """
 
 from __future__ import annotations
 
-from msgspec import Struct
-
+from coursebuild.numerics.reports import Record
 from coursebuild.numerics.reports.bench import Machine
 
 IDENTICAL = "bit-identical"
@@ -21,7 +17,7 @@ CHANGES = "changes the result"
 LABELS = (IDENTICAL, EQUAL, UNTOUCHED, CHANGES)
 
 
-class Place(Struct, frozen=True):
+class Place(Record, frozen=True):
     """An element of the model."""
 
     name: str
@@ -36,7 +32,7 @@ class Place(Struct, frozen=True):
     """From 1, in characters."""
 
 
-class TextEdit(Struct, frozen=True):
+class TextEdit(Record, frozen=True):
     """A part of a file replaced."""
 
     path: str
@@ -49,7 +45,7 @@ class TextEdit(Struct, frozen=True):
     new: str
 
 
-class Saving(Struct, frozen=True):
+class Saving(Record, frozen=True):
     """What a change saves; times are those of one machine."""
 
     time: float | None
@@ -64,7 +60,7 @@ class Saving(Struct, frozen=True):
     """Bytes of the MJCF."""
 
 
-class Finding(Struct, frozen=True):
+class Finding(Record, frozen=True):
     """What a model could be without."""
 
     kind: str
@@ -101,7 +97,7 @@ class Finding(Struct, frozen=True):
         return not excused and self.label in (IDENTICAL, EQUAL)
 
 
-class Tried(Struct, frozen=True):
+class Tried(Record, frozen=True):
     """What could be left out and is no finding: it is needed, or saves no time."""
 
     kind: str
@@ -113,7 +109,7 @@ class Tried(Struct, frozen=True):
     """Why it was not run; empty where it was, and changed the result."""
 
 
-class DietScenario(Struct, frozen=True):
+class DietScenario(Record, frozen=True):
     """A scenario that the model was tried in."""
 
     name: str
@@ -123,7 +119,7 @@ class DietScenario(Struct, frozen=True):
     reasons: tuple[str, ...]
 
 
-class StaleKeep(Struct, frozen=True):
+class StaleKeep(Record, frozen=True):
     """An entry `[[keep]]` that keeps nothing any more."""
 
     finding: str
@@ -132,7 +128,7 @@ class StaleKeep(Struct, frozen=True):
     column: int
 
 
-class DietReport(Struct, frozen=True):
+class DietReport(Record, frozen=True):
     """Everything that was found in a model."""
 
     model: str

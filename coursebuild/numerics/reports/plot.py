@@ -19,17 +19,27 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from coursebuild.drawing.loglog import SIZE, TICK_SIZE, grid
 from coursebuild.drawing.marks import Box, apart, clear_place, markup_text, text_width
 from coursebuild.drawing.scales import number_text
-from coursebuild.drawing.symbols import colour, cross, dash
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.numerics.reports.layout import NARROW, ROW, WIDE, Lane, Layout, entry_width
+from coursebuild.numerics.reports.layout import (
+    NARROW,
+    ROW,
+    SIZE,
+    TICK_SIZE,
+    WIDE,
+    Lane,
+    Layout,
+    entry_width,
+    grid,
+)
 from coursebuild.numerics.reports.points import (
     Line,
     Point,
     Quantity,
     chart,
+    described,
+    point_title,
     seconds_text,
     setting_text,
     telling,
@@ -40,6 +50,9 @@ from coursebuild.numerics.reports.strokes import (
     OWN,
     RING,
     SMALL,
+    colour,
+    cross,
+    dash,
     halo,
     key_mark,
     leader,
@@ -47,7 +60,6 @@ from coursebuild.numerics.reports.strokes import (
     ring,
     symbol,
 )
-from coursebuild.numerics.reports.words import described, point_title
 
 _BOLD = 1.12
 """By what bold letters are wider."""

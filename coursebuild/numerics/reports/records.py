@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
+from coursebuild.numerics.reports import Record
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.diet import DietReport
@@ -50,7 +51,7 @@ class Failure(Struct, frozen=True):
     help: str = ""
 
 
-class _BenchFile(Struct, frozen=True):
+class _BenchFile(Record, frozen=True):
     """What a file of a model holds."""
 
     holds: str
@@ -58,7 +59,7 @@ class _BenchFile(Struct, frozen=True):
     scene: SceneReport
 
 
-class _StabilityFile(Struct, frozen=True):
+class _StabilityFile(Record, frozen=True):
     """What the file of the hard cases holds."""
 
     holds: str
@@ -66,7 +67,7 @@ class _StabilityFile(Struct, frozen=True):
     cases: tuple[CaseReport, ...]
 
 
-class _DietFile(Struct, frozen=True):
+class _DietFile(Record, frozen=True):
     """What the file of a model's diet holds."""
 
     holds: str
@@ -156,14 +157,10 @@ def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
         age = "an older" if form < FORM else "a newer"
         raise RecordError(f"was written by {age} version of this tool (form {form}, not {FORM})")
     try:
-        found = msgspec.convert(value, kind)
+        return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         text = str(error)
         raise RecordError(f"is damaged: {text[:1].lower()}{text[1:]}") from None
-    surplus = _surplus(value, msgspec.to_builtins(found), "$")
-    if surplus is not None:
-        raise RecordError(f"is damaged: unknown field at `{surplus}`")
-    return found
 
 
 def _json(data: bytes) -> Any:
@@ -178,23 +175,6 @@ def _json(data: bytes) -> Any:
             raise RecordError(f"is damaged: {what[:1].lower()}{what[1:]}") from None
         line = data.count(b"\n", 0, int(match[1])) + 1
         raise RecordError(f"is damaged: no JSON at line {line}") from None
-
-
-def _surplus(given: Any, known: Any, path: str) -> str | None:
-    """Where a value has a field that the report has not; `None` where nowhere."""
-    if isinstance(given, dict) and isinstance(known, dict):
-        for key, value in given.items():
-            if key not in known:
-                return f"{path}.{key}"
-            found = _surplus(value, known[key], f"{path}.{key}")
-            if found is not None:
-                return found
-    elif isinstance(given, list):
-        for n, (value, other) in enumerate(zip(given, known, strict=True)):
-            found = _surplus(value, other, f"{path}[{n}]")
-            if found is not None:
-                return found
-    return None
 
 
 # --- writing

@@ -27,7 +27,7 @@ from coursebuild.checks.links import Places, places
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.read import read_sources
 from coursebuild.model import Course, Document, Lesson
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.outlines import Task

@@ -30,7 +30,7 @@ from coursebuild.model import (
     Script,
     document_blocks,
 )
-from coursebuild.numerics.reports.shown import Reports
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.preview.memo import PerDocument
 from coursebuild.render.asked import asked
 from coursebuild.render.assets import Assets

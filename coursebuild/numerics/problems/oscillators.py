@@ -1,0 +1,265 @@
+"""Cases 5, 6 and 12: linear oscillators, whose largest stable timesteps are known.
+
+Entry point: `problems()`: a damped spring, a servo, and a soft equality constraint.
+
+1. *Damped spring.* Joint damping is implicit, unless `eulerdamp` is off.
+2. *Stiff servo*: a spring and damper that a `position` actuator makes. Its `kv` is not joint
+   damping: Euler takes it at the beginning of the step, and so is stable to a smaller timestep.
+3. *Soft equality.* With constant impedance d a constraint's acceleration is a = −d (b v + k d r),
+   where b = 2/(d · timeconst), k = 1/(d² timeconst² dampratio²) and r is the violation: an
+   oscillator with ω = 1/(timeconst · dampratio) and ζ = dampratio. All integrators but `discrete`
+   compute it from the state at the beginning of the step, the implicit ones too. `refsafe` would
+   raise the time constant to two timesteps and so hide the limit behind another model; it is off.
+
+Sources: for the semi-implicit method E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
+Integration, I.3; for the polynomial of the classical Runge–Kutta method E. Hairer, G. Wanner,
+Solving Ordinary Differential Equations II, IV.2; MuJoCo documentation, Constraint model.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+
+from coursebuild.numerics.integrate import State, bulirsch_stoer
+from coursebuild.numerics.problem import (
+    Array,
+    Integrator,
+    Limit,
+    Motion,
+    Problem,
+    Reference,
+    Scenario,
+)
+from coursebuild.numerics.problems.common import (
+    NO_CONTACT,
+    NO_GRAVITY,
+    divisions,
+    model_text,
+    motion_without_attitude,
+)
+
+START = (1.0, 5.0)
+"""m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
+BOUND = 1e4
+"""m: with a double root a stable state may grow a few hundred times before it decays."""
+SPRING_RATE, SERVO_RATE, EQUALITY_RATE = 10.0, 100.0, 50.0
+"""√(k/m), √(kp/m) and 1/(timeconst · dampratio), rad/s."""
+TARGETS, HOLD = (0.1, -0.05), 0.05
+"""Commands of the servo, m, and how long each holds, s."""
+
+
+def problems() -> tuple[Problem, ...]:
+    """Each oscillator with some damping ratios."""
+    return (
+        *(_spring(ratio) for ratio in (0.0, 0.1, 1.0, 10.0)),
+        *(_servo(ratio) for ratio in (0.1, 1.0, 10.0)),
+        *(_equality(ratio) for ratio in (0.1, 1.0)),
+    )
+
+
+# --------------------------------------------------------------------------------------- solutions
+
+
+def oscillation(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
+    """x″ + 2ζωx′ + ω²x = 0 from x0 (m) and v0 (m/s), at the times (n,) s."""
+    decay = ratio * rate
+    if ratio == 1.0:
+        fall, b = np.exp(-decay * times), v0 + decay * x0
+        place = fall * (x0 + b * times)
+        speed = fall * (b - decay * (x0 + b * times))
+    elif ratio < 1.0:
+        turn = rate * math.sqrt(1 - ratio**2)
+        fall, sine, cosine = np.exp(-decay * times), np.sin(turn * times), np.cos(turn * times)
+        place = fall * (x0 * cosine + (v0 + decay * x0) / turn * sine)
+        speed = fall * (v0 * cosine - (decay * v0 + rate**2 * x0) / turn * sine)
+    else:  # the slow root without the difference of large numbers
+        fast = -rate * (ratio + math.sqrt(ratio**2 - 1))
+        slow = rate**2 / fast
+        a, b = (fast * x0 - v0) / (fast - slow), (v0 - slow * x0) / (fast - slow)
+        place = a * np.exp(slow * times) + b * np.exp(fast * times)
+        speed = slow * a * np.exp(slow * times) + fast * b * np.exp(fast * times)
+    return motion_without_attitude(times, place[:, None], speed[:, None])
+
+
+def integrated(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
+    """The same by Bulirsch–Stoer."""
+
+    def slope(state: State) -> State:
+        x, v = state.tolist()
+        return np.array([v, -2 * ratio * rate * v - rate**2 * x])
+
+    states = bulirsch_stoer(slope, np.array([x0, v0]), times)
+    return motion_without_attitude(times, states[:, :1], states[:, 1:])
+
+
+def commanded(ratio: float, times: Array, *, closed: bool) -> Motion:
+    """The servo following its commands from rest at 0, at the times (n,) s.
+
+    In each hold it is an oscillator about its target, by the closed form or integrated.
+    """
+    form = oscillation if closed else integrated
+    x, v, begin = 0.0, 0.0, 0.0
+    place, speed = np.empty((len(times), 1)), np.empty((len(times), 1))
+    for index, target in enumerate(TARGETS):
+        last = index + 1 == len(TARGETS)
+        end = math.inf if last else begin + HOLD
+        here = (times > begin + 1e-12) & (times <= end + 1e-12)
+        until = max(HOLD, float(times[-1]) - begin) if last else HOLD
+        offsets = np.append(times[here] - begin, until)
+        part = form(ratio, SERVO_RATE, x - target, v, offsets)
+        place[here], speed[here] = part.position[:-1] + target, part.velocity[:-1]
+        if not last:
+            x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
+            begin = end
+    return motion_without_attitude(times, place, speed)
+
+
+def _references(
+    ratio: float, rate: float, source: str, *, floor: float
+) -> tuple[Reference, Reference]:
+    """The oscillator begun at `START`: its closed form, and an integration.
+
+    `floor` is for a rate of 1 rad/s: velocities are known worse by the rate.
+    """
+
+    def closed(times: Array) -> Motion:
+        return oscillation(ratio, rate, *START, times)
+
+    def second(times: Array) -> Motion:
+        return integrated(ratio, rate, *START, times)
+
+    return (
+        Reference("closed", source, closed, floor * rate),
+        Reference("ode", "Bulirsch–Stoer", second, 1e-13 * rate),
+    )
+
+
+# ------------------------------------------------------------------------------------------ limits
+
+
+def limit_of(ratio: float, rate: float, integrator: Integrator, *explicit: Integrator) -> Limit:
+    """The largest stable timestep of a damped oscillator.
+
+    `explicit` are the integrators that take its damping at the beginning of the step.
+    """
+    root = math.sqrt(ratio**2 + 1)
+    if integrator is Integrator.RK4:
+        return Limit(rk4_limit(ratio) / rate, "|1 + z + z²/2 + z³/6 + z⁴/24| = 1")
+    if integrator is Integrator.DISCRETE:
+        return Limit(math.inf, "implicit in positions and velocities")
+    if integrator in explicit:
+        return Limit(2 * (root - ratio) / rate, "hω = 2(√(ζ²+1) − ζ)")
+    return Limit(2 * (root + ratio) / rate, "hω = 2(√(ζ²+1) + ζ)")
+
+
+def rk4_limit(ratio: float) -> float:
+    """The first hω at which the Runge–Kutta method does not damp an oscillator."""
+    under = cmath.sqrt(ratio**2 - 1)
+    roots = (-ratio + under, -ratio - under)
+
+    def growth(z: float) -> float:
+        return max(abs(rk4_factor(root * z)) for root in roots)
+
+    low = high = 0.5 / (1 + ratio)
+    while growth(high) <= 1:
+        low, high = high, high * 1.01
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if growth(middle) <= 1 else (low, middle)
+    return low
+
+
+def rk4_factor(z: complex) -> complex:
+    """R(z): what a step of the classical Runge–Kutta method multiplies by, z = hλ."""
+    return 1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))
+
+
+# ---------------------------------------------------------------------------------------- problems
+
+
+def _spring(ratio: float) -> Problem:
+    rate, explicit = SPRING_RATE, Integrator.EULER_EXPLICIT
+    damper = f'stiffness="{rate**2!r}" damping="{2 * ratio * rate!r}"'
+    joint = f'<joint type="slide" axis="1 0 0" {damper}/>'
+    reference, second = _references(ratio, rate, "the linear oscillator", floor=1e-14)
+    return Problem(
+        name=f"damped-spring-{ratio:g}",
+        title=f"Damped spring, ζ = {ratio:g}",
+        case=5,
+        mjcf=model_text(_ball(joint), NO_GRAVITY, NO_CONTACT),
+        scenario=Scenario(1.0, 0.1, START[:1], START[1:]),
+        position_bound=BOUND,
+        velocity_bound=BOUND * rate * (1 + 4 * ratio),
+        reference=reference,
+        second=second,
+        timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
+        limit=lambda one: limit_of(ratio, rate, one, explicit),
+        energy_conserved=ratio == 0,
+        search=(1e-2 / rate, 1e2 / rate),
+    )
+
+
+def _servo(ratio: float) -> Problem:
+    rate, explicit = SERVO_RATE, (Integrator.EULER, Integrator.EULER_EXPLICIT)
+    gains = f'kp="{rate**2!r}" kv="{2 * ratio * rate!r}"'
+    motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
+    bound = BOUND / 10
+    return Problem(
+        name=f"stiff-servo-{ratio:g}",
+        title=f"Stiff servo, ζ = {ratio:g}",
+        case=6,
+        mjcf=model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor),
+        scenario=Scenario(2 * HOLD, 0.01, controls=tuple((x,) for x in TARGETS), hold=HOLD),
+        position_bound=bound,
+        velocity_bound=bound * rate * (1 + 4 * ratio),
+        reference=Reference(
+            "closed",
+            "the linear oscillator about each target",
+            lambda times: commanded(ratio, times, closed=True),
+            floor=1e-14 * rate,
+        ),
+        second=Reference(
+            "ode",
+            "Bulirsch–Stoer, begun anew at each command",
+            lambda times: commanded(ratio, times, closed=False),
+            floor=1e-13 * rate,
+        ),
+        timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
+        limit=lambda one: limit_of(ratio, rate, one, *explicit),
+        search=(1e-2 / rate, 1e2 / rate),
+    )
+
+
+def _equality(ratio: float) -> Problem:
+    rate, implicit = EQUALITY_RATE, (Integrator.RK4, Integrator.DISCRETE)
+    explicit = [one for one in Integrator if one not in implicit]
+    soft = f'solref="{1 / (rate * ratio)!r} {ratio!r}" solimp="0.9 0.9 0.001 0.5 2"'
+    equality = f'  <equality><joint joint1="slide" {soft}/></equality>\n'
+    flags = '<flag refsafe="disable" contact="disable"/>'
+    source = "the linear oscillator of the constraint"
+    reference, second = _references(ratio, rate, source, floor=1e-13)
+    return Problem(
+        name=f"soft-equality-{ratio:g}",
+        title=f"Soft equality as an oscillator, ζ = {ratio:g}, refsafe off",
+        case=12,
+        mjcf=model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality),
+        scenario=Scenario(0.2, 0.02, START[:1], START[1:]),
+        position_bound=BOUND,
+        velocity_bound=BOUND * rate * (1 + 4 * ratio),
+        reference=reference,
+        second=second,
+        timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
+        limit=lambda one: limit_of(ratio, rate, one, *explicit),
+        search=(1e-2 / rate, 1e1 / rate),
+    )
+
+
+_SLIDE = '<joint name="slide" type="slide" axis="1 0 0"/>'
+
+
+def _ball(joint: str) -> str:
+    """1 kg on a joint."""
+    return f'    <body>{joint}<geom size="0.1" mass="1"/></body>'
