@@ -11,11 +11,12 @@ from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, reason
 
-_PACKAGE = Path(__file__).parent.parent
+_PACKAGES = Path(__file__).parents[2]
+"""The folder in which `coursebuild` and `mjcourse` are."""
 
 
-def code_digest(*parts: str) -> str:
-    """A hash over packages and modules of the tool, such as `numerics` and `report/text.py`.
+def code_digest(*parts: str, root: Path = _PACKAGES) -> str:
+    """A hash over packages and modules, such as `mjcourse/spatial` and `coursebuild/results.py`.
 
     Raises:
         FileNotFoundError: the tool has no such part.
@@ -23,12 +24,12 @@ def code_digest(*parts: str) -> str:
     """
     digest = hashlib.sha256()
     for part in parts:
-        if not (_PACKAGE / part).exists():
+        if not (root / part).exists():
             raise FileNotFoundError(part)
     try:
-        for whole in (_PACKAGE / part for part in parts):
+        for whole in (root / part for part in parts):
             for path in (whole,) if whole.is_file() else sorted(whole.rglob("*.py")):
-                name = path.relative_to(_PACKAGE).as_posix()
+                name = path.relative_to(root).as_posix()
                 content = path.read_bytes()
                 digest.update(f"{name}\0{len(content)}\0".encode())
                 digest.update(content)

@@ -1,6 +1,6 @@
 """Speed against error of a model in its scenarios.
 
-Entry point: `measure_scene(model, declared, quick=…, clock=…, said=…)`.
+Entry point: `measure_scene(model, declared, quick=…, clock=…, tell=…)`.
 
 1. A first run in small steps says what acts in a scenario and how far it can be told (`pilot`).
 2. The reference is made, and made again in another way (`references`).
@@ -48,7 +48,7 @@ def measure_scene(
     *,
     quick: bool = False,
     clock: Clock | None,
-    said: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[ScenarioReport, ...]:
     """Measure a model (`mjModel`) in its scenarios.
 
@@ -57,13 +57,13 @@ def measure_scene(
         declared: what its author wrote of it, if anything.
         quick: fewer timesteps, fewer repeats.
         clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-        said: is told what is being done.
+        tell: is told what is being done.
 
     Raises:
         SceneError: a scenario does not fit the model, or diverges at every timestep.
     """
     return tuple(
-        measure_scenario(model, one, quick=quick, clock=clock, said=said)
+        measure_scenario(model, one, quick=quick, clock=clock, tell=tell)
         for one in scenes(model, declared, quick=quick)
     )
 
@@ -74,12 +74,12 @@ def measure_scenario(
     *,
     quick: bool = False,
     clock: Clock | None,
-    said: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> ScenarioReport:
     """Measure a model in one of its scenarios; see `measure_scene`."""
-    said(f"{scene.name}: a first run")
+    tell(f"{scene.name}: a first run")
     first = pilot(model, scene)
-    said(f"{scene.name}: the reference")
+    tell(f"{scene.name}: the reference")
     cones = references(model, first, quick=quick)
     own = own_setting(model, first)
     known = cones[own.cone].known
@@ -87,13 +87,13 @@ def measure_scenario(
     basis = Basis(model, first, own, cones, invariant, beyond)
     found = []
     for setting in settings(model, first, quick=quick):
-        said(f"{scene.name}: {words(setting)}")
+        tell(f"{scene.name}: {words(setting)}")
         found.append(measured(basis, setting))
     taken: list[Cost | None] = [None] * len(found)
     if clock is not None:
-        said(f"{scene.name}: times")
+        tell(f"{scene.name}: times")
         taken = _times(basis, found, clock, quick)
-    said(f"{scene.name}: stable timesteps")
+    tell(f"{scene.name}: stable timesteps")
     largest = stable(model, first, quick=quick)
     points = [_point(one.row, cost) for one, cost in zip(found, taken, strict=True)]
     placed = front(points)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from coursebuild.numerics.pruning.model_text import ModelText
 
 _KIND = "diet"
-_CODE = ("numerics", "pipeline/diet.py", "pipeline/diet_model.py")
+_CODE = ("coursebuild/numerics", "coursebuild/pipeline/diet_model.py", "mjcourse/spatial")
 _LOCK = "bench-lock"
 """The lock of `bench`: each would disturb the other's times."""
 _ROUNDS = 20

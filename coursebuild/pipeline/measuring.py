@@ -61,7 +61,7 @@ def measured(
                 loaded.scenarios[number],
                 quick=quick,
                 clock=time.thread_time_ns if timed else None,
-                said=tell,
+                tell=tell,
             )
     except SceneError as error:
         return _told(loaded.scene, error)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _SCENE, _SCENARIO = "bench", "bench-scenarios"
 """Kinds of what is kept."""
 _T = TypeVar("_T")
-_CODE = ("numerics", "pipeline/measuring.py", "pipeline/cards.py")
+_CODE = ("coursebuild/numerics", "coursebuild/pipeline/cards.py", "mjcourse/spatial")
 """What measures and says what was measured."""
 _LOCK = "bench-lock"
 

@@ -35,7 +35,7 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reports import command, read_record, write_record
 
 _KIND = "stability"
-_CODE = ("numerics",)
+_CODE = ("coursebuild/numerics", "mjcourse/spatial")
 """What measures and says what was measured."""
 
 

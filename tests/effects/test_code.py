@@ -6,27 +6,25 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import code
+from coursebuild.effects.code import code_digest
 
 
-def test_content_counts_and_times_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code, "_PACKAGE", tmp_path)
+def test_content_counts_and_times_do_not(tmp_path: Path) -> None:
     (tmp_path / "part" / "inner").mkdir(parents=True)
     module, other = tmp_path / "part" / "inner" / "a.py", tmp_path / "other.py"
     module.write_text("x = 1\n")
     other.write_text("y = 1\n")
-    first = code.code_digest("part")
+    first = code_digest("part", root=tmp_path)
     module.touch()
     other.write_text("y = 2\n")
-    assert code.code_digest("part") == first
-    both = code.code_digest("part", "other.py")
+    assert code_digest("part", root=tmp_path) == first
+    both = code_digest("part", "other.py", root=tmp_path)
     other.write_text("y = 3\n")
-    assert code.code_digest("part", "other.py") != both
+    assert code_digest("part", "other.py", root=tmp_path) != both
     module.rename(tmp_path / "part" / "a.py")
-    assert code.code_digest("part") != first
+    assert code_digest("part", root=tmp_path) != first
 
 
-def test_a_part_that_is_not_there_is_a_bug(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code, "_PACKAGE", tmp_path)
+def test_a_part_that_is_not_there_is_a_bug(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
-        code.code_digest("missing")
+        code_digest("missing", root=tmp_path)

@@ -89,7 +89,7 @@ def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
 
 def test_what_is_being_done_is_told() -> None:
     said: list[str] = []
-    measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=None, said=said.append)
+    measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=None, tell=said.append)
     assert said[:3] == [
         "keyframe-0: a first run",
         "keyframe-0: the reference",

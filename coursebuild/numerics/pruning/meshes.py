@@ -8,6 +8,7 @@ of it than one part in fifty of its size, and both have the same volume to that 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +20,7 @@ from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
 from coursebuild.numerics.pruning.edits import Edit, drop_attribute, set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.unused import asset_name
+from mjcourse.spatial import quat_conj, quat_rotate
 
 Points = NDArray[np.float64]
 
@@ -137,45 +139,39 @@ def _mesh(model: Any, geom: int) -> tuple[Points, float]:
     start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     corners = own[np.asarray(model.mesh_face[start : start + faces])]
     volume = float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
-    placed = own @ _matrix(model.geom_quat[geom]).T + model.geom_pos[geom]
-    return np.asarray(placed, dtype=np.float64), abs(volume)
+    return quat_rotate(model.geom_quat[geom], own) + model.geom_pos[geom], abs(volume)
 
 
 def _inside(model: Any, geom: int, points: Points) -> Points:
     """Points of the body's frame in that of a geom."""
-    return np.asarray((points - model.geom_pos[geom]) @ _matrix(model.geom_quat[geom]))
-
-
-def _matrix(quat: Any) -> Points:
-    flat = np.empty(9)
-    mujoco.mju_quat2Mat(flat, np.asarray(quat, dtype=np.float64))
-    return flat.reshape(3, 3)
+    return quat_rotate(quat_conj(model.geom_quat[geom]), points - model.geom_pos[geom])
 
 
 def _outside(shape: str, size: Points, points: Points) -> float:
     """How far the farthest point is outside of a primitive, m, or more."""
-    flat = np.hypot(points[:, 0], points[:, 1])
-    if shape == "box":
-        away = np.max(np.abs(points) - size, axis=1)
-    elif shape == "sphere":
-        away = np.linalg.norm(points, axis=1) - size[0]
-    elif shape == "cylinder":
-        away = np.maximum(flat - size[0], np.abs(points[:, 2]) - size[1])
-    elif shape == "capsule":
-        away = np.hypot(flat, np.maximum(np.abs(points[:, 2]) - size[1], 0.0)) - size[0]
-    else:
-        away = (np.linalg.norm(points / size, axis=1) - 1.0) * float(size.max())
+    flat, up = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
+    match shape:
+        case "box":
+            away = np.max(np.abs(points) - size, axis=1)
+        case "sphere":
+            away = np.linalg.norm(points, axis=1) - size[0]
+        case "cylinder":
+            away = np.maximum(flat - size[0], up - size[1])
+        case "capsule":
+            away = np.hypot(flat, np.maximum(up - size[1], 0.0)) - size[0]
+        case _:
+            away = (np.linalg.norm(points / size, axis=1) - 1.0) * float(size.max())
     return float(np.max(away))
 
 
 def _volume(shape: str, size: Points) -> float:
     """m³."""
-    if shape == "box":
-        return float(8 * np.prod(size))
-    if shape == "sphere":
-        return float(4 / 3 * np.pi * size[0] ** 3)
-    if shape == "cylinder":
-        return float(2 * np.pi * size[0] ** 2 * size[1])
-    if shape == "capsule":
-        return float(np.pi * size[0] ** 2 * (2 * size[1] + 4 / 3 * size[0]))
-    return float(4 / 3 * np.pi * np.prod(size))
+    a, b, c = size.tolist()
+    volumes = {
+        "box": 8 * a * b * c,
+        "sphere": 4 / 3 * math.pi * a**3,
+        "cylinder": 2 * math.pi * a**2 * b,
+        "capsule": math.pi * a**2 * (2 * b + 4 / 3 * a),
+        "ellipsoid": 4 / 3 * math.pi * a * b * c,
+    }
+    return float(volumes[shape])

@@ -14,95 +14,41 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 _ALL: dict[str, tuple[str, ...]] = {
-    "sensor": (
-        "sensordata",
-        "nsensordata",
-        "nsensor",
-        "sensor_adr",
-        "sensor_dim",
-        "sensor_type",
-        "sensor_name",
-        "sensors",
-        "mj_id2name",
-        "id2name",
-        r"sensor\(\s*[^'\"\s]",
-        r"rollout",
-    ),
-    "actuator": (
-        "ctrl",
-        "nu",
-        "qfrc_actuator",
-        "actuator_force",
-        "actuator_length",
-        "actuator_velocity",
-        "actuators",
-        "mj_id2name",
-        r"actuator\(\s*[^'\"\s]",
-        "set_mjcb_control",
-        "rollout",
-    ),
-    "tendon": (
-        "ten_length",
-        "ten_velocity",
-        "ten_J",
-        "ten_wrapnum",
-        "wrap_xpos",
-        "ntendon",
-        "tendons",
-        r"tendon\(\s*[^'\"\s]",
-    ),
-    "keyframe": ("nkey", "key_qpos", "key_qvel", "key_ctrl", r'"key"\s*:\s*\d', r"spec\.keys\b"),
-    "keyframe-number": (r"mj_resetDataKeyframe\([^,()]*,[^,()]*,\s*\d",),
-    "site": ("site_xpos", "site_pos", "nsite", "site_xmat", "sites", r"\bsite\(\s*[^'\"\s]"),
-    "material": (
-        "mat_rgba",
-        "nmat",
-        "materials",
-        r"\bmat\(\s*[^'\"\s]",
-        r"\bmaterial\(\s*[^'\"\s]",
-    ),
-    "texture": ("tex_data", "ntex", "textures"),
-    "mesh": ("nmesh", "mesh_vert", "mesh_face", "mesh_pos", "meshes", r"\bmesh\(\s*[^'\"\s]"),
-    "hfield": ("hfield_data", "nhfield", "hfields", r"\bhfield\(\s*[^'\"\s]"),
-    "energy": ("energy", "Energy"),
-    "fwdinv": ("solver_fwdinv", "mj_compareFwdInv"),
-    "number": (
-        "qpos",
-        "qvel",
-        "qacc",
-        "nq",
-        "nv",
-        "nbody",
-        "ngeom",
-        "xpos",
-        "xquat",
-        "xipos",
-        "geom_xpos",
-        "body_mass",
-        "cvel",
-        "rollout",
-    ),
-    "body-number": ("nbody", "ngeom", "xpos", "xipos", "geom_xpos", "body_mass", "cvel", "bodies"),
-    "contact": ("contact", "ncon", "contacts", "cfrc_ext", "efc_force", "xfrc_applied"),
-    "shape": (
-        "body_pos",
-        "body_quat",
-        "geom_pos",
-        "geom_quat",
-        "geom_size",
-        "geom_margin",
-        "jnt_range",
-        "jnt_pos",
-        "jnt_limited",
-        "contype",
-        "conaffinity",
-        "geom_contype",
-        "geom_conaffinity",
-        "disableflags",
-        "MjSpec",
-        "mjs_addGeom",
-    ),
+    kind: tuple(words.split())
+    for kind, words in {
+        "sensor": (
+            r"sensordata nsensordata nsensor sensor_adr sensor_dim sensor_type sensor_name "
+            r"""sensors mj_id2name id2name sensor\(\s*[^'\"\s] rollout"""
+        ),
+        "actuator": (
+            r"ctrl nu qfrc_actuator actuator_force actuator_length actuator_velocity actuators "
+            r"""mj_id2name actuator\(\s*[^'\"\s] set_mjcb_control rollout"""
+        ),
+        "tendon": (
+            r"ten_length ten_velocity ten_J ten_wrapnum wrap_xpos ntendon tendons "
+            r"""tendon\(\s*[^'\"\s]"""
+        ),
+        "keyframe": r"""nkey key_qpos key_qvel key_ctrl "key"\s*:\s*\d spec\.keys\b""",
+        "keyframe-number": r"mj_resetDataKeyframe\([^,()]*,[^,()]*,\s*\d",
+        "site": r"""site_xpos site_pos nsite site_xmat sites \bsite\(\s*[^'\"\s]""",
+        "material": (r"""mat_rgba nmat materials \bmat\(\s*[^'\"\s] \bmaterial\(\s*[^'\"\s]"""),
+        "texture": "tex_data ntex textures",
+        "mesh": r"""nmesh mesh_vert mesh_face mesh_pos meshes \bmesh\(\s*[^'\"\s]""",
+        "hfield": r"""hfield_data nhfield hfields \bhfield\(\s*[^'\"\s]""",
+        "energy": "energy Energy",
+        "fwdinv": "solver_fwdinv mj_compareFwdInv",
+        "number": (
+            "qpos qvel qacc nq nv nbody ngeom xpos xquat xipos geom_xpos body_mass cvel rollout"
+        ),
+        "body-number": "nbody ngeom xpos xipos geom_xpos body_mass cvel bodies",
+        "shape": (
+            "body_pos body_quat geom_pos geom_quat geom_size geom_margin jnt_range jnt_pos "
+            "jnt_limited contype conaffinity geom_contype geom_conaffinity disableflags "
+            "MjSpec mjs_addGeom"
+        ),
+    }.items()
 }
+"""Who says one of these reads all of a kind, or may; what has a backslash is a pattern."""
 _WORD = r"(?<![\w]){}(?![\w])"
 _UNNAMED = r"(?<![\w])(?<!\)\.){}(?![\w])"
 """A word that is not asked of one thing, as in `data.joint("pivot").qpos`."""
