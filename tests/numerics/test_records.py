@@ -105,7 +105,7 @@ def test_where_a_report_is() -> None:
         ),
         (
             GOOD.replace(b'"cpu"', b'"cup"'),
-            "is damaged: object missing required field `cpu` - at `$.scene.machine`",
+            "is damaged: object contains unknown field `cup` - at `$.scene.machine`",
         ),
         (
             GOOD.replace(b'{"attitude"', b'{"x": 1, "attitude"', 1),
