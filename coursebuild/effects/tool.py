@@ -1,6 +1,6 @@
 """Which tool this is: a name for its code, its templates and what it bundles.
 
-Entry points: `tool_digest()`; `engine_digest()`, of what typesets formulas.
+Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas.
 
 What it imports belongs to it, by the versions that are installed. The files' sizes and times tell
 one tool from another, so that none of them need be read. A tool that was installed anew makes
@@ -27,7 +27,7 @@ def tool_digest() -> str:
 
 
 @functools.cache
-def engine_digest() -> str:
+def typesetter_digest() -> str:
     """A hash over what makes MathML of TeX."""
     return _digest(str(assets_dir() / "temml"), os.path.join(_PACKAGE, "effects"))  # noqa: PTH118
 

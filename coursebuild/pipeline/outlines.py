@@ -20,7 +20,7 @@ from typing import Any
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.tool import engine_digest, tool_digest
+from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Document
 from coursebuild.source import Source
 
@@ -39,7 +39,7 @@ class Task(Struct, frozen=True):
     @classmethod
     def of(cls, source: Source, callouts: frozenset[str], lesson: bool) -> Task:
         """With its key."""
-        parts = (tool_digest(), engine_digest(), str(lesson), *sorted(callouts), "", source.path)
+        parts = (tool_digest(), str(lesson), *sorted(callouts), "", source.path)
         digest = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass"))
         digest.update(b"\0" + source.digest)
         return cls(source, callouts, lesson, digest.hexdigest())

@@ -13,7 +13,6 @@ What draws is imported when there is something to draw.
 from __future__ import annotations
 
 import gc
-import hashlib
 import importlib
 import json
 from collections.abc import Sequence
@@ -28,7 +27,7 @@ from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.resources import template_texts
 from coursebuild.effects.store import Store
-from coursebuild.effects.tool import engine_digest, tool_digest
+from coursebuild.effects.tool import tool_digest, typesetter_digest
 from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
@@ -63,12 +62,11 @@ if TYPE_CHECKING:
     from coursebuild.effects.v8 import MathEngine
 
 _MATHML, _CODE = "mathml", "code"
-"""Kinds of entries in the store. All stay on this machine: reading them runs code."""
+"""Kinds of entries in the store. One has the formulas of a text: one for each formula would take as
+long to write as to make."""
 _ROOM = 700_000
 """Characters of documents that wait to be drawn, some 25 bytes each. Further ones are parsed
 again, so that memory does not grow with the course."""
-_FORMULAS = 1024
-"""Formulas that are remembered."""
 _COLLECT = 512
 """Texts after which what is left in cycles is looked for, of each some 2 kB: the collector's own
 measure would let a process grow for much longer."""
@@ -123,7 +121,6 @@ class Reader:
         """Documents that were read and not drawn yet, by the key of their text."""
         self._room = _ROOM
         self._read_texts = 0
-        self._formulas: dict[Formula, str | MathError] = {}
         self._tools: dict[str, Tools] = {}
 
     def __enter__(self) -> Self:
@@ -201,33 +198,23 @@ class Reader:
 
         parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
         formulas = document_formulas(parsed.value)
-        return _Whole(parsed.value, parsed.diagnostics, self._typeset(formulas))
+        return _Whole(parsed.value, parsed.diagnostics, self._typeset(task.source.path, formulas))
 
-    def _typeset(self, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
-        """MathML, from the store where these formulas were typeset together before."""
+    def _typeset(self, path: str, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
+        """MathML; that of formulas which the text at this path had before is in the store."""
         if not formulas:
             return {}
-        known = [self._formulas.get(formula) for formula in formulas]
-        if all(found is not None for found in known):
-            return {f: m for f, m in zip(formulas, known, strict=True) if m is not None}
-        digest = hashlib.sha256(engine_digest().encode())
-        for formula in formulas:
-            digest.update(f"\0{formula.display}\0{formula.tex}".encode("utf-8", "surrogatepass"))
-        key = digest.hexdigest()
+        key = key_of(typesetter_digest(), path)
         stored = None if self._store.fresh else self._store.peek(_MATHML, key)
-        made: list[str | MathError]
-        if stored is not None:
-            made = json.loads(stored)
-        else:
-            new = [f for f, found in zip(formulas, known, strict=True) if found is None]
-            fresh = iter(self._started().typeset(new))
-            made = [next(fresh) if found is None else found for found in known]
-            if all(isinstance(one, str) for one in made):
-                self._store.keep(_MATHML, key, json.dumps(made).encode(), local=True)
-        while len(self._formulas) > _FORMULAS:
-            del self._formulas[next(iter(self._formulas))]
-        found = dict(zip(formulas, made, strict=True))
-        self._formulas.update((f, one) for f, one in found.items() if isinstance(one, str))
+        entries = [] if stored is None else json.loads(stored)
+        known: dict[Formula, str] = {Formula(tex, display): made for tex, display, made in entries}
+        new = [formula for formula in formulas if formula not in known]
+        if not new:
+            return {formula: known[formula] for formula in formulas}
+        made = {**known, **dict(zip(new, self._started().typeset(new), strict=True))}
+        found = {formula: made[formula] for formula in formulas}
+        entries = [(f.tex, f.display, m) for f, m in found.items() if isinstance(m, str)]
+        self._store.keep(_MATHML, key, json.dumps(entries).encode(), local=True)
         return found
 
     def _started(self) -> MathEngine:

@@ -68,4 +68,4 @@ def test_it_depends_on_the_libraries(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_all_libraries_are_found_here() -> None:
     assert tool._libraries().count("\0") + 1 >= len(tool._LIBRARIES)
-    assert tool.tool_digest() != tool.engine_digest()
+    assert tool.tool_digest() != tool.typesetter_digest()

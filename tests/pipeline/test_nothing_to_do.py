@@ -54,8 +54,12 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
 
 
 def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
-    """What is compiled, measured, drawn from reports, cut or read from HTML was not edited."""
+    """What is compiled, measured, drawn from reports, cut or read from HTML was not edited.
+
+    A formula that the lesson had before is not typeset again.
+    """
     folder = make(FIRST)
+    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 1$.\n")
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
         "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
@@ -68,9 +72,12 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     command = [sys.executable, "-c", code, "-C", str(folder.root), "build", "-q"]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run(command, check=True, capture_output=True, env=env)
-    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nOne more.\n")
+    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 1$.\n")
     done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
     assert done.stderr == "[]\n"
+    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 2$.\n")
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
+    assert "coursebuild.effects.v8" in done.stderr
 
 
 @pytest.mark.parametrize("wrong", [["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"]])
