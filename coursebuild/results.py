@@ -289,8 +289,6 @@ class KeptFile(Struct, frozen=True):
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
     """Gives its bytes; called at most once, and not at all where the published file is whole."""
-    pieces: Callable[[], Iterable[bytes]] | None = None
-    """Gives them one after the other, where all at once would take too much room."""
 
 
 SiteFile: TypeAlias = OutputFile | KeptFile

@@ -124,14 +124,16 @@ def _export(parser: argparse.ArgumentParser) -> None:
     _running(parser)
     parser.add_argument(
         "kind",
-        choices=("qti", "scorm"),
-        help="the quizzes as IMS QTI 2.1, or the course as SCORM 1.2",
+        choices=("epub", "page", "qti", "scorm"),
+        help="the lessons as an e-book (EPUB 3) or on one page, the quizzes as IMS QTI 2.1,"
+        " or the course as SCORM 1.2",
     )
     parser.add_argument(
         "--out",
         default=None,
         metavar="FILE",
-        help="from the course's folder (default: quizzes-qti.zip, course-scorm.zip)",
+        help="from the course's folder (default: course.epub, course.html, quizzes-qti.zip,"
+        " course-scorm.zip)",
     )
 
 
@@ -207,7 +209,7 @@ _COMMANDS = (
     ("serve", "preview: build, serve, rebuild and reload on change", serve_command, _serve),
     (
         "export",
-        "verify everything and write an archive for learning platforms",
+        "verify everything and write the course, or its quizzes, as one file",
         export_command,
         _export,
     ),

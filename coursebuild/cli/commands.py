@@ -149,10 +149,10 @@ def extract_command(arguments: argparse.Namespace) -> int:
 
 
 def export_command(arguments: argparse.Namespace) -> int:
-    """Write an archive for learning platforms."""
+    """Write the course, or its quizzes, as one file."""
     from pathlib import Path
 
-    from coursebuild.pipeline.packages import NAMES, export
+    from coursebuild.pipeline.export import NAMES, export
 
     options = options_of(arguments)
     out = Path(arguments.out or NAMES[arguments.kind])

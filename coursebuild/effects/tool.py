@@ -44,6 +44,7 @@ _LIBRARIES = (
     "msgspec",
     "pygments",
     "segno",
+    "selectolax",
     "tree_sitter",
     "tree_sitter_javascript",
     "uharfbuzz",

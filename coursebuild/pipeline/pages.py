@@ -38,7 +38,7 @@ from coursebuild.pipeline.records import (
     unpack_record,
     unpack_value,
 )
-from coursebuild.pipeline.requests import EXPORTS, PAGES, PARTS, SECTIONS, Draw, Later
+from coursebuild.pipeline.requests import BYPRODUCTS, PAGES, Draw, Later
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.links import has
@@ -52,8 +52,7 @@ from coursebuild.results import KeptFile
 from coursebuild.source import key_of
 
 if TYPE_CHECKING:
-    from coursebuild.render.exports.page import Beside
-    from coursebuild.render.exports.parts import LessonPart, OpenChapter
+    from coursebuild.render.exports.files import PageByproducts
 
 
 class _Wanted(Struct, frozen=True):
@@ -88,7 +87,7 @@ class Pages:
         self._store = store
         self._facts = Facts()
         self._by_path: dict[str, _Wanted] = {}
-        self._beside: tuple[str, Beside] | None = None
+        self._byproducts: tuple[str, PageByproducts] | None = None
         """What the page that was asked for last gives: two files are made of it."""
         self._sheets: dict[str, bytes] = {}
         """Of the pages without a known key, by site path, until these are drawn."""
@@ -154,38 +153,18 @@ class Pages:
         """The key of a page."""
         return self._at(path).key
 
-    def beside(self, path: str) -> Beside:
+    def byproducts(self, path: str) -> PageByproducts:
         """What a page gives to the files beside it, which are made one after the other."""
-        if self._beside is None or self._beside[0] != path:
-            self._beside = path, self._beside_of(path)
-        return self._beside[1]
+        if self._byproducts is None or self._byproducts[0] != path:
+            self._byproducts = path, self._byproducts_of(path)
+        return self._byproducts[1]
 
-    def _beside_of(self, path: str) -> Beside:
-        from coursebuild.render.exports.page import Beside
-
-        page = self._at(path)
-        found = unpack_value(self._store.peek(EXPORTS, page.key), Beside)
-        return found or self._documents.drawn(self._request(page)).exports.beside
-
-    def section(self, path: str) -> str:
-        """What a lesson gives to the page of the whole course."""
-        page = self._at(path)
-        found = unpack_value(self._store.peek(SECTIONS, page.key), str)
-        return found if found is not None else self._part(page).section
-
-    def chapter(self, path: str) -> OpenChapter:
-        """What a lesson gives to the e-book."""
-        from coursebuild.render.exports.parts import OpenChapter
+    def _byproducts_of(self, path: str) -> PageByproducts:
+        from coursebuild.render.exports.files import PageByproducts
 
         page = self._at(path)
-        found = unpack_value(self._store.peek(PARTS, page.key), OpenChapter)
-        return found or self._part(page).chapter
-
-    def _part(self, page: _Wanted) -> LessonPart:
-        """Both, made anew: what was kept is damaged or gone."""
-        part = self._documents.drawn(self._request(page)).exports.part
-        assert part is not None, "a written lesson has a part"
-        return part
+        found = unpack_value(self._store.peek(BYPRODUCTS, page.key), PageByproducts)
+        return found or self._documents.drawn(self._request(page)).byproducts
 
     def _at(self, path: str) -> _Wanted:
         if not self._by_path:

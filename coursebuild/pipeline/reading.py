@@ -35,12 +35,10 @@ from coursebuild.pipeline.faces import outline_face
 from coursebuild.pipeline.outlines import Outline, Task, pack, packed
 from coursebuild.pipeline.records import join, pack_record, pack_value
 from coursebuild.pipeline.requests import (
-    EXPORTS,
+    BYPRODUCTS,
     ITEMS,
     OUTLINES,
     PAGES,
-    PARTS,
-    SECTIONS,
     Answer,
     Ask,
     Draw,
@@ -84,7 +82,7 @@ class _Whole(Struct, frozen=True):
 _HEAVY = (
     "coursebuild.effects.v8",
     "coursebuild.render.draw",
-    "coursebuild.render.exports.page",
+    "coursebuild.render.exports.files",
     "coursebuild.render.highlight",
     "coursebuild.render.lesson",
     "coursebuild.render.pages",
@@ -229,7 +227,7 @@ class Reader:
     def draw(self, request: Draw) -> Drawn:
         """A page, its body, and what it is found by."""
         from coursebuild.render.draw import draw_whole
-        from coursebuild.render.exports.page import page_exports
+        from coursebuild.render.exports.files import page_byproducts
         from coursebuild.render.search.page import searched
 
         whole = self._whole(request.task) if request.task is not None else None
@@ -238,24 +236,19 @@ class Reader:
         if whole is not None:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
         sheet = request.sheet
-        draft, text, page = draw_whole(sheet, document, tools)
-        found, body, article = record(draft, str(text), request.base_url)
+        draft, page = draw_whole(sheet, document, tools)
+        found, body = record(draft, request.base_url)
         by = searched(sheet, document, str(draft.body))
         if by is not None:
             found = replace(found, search=(by.name, by.digest))
-        base = request.base_url
-        exports = page_exports(sheet, page, tools, base, body, article)
-        return Drawn(found, body, by, exports)
+        made = page_byproducts(sheet, page, request.base_url, body)
+        return Drawn(found, body, by, made)
 
     def _draw(self, request: Draw) -> bytes:
         drawn = self.draw(request)
         packed_record = pack_record(drawn.record)
         data = join(packed_record, drawn.body, drawn.searched)
-        made = drawn.exports
-        self._store.keep(EXPORTS, request.key, pack_value(made.beside), local=True)
-        if made.part is not None:
-            self._store.keep(PARTS, request.key, pack_value(made.part.chapter), local=True)
-            self._store.keep(SECTIONS, request.key, pack_value(made.part.section), local=True)
+        self._store.keep(BYPRODUCTS, request.key, pack_value(drawn.byproducts), local=True)
         # At last, since a page that is there is not drawn again.
         self._store.keep(PAGES, request.key, data, local=True)
         return packed_record

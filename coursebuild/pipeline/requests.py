@@ -17,10 +17,9 @@ from coursebuild.render.search.values import Searched
 from coursebuild.render.sheet import Sheet
 
 if TYPE_CHECKING:
-    from coursebuild.render.exports.page import PageExports
+    from coursebuild.render.exports.files import PageByproducts
 
-OUTLINES, PAGES, EXPORTS, ITEMS = "outlines", "pages", "beside", "items"
-PARTS, SECTIONS = "parts", "sections"
+OUTLINES, PAGES, BYPRODUCTS, ITEMS = "outlines", "pages", "byproducts", "items"
 """Kinds of entries in the store. They stay on this machine: reading them may run code."""
 
 
@@ -83,7 +82,7 @@ class Drawn(Struct, frozen=True):
     body: str
     searched: Searched | None
     """What it is found by; `None` where it is not searched."""
-    exports: PageExports
+    byproducts: PageByproducts
     """What it gives to the files beside it."""
 
 

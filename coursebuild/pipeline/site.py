@@ -14,7 +14,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 from msgspec import Struct
@@ -47,13 +47,8 @@ from coursebuild.render.shared import PageFacts, common_characters
 from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
 
-if TYPE_CHECKING:
-    from coursebuild.render.exports.chapters import Note
-
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
-_CHAPTERS, _NOTED = "chapters", "chapters-noted"
-"""Kinds of the entries that hold chapters of the e-book, and what is known of all of them."""
 _CELLS = "search"
 """Kind of the entries that hold parts of the index of the search."""
 _DIGEST = hashlib.sha256().digest_size * 2
@@ -111,7 +106,7 @@ class _Site:
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
-        files += self._exports(pages, names, frozenset(file.path for file in files))
+        files += self._exports(pages, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if not pages.are_sound({file.path for file in files}):
@@ -231,32 +226,12 @@ class _Site:
 
     # --- what the site gives away
 
-    def _exports(self, pages: Pages, names: Names, taken: frozenset[str]) -> Iterator[SiteFile]:
-        from coursebuild.render.exports.files import Around, Exports
+    def _exports(self, pages: Pages, taken: frozenset[str]) -> Iterator[SiteFile]:
+        from coursebuild.render.exports.files import ExportContext, Exports
 
-        labs = {file.path: file.data for file in self.library.labs.files}
-        around = Around(
-            style=self.assets.template("exports/epub.css"),
-            picture=lambda path: labs[path] if path in labs else self._files[path][1](),
-            pictures=repr([(path, digest) for path, (digest, _) in self._files.items()]),
-            archives=self._packed,
-            imports=self._imports,
-            declarations=pages.facts.declarations,
-            taken=taken,
-            keep=functools.partial(self.store.kept, _CHAPTERS, local=True),
-            note=self._note(),
-        )
-        return Exports(self.library, pages, around).files(names)
-
-    def _note(self) -> Note:
-        from coursebuild.render.exports.chapters import Note
-
-        name, store = key_of("chapters", tool_digest()), self.store
-
-        def get() -> bytes | None:
-            return None if store.fresh else store.peek(_NOTED, name)
-
-        return Note(get, functools.partial(store.keep, _NOTED, name, local=True))
+        return Exports(
+            self.library, pages, ExportContext(self._packed, self._imports, taken)
+        ).files()
 
 
 class _Data:
@@ -346,16 +321,13 @@ def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
-    """Links of the built pages that lead nowhere; most are found in the sources already.
-
-    What is wrong on a page of the whole course is so on a lesson's page, and is told there.
-    """
+    """Links of the built pages that lead nowhere; most are found in the sources already."""
     from coursebuild.render.links import check_links
 
     pages = {
         file.path: file.data if isinstance(file, OutputFile) else file.make()
         for file in files
-        if file.path.endswith(".html") and not file.path.startswith(urls.COURSE_PAGES)
+        if file.path.endswith(".html")
     }
     everything = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
     for broken in check_links(everything, base_url):

@@ -1,6 +1,6 @@
 """Drawing a page: its sheet and its document through the templates.
 
-Entry points: `draw(sheet, document, tools)`; `draw_whole`, with the document's part alone as well.
+Entry points: `draw(sheet, document, tools)`; `draw_whole`, with the document's context as well.
 """
 
 from __future__ import annotations
@@ -30,16 +30,15 @@ def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
 
 def draw_whole(
     sheet: Sheet, document: Document | None, tools: Tools
-) -> tuple[Draft, Markup, PageContext | None]:
-    """The page without its frame, what it shows of its document, and the document's context."""
-    text = Markup()
+) -> tuple[Draft, PageContext | None]:
+    """The page without its frame, and the context of its document."""
     page: PageContext | None = None
     values = {name: _drawn(value, tools) for name, value in sheet.values.items()}
     description = sheet.description
     if document is not None and sheet.shown is not None:
         page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
         values["contents"] = contents(page, document)
-        values["article"] = text = article(page, document)
+        values["article"] = article(page, document)
         if sheet.kind == "page":
             description = _first_sentences(document)
     draft = Draft(
@@ -52,7 +51,7 @@ def draw_whole(
         og_type=sheet.og_type,
         indexed=sheet.indexed,
     )
-    return draft, text, page
+    return draft, page
 
 
 def _drawn(value: object, tools: Tools) -> object:

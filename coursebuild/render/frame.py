@@ -106,7 +106,6 @@ class NavLink(Struct, frozen=True):
     href: str
     text: str
     current: bool
-    download: bool = False
 
 
 def place_of(library: Library, path: str) -> urls.Place:
@@ -210,9 +209,8 @@ def _own_script(draft: Draft, names: Names) -> str:
             return ""
 
 
-_ALIKE = ("lesson", "stub", "level", "model", "book")
-"""Kinds of pages that no menu has, so that their frames differ in their own values alone; one book
-is in it."""
+_ALIKE = ("lesson", "stub", "level", "model")
+"""Kinds of pages that no menu has, so that their frames differ in their own values alone."""
 _SLOT = pattern("\ue000([a-z_]+[0-9]*)\ue001")
 
 
@@ -226,7 +224,7 @@ class Frames:
 
     def around(self, draft: Draft, parts: tuple[str, ...]) -> tuple[str, str]:
         """See `frame_around`."""
-        if draft.kind not in _ALIKE or draft.path == urls.COURSE_PAGE:
+        if draft.kind not in _ALIKE:
             return frame_around(self._library, draft, self._names, parts)
         own = _own_values(self._library, draft)
         slots, filled = _slots(own)
@@ -286,6 +284,6 @@ def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[Nav
 def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
     """Links to what the site adds to the pages of the course."""
     return tuple(
-        NavLink(place.href(own.path), own.title, own.path == place.path, own.download)
+        NavLink(place.href(own.path), own.title, own.path == place.path)
         for own in own_pages(library)
     )

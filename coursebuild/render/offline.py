@@ -37,7 +37,7 @@ _DIGITS = 12
 """Of a hash; what is told apart are states of one file."""
 _SHORT = 12
 """Characters of a name below an icon."""
-_COPIES = (".br", ".gz", ".zip", ".epub", ".ipynb", ".md", ".imscc")
+_COPIES = (".br", ".gz", ".zip", ".ipynb", ".md", ".imscc")
 _PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
 _NEEDED = (".css", ".js", ".svg")
 _SHOWN = (".html", ".webmanifest", *_PICTURES)

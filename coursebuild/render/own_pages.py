@@ -1,4 +1,4 @@
-"""The pages and files that the site adds to those of a course, as the foot of each page has them.
+"""The pages that the site adds to those of a course, as the foot of each page has them.
 
 Entry point: `own_pages(library)`: the one place that says which there are, in their order.
 """
@@ -14,18 +14,16 @@ from coursebuild.render.library import Library
 
 
 class OwnPage(Struct, frozen=True):
-    """A page or file of the site that no author wrote."""
+    """A page of the site that no author wrote."""
 
     path: str
     """Its site path."""
     title: str
     """As the foot calls it."""
-    download: bool = False
-    """Whether it is a file to keep, and not a page to read."""
 
 
 def own_pages(library: Library) -> tuple[OwnPage, ...]:
-    """Those that this course has: first what looks things up, then the reader's own, then files."""
+    """Those that this course has: first what looks things up, then the reader's own."""
     return tuple(_listed(library))
 
 
@@ -42,6 +40,3 @@ def _listed(library: Library) -> Iterator[OwnPage]:
     if library.asked:
         yield OwnPage(urls.REVIEW, words("review.title"))
     yield OwnPage(urls.OFFLINE, words("offline.title"))
-    if any(lesson.document is not None for lesson in library.order):
-        yield OwnPage(urls.COURSE_PAGE, words("exports.book"))
-        yield OwnPage(urls.EPUB, words("exports.epub"), download=True)

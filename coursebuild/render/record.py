@@ -1,6 +1,6 @@
 """A drawn page, ready for its frame, and what the rest of the site must know of it.
 
-Entry point: `record(draft, article, base_url)`.
+Entry point: `record(draft, base_url)`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ from msgspec.structs import replace
 
 from coursebuild.render import fonts
 from coursebuild.render.draft import Draft
-from coursebuild.render.formulas import Woven
 from coursebuild.render.frame import parts_of
 from coursebuild.render.links import Reference, references, without_lines
-from coursebuild.render.settling import settle_with
+from coursebuild.render.settling import settle
 from coursebuild.render.shared import PageFacts
 
 
@@ -45,12 +44,9 @@ class PageRecord(Struct, frozen=True):
         )
 
 
-def record(draft: Draft, article: str, base_url: str) -> tuple[PageRecord, str, Woven]:
-    """The record of a page that was just drawn, and its body as it will be published.
-
-    At last its document's part of that, which was drawn as `article`.
-    """
-    made, part = settle_with(str(draft.body), article)
+def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
+    """The record of a page that was just drawn, and its body as it will be published."""
+    made = settle(str(draft.body))
     found = PageRecord(
         draft=replace(draft, body=Markup()),
         parts=parts_of(made.html),
@@ -60,4 +56,4 @@ def record(draft: Draft, article: str, base_url: str) -> tuple[PageRecord, str, 
         ids=tuple(sorted(without_lines(made.ids))),
         references=tuple(sorted(references(draft.path, made.addresses, base_url))),
     )
-    return found, made.html, part
+    return found, made.html

@@ -20,8 +20,8 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
-from coursebuild.render.exports.files import Around, Exports, OnDemand
-from coursebuild.render.frame import Draft, Names, frame
+from coursebuild.render.exports.files import ExportContext, Exports, OnDemand
+from coursebuild.render.frame import Draft, frame
 from coursebuild.render.library import Library
 from coursebuild.render.offline import facts_of, file_list, offline_files
 from coursebuild.render.page_list import page_list
@@ -69,7 +69,7 @@ def render_site(
     files += _machine_files(course, drafts)
     files += site_search(library, drawn)
     files += offline_files(course, assets)
-    files += _exports(library, assets, options, drafts, facts, names)
+    files += _exports(library, options, drafts)
     listed = file_list(names, "")
     files.append(OutputFile(listed.path, listed.make(facts_of(files))))
     return tuple(sorted(files, key=lambda file: file.path))
@@ -107,28 +107,16 @@ def _downloads(library: Library, options: SiteOptions) -> Iterator[OutputFile]:
 
 
 def _exports(
-    library: Library,
-    assets: Assets,
-    options: SiteOptions,
-    drafts: Sequence[Draft],
-    facts: Sequence[PageFacts],
-    names: Names,
+    library: Library, options: SiteOptions, drafts: Sequence[Draft]
 ) -> Iterator[OutputFile]:
     """What the site gives away besides its pages."""
     bodies = {draft.path: visible(str(draft.body)) for draft in drafts}
-    pictures = {file.path: file.data for file in library.labs.files}
-    pictures |= {urls.file_path(file.path): file.data for file in options.files}
-    around = Around(
-        style=assets.template("exports/epub.css"),
-        picture=pictures.__getitem__,
-        pictures="",
-        archives=zips.lesson_archives(library, options.around),
-        imports=options.around.imports,
-        declarations=frozenset[str]().union(*(one.declarations for one in facts)),
-        taken=frozenset(urls.file_path(file.path) for file in options.files),
+    context = ExportContext(
+        zips.lesson_archives(library, options.around),
+        options.around.imports,
+        frozenset(urls.file_path(file.path) for file in options.files),
     )
-    source = OnDemand(library, bodies.__getitem__)
-    for file in Exports(library, source, around).files(names):
+    for file in Exports(library, OnDemand(library, bodies.__getitem__), context).files():
         yield file if isinstance(file, OutputFile) else OutputFile(file.path, file.make())
 
 

@@ -32,10 +32,6 @@ SEARCH_INDEX = "search/index.js"
 """The one file of the search's index whose name is always the same."""
 GLOSSARY = "glossary/index.html"
 SYMBOLS = "symbols/index.html"
-COURSE_PAGES = "course/"
-"""Where the whole course is, to be printed, in a folder of the same kind."""
-COURSE_PAGE = f"{COURSE_PAGES}index.html"
-EPUB = "course.epub"
 SITEMAP = "sitemap.xml"
 ROBOTS = "robots.txt"
 OFFLINE = "offline/index.html"
@@ -67,7 +63,7 @@ _WITHOUT_TWIN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
 
 def twin_path(page: str) -> str | None:
     """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
-    if page in _WITHOUT_TWIN or page.startswith(COURSE_PAGES):
+    if page in _WITHOUT_TWIN:
         return None
     return f"{page.removesuffix('.html')}.md"
 
@@ -120,6 +116,11 @@ _UNRESERVED = pattern("[A-Za-z0-9/~._+@,-]*+")
 def encode(path: str) -> str:
     """A site path as part of an address; colons are encoded, since one may read as a scheme."""
     return path if _UNRESERVED.fullmatch(path) else quote(path, safe="/~-._+@,")
+
+
+def quoted(anchor: str) -> str:
+    """An anchor as part of an address."""
+    return quote(anchor, safe="-._~:")
 
 
 class Place(Struct, frozen=True):

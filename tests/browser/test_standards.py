@@ -26,8 +26,6 @@ KNOWN = {"home", "lesson", "stub", "level", "model", "page", "notfound", "offlin
 """Kinds of pages that both courses have, whatever others there are."""
 WINDOW: Any = {"width": 1440, "height": 900}
 NARROW = (320, 360)
-LONG = ("real", "course/index.html")
-"""All lessons in one page: as long to look at as all others together."""
 
 
 def test_every_kind_of_page_is_found(sites: Mapping[str, Site]) -> None:
@@ -122,7 +120,7 @@ def test_every_kind_of_page_keeps_the_standards(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], name: str
 ) -> None:
     """Labs run and axe looks in the course of every construct: the other one only has more."""
-    paths = [path for path in sites[name].kinds().values() if (name, path) != LONG]
+    paths = list(sites[name].kinds().values())
     keeps_the_standards(browsers["webgl"], sites[name], paths, closely=name == "full")
 
 
@@ -131,17 +129,8 @@ def test_every_kind_of_page_keeps_the_standards(
 def test_every_page_keeps_the_standards(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], name: str
 ) -> None:
-    paths = [path for path in sites[name].unlike_pages() if (name, path) != LONG]
+    paths = list(sites[name].unlike_pages())
     keeps_the_standards(browsers["webgl"], sites[name], paths, closely=True)
-
-
-@pytest.mark.slow
-def test_all_lessons_in_one_page_keep_the_standards(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
-) -> None:
-    """But for labs and axe, which have seen each lesson."""
-    name, path = LONG
-    keeps_the_standards(browsers["webgl"], sites[name], [path], closely=False)
 
 
 def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely: bool) -> None:

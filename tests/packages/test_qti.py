@@ -343,8 +343,8 @@ def test_package_is_written_nowhere_where_it_would_be_in_the_way(make: Make) -> 
     folder.write("notes.txt", "mine")
     assert folder.main("build").status == 0
     for out, said in (
-        ("content/q.zip", "lies in content/ of the project, where no archive goes"),
-        ("notes.txt", "is there, and is no such archive"),
+        ("models/q.zip", "lies in models/ of the project, where no export goes"),
+        ("notes.txt", "is there, and is no such export"),
         (".", "is a folder"),
         ("public/q.zip", "lies in a published site, which the next build replaces"),
     ):

@@ -185,7 +185,7 @@ def test_package_may_be_named_and_replaces_a_package_only(make: Make) -> None:
     assert (done.status, done.out) == (0, "")
     folder.write("mine.zip", b"PK\x05\x06" + bytes(18))
     done = folder.main("export", "scorm", "--out", "mine.zip")
-    assert done.status == 2 and "mine.zip is there, and is no such archive" in done.err
+    assert done.status == 2 and "mine.zip is there, and is no such export" in done.err
 
 
 def test_a_full_disk_leaves_what_was_there(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:

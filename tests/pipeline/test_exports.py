@@ -1,9 +1,8 @@
-"""The e-book and the notebooks are valid, and an edit makes few files of a built course anew."""
+"""Exports of the whole course, and the files beside its pages: valid, and made anew when needed."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -26,11 +25,11 @@ FULL = ROOT / "tests" / "courses" / "full" / "course"
 COURSES = {"other letters": ROOT / "tests" / "courses" / "unicode" / "course", "this course": ROOT}
 
 
-def built(folder: Folder, stores: Path) -> Folder:
-    folder.borrow(stores)
-    done = folder.main("build", "--quiet")
+def exported(folder: Folder, kind: str) -> Path:
+    """The course as one file."""
+    done = folder.main("export", kind, "--quiet")
     assert done.status == 0, done.out
-    return folder
+    return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]
 
 
 def told(book: Path) -> list[str]:
@@ -96,7 +95,7 @@ def wild_chapter(book: Path) -> str:
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
-    """The course of every construct, with a wild lesson besides, built."""
+    """The course of every construct, with a wild lesson besides."""
     folder = Folder(tmp_path_factory.mktemp("everything") / "course")
     shutil.copytree(FULL, folder.root)
     with_wild_lesson(folder, '[[level]]\nid = "A"')
@@ -105,11 +104,12 @@ def everything(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder
         'base_url = "https://example.org/a%20b/"', folder.text("content/course.toml")
     )
     folder.write("content/course.toml", text)
-    return built(folder, stores)
+    folder.borrow(stores)
+    return folder
 
 
 def test_ebook_of_every_construct_and_of_wild_html_is_valid(everything: Folder) -> None:
-    book = everything.root / "public" / "course.epub"
+    book = exported(everything, "epub")
     assert told(book) == []
     chapter = wild_chapter(book)
     assert 'href="1.9-wild.xhtml"' in chapter and 'href="1.1-text.xhtml"' in chapter
@@ -117,7 +117,20 @@ def test_ebook_of_every_construct_and_of_wild_html_is_valid(everything: Folder) 
     assert "onclick" not in chapter and "press" not in chapter
 
 
+def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(everything: Folder) -> None:
+    page = exported(everything, "page").read_text("utf-8")
+    ids = re.findall(r' id="([^"]*)"', page)
+    assert len(ids) == len(set(ids)) and page.count("<h1") == 1
+    assert set(re.findall(r'href="#([^"]*)"', page)) <= set(ids)
+    assert not re.findall(r'(?:src|srcset|poster)="(?!data:)', page)
+    assert not re.findall(r"url\((?!.?(?:data:|#))", page) and "@font-face" in page
+    assert "<script" not in page and "<button" not in page and "onclick" not in page
+    assert 'href="https://example.org/a%20b/files/lessons/data.csv"' in page
+    assert page.index('id="_1.1--_top"') < page.index('id="_1.9--_top"')
+
+
 def test_notebooks_of_every_construct_and_of_wild_html_are_valid(everything: Folder) -> None:
+    assert everything.main("build", "--quiet").status == 0
     paths = list((everything.root / "public" / "lessons").glob("*.ipynb"))
     assert len(paths) == 5
     for path in paths:
@@ -131,9 +144,7 @@ def arabic_book(make: Make) -> Path:
     folder = make(GOOD)
     with_wild_lesson(folder, '[[level.lesson]]\nid = "1.1"')
     folder.replace("content/course.toml", "[course]\n", '[course]\nlanguage = "ar"\n')
-    done = folder.main("build", "--quiet")
-    assert done.status == 0, done.out
-    return folder.root / "public" / "course.epub"
+    return exported(folder, "epub")
 
 
 def test_ebook_in_arabic_is_read_from_the_right_and_links_no_files(make: Make) -> None:
@@ -156,19 +167,52 @@ def test_ebook_of_course_is_valid(name: str, tmp_path: Path, stores: Path) -> No
     for top in ("content", "models", "docs"):
         if (COURSES[name] / top).is_dir():
             shutil.copytree(COURSES[name] / top, folder.root / top)
-    assert told(built(folder, stores).root / "public" / "course.epub") == []
+    folder.borrow(stores)
+    assert told(exported(folder, "epub")) == []
 
 
 def test_an_ebook_begins_as_it_must(make: Make) -> None:
-    folder = make(GOOD)
-    assert folder.main("build", "--quiet").status == 0
-    book = folder.root / "public" / "course.epub"
+    book = exported(make(GOOD), "epub")
     assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
     with zipfile.ZipFile(book) as archive:
         assert archive.testzip() is None
         first = archive.infolist()[0]
         assert (first.filename, first.compress_type) == ("mimetype", zipfile.ZIP_STORED)
         assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+@pytest.mark.parametrize("kind", ["epub", "page"])
+def test_export_is_as_the_course_is_now(make: Make, kind: str) -> None:
+    folder = make("## One\n\n![a dot](dot.png)\n\nText.\n")
+    folder.write("content/lessons/dot.png", DOT)
+    first = exported(folder, kind).read_bytes()
+    assert exported(folder, kind).read_bytes() == first
+    folder.write("content/lessons/dot.png", DOT + b"more")
+    assert exported(folder, kind).read_bytes() != first
+    folder.write("content/lessons/dot.png", DOT)
+    folder.replace(folder.lesson(1), "Text.", "See [no lesson](lesson:7.7).")
+    assert folder.main("export", kind).status == 1
+    folder.replace(folder.lesson(1), "See [no lesson](lesson:7.7).", "Text.")
+    assert exported(folder, kind).read_bytes() == first
+
+
+@pytest.mark.parametrize("kind", ["epub", "page"])
+def test_nothing_but_such_a_file_is_written_over(make: Make, kind: str) -> None:
+    folder = make(GOOD)
+    folder.write("there", b"an author's own")
+    done = folder.main("export", kind, "--out", "there")
+    assert done.status != 0 and "there is there, and is no such export" in done.out + done.err
+    assert folder.read("there") == b"an author's own"
+
+
+def test_exported_book_can_be_offered_by_a_link(make: Make) -> None:
+    folder = make(GOOD)
+    assert folder.main("export", "epub", "--out", "content/files/course.epub").status == 0
+    text = folder.text(folder.lesson(1))
+    folder.write(folder.lesson(1), f"{text}\n[The book](../files/course.epub).\n")
+    assert folder.main("build", "--quiet").status == 0
+    book = folder.root / "public" / "files" / "files" / "course.epub"
+    assert book.read_bytes() == folder.read("content/files/course.epub")
 
 
 # --------------------------------------------------------------------------------- little anew
@@ -179,55 +223,24 @@ def stamps(folder: Folder) -> dict[str, int]:
     return {
         path.relative_to(public).as_posix(): path.stat().st_ino
         for path in public.rglob("*")
-        if path.suffix in (".md", ".ipynb", ".epub", ".txt") or "course/" in path.as_posix()
+        if path.suffix in (".md", ".ipynb", ".txt")
     }
 
 
-def test_an_edit_makes_the_files_of_its_lesson_and_those_of_the_whole(make: Make) -> None:
+def test_an_edit_makes_the_files_of_its_lesson(make: Make) -> None:
     folder = make(GOOD, "## Two\n\nText.\n", "## Three\n\nText.\n")
     assert folder.main("build", "--quiet").status == 0
     before = stamps(folder)
-    assert {"lessons/1.2-two.md", "lessons/1.2-two.ipynb", "course.epub", "llms.txt"} <= set(before)
+    assert {"lessons/1.2-two.md", "lessons/1.2-two.ipynb", "llms.txt"} <= set(before)
     folder.replace(folder.lesson(2), "Text.", "Other text.")
     assert folder.main("build", "--quiet").status == 0
     after = stamps(folder)
     assert before.keys() == after.keys()
     assert {path for path in after if after[path] != before[path]} == {
-        "course.epub",
-        "course/index.html",
         "lessons/1.2-two.ipynb",
         "lessons/1.2-two.md",
     }
     assert b"Other text." in folder.read("public/lessons/1.2-two.md")
-    assert b"Other text." in folder.read("public/course/index.html")
-
-
-@pytest.mark.parametrize("name", ["course/index.html", "course.epub"])
-def test_what_somebody_did_to_the_whole_course_is_not_taken_over(make: Make, name: str) -> None:
-    folder = make(GOOD, "## Two\n\nText.\n")
-    assert folder.main("build", "--quiet").status == 0
-    path = folder.root / "public" / name
-    data, status = path.read_bytes(), path.stat()
-    path.write_bytes(bytes(byte ^ 1 for byte in data))
-    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))  # so that it looks as it was
-    folder.replace(folder.lesson(2), "Text.", "Other text.")
-    assert folder.main("build", "--quiet").status == 0
-    edited = folder.tree("public")
-    shutil.rmtree(folder.root / "public")
-    shutil.rmtree(folder.root / ".coursebuild")
-    assert folder.main("build", "--quiet").status == 0
-    assert folder.tree("public") == edited
-
-
-def test_another_picture_makes_the_ebook_anew(make: Make) -> None:
-    folder = make("## One\n\n![a dot](dot.png)\n")
-    folder.write("content/lessons/dot.png", DOT)
-    assert folder.main("build", "--quiet").status == 0
-    folder.write("content/lessons/dot.png", DOT + b"more")
-    assert folder.main("build", "--quiet").status == 0
-    with zipfile.ZipFile(folder.root / "public" / "course.epub") as archive:
-        pictures = [archive.read(name) for name in archive.namelist() if "images/" in name]
-    assert pictures == [DOT + b"more"]
 
 
 def test_damaged_leftovers_are_made_again(make: Make) -> None:

@@ -74,7 +74,7 @@ def test_each_file_is_in_the_group_of_those_who_need_it(path: str, group: str) -
     [
         *("404.html", "robots.txt", "sitemap.xml", "service-worker.js", "llms.txt"),
         *("examples.zip", "lessons/1.1-a.zip", "lessons/1.1-a.ipynb", "lessons/1.1-a.md"),
-        *("course.epub", "assets/site.#.css.br", "assets/site.#.css.gz"),
+        *("assets/site.#.css.br", "assets/site.#.css.gz"),
     ],
 )
 def test_copies_and_files_for_machines_are_in_no_group(path: str) -> None:

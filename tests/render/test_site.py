@@ -77,8 +77,6 @@ def test_the_files_of_a_site(site: dict[str, bytes]) -> None:
         "404.html",
         "about.html",
         "about.md",
-        "course.epub",
-        "course/index.html",
         "examples.zip",
         "examples/a.py",
         "files.json",

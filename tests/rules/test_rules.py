@@ -21,7 +21,7 @@ from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.pipeline.build import build
 from coursebuild.pipeline.check import check
-from coursebuild.pipeline.packages import export
+from coursebuild.pipeline.export import export
 from coursebuild.pipeline.update import update
 from coursebuild.report import Style, diagnostic_text
 from coursebuild.rules import RULES

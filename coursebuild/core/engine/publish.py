@@ -172,7 +172,7 @@ class _Site(Struct, frozen=True):
         made = [file.path for file, _ in new]
         if self.listed is not None and self._add_list(self.listed, slot, entries):
             made.append(self.listed.path)
-        write_file(f"{slot}/{MARKER}", (marker(entries),))
+        write_file(f"{slot}/{MARKER}", marker(entries))
         return entries, made
 
     def _add_list(self, listed: FileList, slot: Path, entries: dict[str, Entry]) -> bool:
@@ -184,7 +184,7 @@ class _Site(Struct, frozen=True):
             return False
         facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
         target = f"{slot}/{listed.path}"
-        digest = write_file(target, (listed.make(facts),))
+        digest = write_file(target, listed.make(facts))
         entries[listed.path] = Entry.of(key, digest, os.lstat(target))
         return True
 

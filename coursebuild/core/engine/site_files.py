@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,7 +38,7 @@ def writing(
     def write(file: SiteFile, key: str) -> Entry:
         target = f"{folder}/{file.path}"
         Path(target).unlink(missing_ok=True)  # half of it, by a copy that died
-        digest = write_file(target, _pieces(file))
+        digest = write_file(target, file.data if isinstance(file, OutputFile) else file.make())
         return Entry.of(key, digest, os.lstat(target))
 
     def share(start: int) -> list[Entry]:
@@ -70,24 +70,14 @@ def _workers(
     yield None
 
 
-def _pieces(file: SiteFile) -> Iterable[bytes]:
-    """The bytes of a file, at once or one after the other."""
-    if isinstance(file, OutputFile):
-        return (file.data,)
-    return (file.make(),) if file.pieces is None else file.pieces()
-
-
-def write_file(path: str, pieces: Iterable[bytes]) -> str:
+def write_file(path: str, data: bytes) -> str:
     """Write a file that is not there; gives the hash of its bytes."""
-    digest = hashlib.sha256()
     fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
     try:
-        for piece in pieces:
-            digest.update(piece)
-            rest = memoryview(piece)
-            while rest:
-                rest = rest[os.write(fd, rest) :]
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(fd, rest) :]
         os.fchmod(fd, 0o644)  # whatever the umask is
     finally:
         os.close(fd)
-    return digest.hexdigest()
+    return hashlib.sha256(data).hexdigest()

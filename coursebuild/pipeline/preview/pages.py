@@ -29,7 +29,7 @@ from coursebuild.pipeline.preview.search import Search
 from coursebuild.render import fonts, meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.characters import visible
-from coursebuild.render.exports.files import Around, Exports, OnDemand, export_paths
+from coursebuild.render.exports.files import ExportContext, Exports, OnDemand, export_paths
 from coursebuild.render.frame import Draft, Frames, Names, parts_of
 from coursebuild.render.library import Library, owners
 from coursebuild.render.offline import offline_files
@@ -205,25 +205,11 @@ class Pages:
 
     def _exports(self, library: Library) -> Iterator[SiteFile]:
         """What the site gives away besides its pages."""
-        assert self._names is not None, "there are shared files since the course was first read"
-        around, course = self._around(library.course), library.course
-        pictures = {file.path: file.data for file in library.labs.files}
-        files = {urls.file_path(path): path for path in course.files}
-
-        def picture(path: str) -> bytes:
-            return pictures[path] if path in pictures else read_bytes(self._root, files[path])
-
-        surroundings = Around(
-            style=self._assets.template("exports/epub.css"),
-            picture=picture,
-            pictures="",
-            archives=zips.lesson_archives(library, around),
-            imports=around.imports,
-            declarations=frozenset[str]().union(*(f.declarations for f in self._facts.values())),
-            taken=frozenset(files),
-        )
-        source = OnDemand(library, self._body, self._whole)
-        return Exports(library, source, surroundings).files(self._names)
+        around = self._around(library.course)
+        taken = frozenset(map(urls.file_path, library.course.files))
+        archives = zips.lesson_archives(library, around)
+        context = ExportContext(archives, around.imports, taken)
+        return Exports(library, OnDemand(library, self._body, self._whole), context).files()
 
     def _exported(self, path: str) -> bytes | None:
         """One of these files, as everything is now; none of what has mistakes."""
@@ -233,9 +219,6 @@ class Pages:
         needed = (page,) if page in self._entries else tuple(self._entries)
         if any(self._page(path) is None or path in self._held for path in needed):
             return None
-        if path == urls.EPUB:  # which has the styles of all pages
-            for page in self.unnoted():
-                self.look_at(page)
         file = next(file for file in self._exports(library) if file.path == path)
         return file.data if isinstance(file, OutputFile) else file.make()
 

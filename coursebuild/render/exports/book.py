@@ -1,130 +1,116 @@
-"""The whole course as pages to be printed.
+"""The whole course on one page, to be read without a network and to be printed.
 
-Entry points: `books(library)`, which pages there are; `Book.texts`, the body of one in pieces, and
-`Book.section`, a lesson in it, so that no more than a lesson is held at a time.
-
-A course of at most `MOST` written lessons is one page. A longer one is a page for each level, and
-the contents: no browser prints a page of thousands of lessons.
+Entry point: `book(course, style)`, the bytes of the page. The page needs no other file: its style
+sheet, fonts and pictures are in it. It loads nothing and runs nothing, as its policy says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import base64
+import functools
+import posixpath
+import re
 
 from markupsafe import Markup
-from msgspec import Struct
 
 from coursebuild.model import Lesson
+from coursebuild.patterns import pattern
 from coursebuild.render import urls
-from coursebuild.render.draft import Draft
-from coursebuild.render.exports.addresses import filled, quoted
-from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
-from coursebuild.render.exports.parts import anchor
-from coursebuild.render.library import Library
+from coursebuild.render.characters import visible
+from coursebuild.render.direction import direction
+from coursebuild.render.exports.rewrite import Rules
+from coursebuild.render.exports.whole_course import WholeCourse
+from coursebuild.render.html_tree import to_html
 
-MOST = 250
-"""Written lessons that are on one page at most."""
-_HERE = Markup("<!--lessons-->")
-
-
-class Book(Struct, frozen=True):
-    """A page of lessons."""
-
-    path: str
-    """Its site path."""
-    title: str
-    summary: str
-    levels: tuple[Part, ...]
-    """All that its contents name."""
-    places: Mapping[str, tuple[str, str]]
-    """Where each written lesson is, by the site path of its page: the page, and the lesson's id."""
-    shown: tuple[Part, ...]
-    """The levels whose lessons are on it."""
-
-    @property
-    def lessons(self) -> tuple[Lesson, ...]:
-        """The lessons on it."""
-        return tuple(lesson for part in self.shown for lesson in part.lessons)
-
-    def draft(self, library: Library) -> Draft:
-        """The page, but for its body."""
-        title = library.words("exports.book_title", title=self.title)
-        return Draft(self.path, "book", title, self.summary, Markup(), indexed=False)
-
-    def texts(self, library: Library) -> Iterator[str | Lesson]:
-        """Its body; a lesson stands for its section."""
-        place = urls.Place(self.path)
-        entries = {part.id: self._entry(part) for part in self.levels}
-        whole = library.render(
-            "exports/book.html",
-            title=self.title,
-            summary=self.summary,
-            facts=facts(library, sum(len(part.lessons) for part in self.levels)),
-            epub=place.href(urls.EPUB),
-            levels=tuple(entries.values()),
-            lessons=_HERE,
-        )
-        before, _, after = str(whole).partition(_HERE)
-        yield before
-        for part in self.shown:
-            yield f"{library.render('exports/level.html', level=entries[part.id])}\n"
-            yield from part.lessons
-        yield after
-
-    def section(self, part: str) -> str:
-        """What a lesson gives to the course, with its links put in."""
-        return filled(part, self._address)
-
-    def _entry(self, part: Part) -> LevelEntry:
-        page, _ = self.places[urls.lesson_path(part.lessons[0])]  # and so are the others
-        there, href = self._page(page), urls.Place(self.path).href(page, part.anchor)
-        lessons = tuple(
-            Entry(lesson.id, lesson.title, f"{there}#{quoted(anchor(lesson.id))}")
-            for lesson in part.lessons
-        )
-        return LevelEntry(part.id, part.title, part.summary, part.anchor, href, lessons)
-
-    def _page(self, page: str) -> str:
-        """Where one of these pages is, as seen from here."""
-        return "" if page == self.path else urls.Place(self.path).href(page)
-
-    def _address(self, path: str, id: str, shown: bool = False) -> str:
-        """Where a site path is, as seen from here: lessons are on these pages."""
-        if path not in self.places:
-            return urls.Place(self.path).href(path, id or None)
-        page, lesson = self.places[path]
-        return f"{self._page(page)}#{quoted(anchor(lesson, id) if id else anchor(lesson))}"
+MARK = b'<meta name="generator" content="coursebuild: the whole course">'
+"""Stands near the beginning of each such page, and in no page of a site."""
+_LOWERED = 2
+"""Levels that headings go down: the course is the first heading, its levels are the second."""
+_ANSWERS = frozenset(("answer", "hint"))
+_URL = pattern(r'url\("([^"():]+)"\)')
+_TYPES = {
+    "gif": "image/gif",
+    "jpeg": "image/jpeg",
+    "jpg": "image/jpeg",
+    "png": "image/png",
+    "svg": "image/svg+xml",
+    "webp": "image/webp",
+    "avif": "image/avif",
+    "woff2": "font/woff2",
+}
 
 
-def books(library: Library) -> tuple[Book, ...]:
-    """The pages; none where nothing is written."""
-    course, levels = library.course, written(library)
-    if not levels:
-        return ()
-    one = sum(len(part.lessons) for part in levels) <= MOST
-    places = {
-        urls.lesson_path(lesson): (urls.COURSE_PAGE if one else _level_page(part), lesson.id)
-        for part in levels
-        for lesson in part.lessons
-    }
-    first = Book(
-        urls.COURSE_PAGE, course.title, course.summary, levels, places, levels if one else ()
+def book(course: WholeCourse, style: str) -> bytes:
+    """The page; `style` is the site path of the style sheet."""
+    library, words = course.library, course.library.words
+    about = library.course
+    contents = course.contents(
+        lambda level: f"#{urls.quoted(_anchor('level', level.id))}",
+        lambda lesson: f"#{urls.quoted(_anchor(lesson.id))}",
     )
-    if one:
-        return (first,)
-    rest = (
-        Book(
-            _level_page(part),
-            f"{library.words('level.label', id=part.id)}: {part.title}",
-            part.summary,
-            (part,),
-            places,
-            (part,),
+    place = {urls.lesson_path(lesson): lesson.id for lesson in course.lessons}
+    picture = functools.cache(functools.partial(_data_address, course))
+
+    def address(path: str, anchor: str) -> str:
+        if path in place:
+            return f"#{urls.quoted(_anchor(place[path], anchor))}"
+        return course.site_address(path, anchor)
+
+    def section(lesson: Lesson) -> Markup:
+        rules = Rules(
+            urls.lesson_path(lesson),
+            address,
+            picture,
+            functools.partial(_anchor, lesson.id),
+            lowered=_LOWERED,
+            closed=_ANSWERS,
+            section=lesson.id,
         )
-        for part in levels
+        return course.lesson(lesson, rules, to_html, _anchor(lesson.id))
+
+    language = about.language or "en"
+    levels = (
+        (level, _anchor("level", level.id), map(section, lessons))
+        for level, lessons in course.levels
     )
-    return (first, *rest)
+    page = library.render(
+        "exports/book.html",
+        mark=Markup(MARK.decode()),
+        language=language,
+        direction=direction(language),
+        style=Markup(_style(course, style)),
+        head_title=words("exports.book_title", title=about.title),
+        title=about.title,
+        summary=about.summary,
+        facts=course.facts(),
+        licence=about.licence,
+        contents=contents,
+        levels=levels,
+    )
+    return visible(page).encode()
 
 
-def _level_page(part: Part) -> str:
-    return f"{urls.COURSE_PAGES}{part.id}.html"
+def _anchor(lesson: str, id: str = "_top") -> str:
+    """The id on the page of what has an id in a lesson; of the lesson.
+
+    In a drawing an id must be a name of XML, which does not begin with a digit.
+    """
+    return f"_{lesson}--{id or '_top'}"
+
+
+def _style(course: WholeCourse, path: str) -> str:
+    """The style sheet, with the fonts in it. Nothing in it ends the element that it stands in."""
+    folder = posixpath.dirname(path)
+
+    def inside(match: re.Match[str]) -> str:
+        return f'url("{_data_address(course, posixpath.join(folder, match[1]))}")'
+
+    return _URL.sub(inside, course.files[path]().decode()).replace("</", "<\\/")
+
+
+def _data_address(course: WholeCourse, path: str) -> str:
+    """A file as an address that holds it; empty where it cannot be shown."""
+    kind = _TYPES.get(path.lower().rpartition(".")[2])
+    if kind is None or path not in course.files:
+        return ""
+    return f"data:{kind};base64,{base64.b64encode(course.files[path]()).decode()}"

@@ -6,8 +6,7 @@ Entry point: `cover(title, direction)`.
 from __future__ import annotations
 
 import unicodedata
-
-from coursebuild.render.exports.addresses import escape
+from html import escape
 
 _WIDTH, _HEIGHT = 1200, 1600
 _EDGE = 120

@@ -1,6 +1,6 @@
 """The whole course as an e-book: EPUB 3.
 
-Entry point: `Epub`, whose `files` are those of the archive, in order.
+Entry point: `epub_files(course, style)`, the files of the archive.
 
 1. Each lesson is a chapter of XHTML, drawn as on its page: formulas are MathML, folds are open,
    labs are their recorded pictures. Links between lessons lead to chapters; others lead to the site
@@ -13,35 +13,33 @@ Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import re
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.model import Lesson
+from coursebuild.model import Lesson, Level
+from coursebuild.patterns import pattern
 from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.direction import direction
-from coursebuild.render.exports.addresses import filled, quoted, xml_id
-from coursebuild.render.exports.archive import File
 from coursebuild.render.exports.cover import cover
-from coursebuild.render.exports.outline import Entry, LevelEntry, Part, facts, written
-from coursebuild.render.exports.parts import OpenChapter
-from coursebuild.render.library import Library
-from coursebuild.render.styles import style_rules
+from coursebuild.render.exports.rewrite import Rules
+from coursebuild.render.exports.whole_course import WholeCourse
+from coursebuild.render.html_tree import to_xml
+from coursebuild.results import KeptFile, OutputFile, SiteFile
 
-MIMETYPE = b"application/epub+zip"
-MODIFIED = "2000-01-01T00:00:00Z"
+PACKAGE = "EPUB/package.opf"
+_MODIFIED = "2000-01-01T00:00:00Z"
 """See the module."""
-_CONTAINER = b"""\
+_CONTAINER = f"""\
 <?xml version="1.0" encoding="utf-8"?>
 <container xmlns="urn:oasis:names:tc:opendocument:xmlns:container" version="1.0">
 <rootfiles>
-<rootfile full-path="EPUB/package.opf" media-type="application/oebps-package+xml"/>
+<rootfile full-path="{PACKAGE}" media-type="application/oebps-package+xml"/>
 </rootfiles>
 </container>
 """
@@ -53,112 +51,87 @@ _TYPES = {
     "svg": "image/svg+xml",
     "webp": "image/webp",
 }
+"""Of the pictures that every reading system shows."""
 _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
+_STYLE_RULE = pattern(r"\.s[0-9a-f]{7}\{[^{}]*\}")
+"""A rule of the site's style sheet that stands for a style in an element, see `styles`."""
 
 
-class Chapter(Struct, frozen=True):
-    """What the package must know of a lesson's chapter."""
-
-    pictures: tuple[str, ...]
-    mathml: bool
-    svg: bool
-
-
-class Item(Struct, frozen=True):
+class EpubItem(Struct, frozen=True):
     """A file of the package."""
 
     id: str
     href: str
     type: str
     properties: str = ""
-    linear: bool | None = None
-    """Whether it is read in order; `None`: it is no page."""
+    linear: bool = False
+    """Whether it is a page, which is read in its place."""
 
 
-class Epub:
-    """The e-book of a course."""
+def epub_files(course: WholeCourse, style: str, sheet: str) -> tuple[SiteFile, ...]:
+    """The files; `style` is the e-book's style sheet, `sheet` the site path of the site's."""
+    rules = _STYLE_RULE.findall(course.files[sheet]().decode())
+    return tuple(_Epub(course).files("\n".join((style, *rules, ""))))
 
-    def __init__(
-        self,
-        library: Library,
-        style: str,
-        declarations: Iterable[str],
-    ) -> None:
-        """`style` is the style sheet, `declarations` are those written in elements of lessons."""
-        self._library = library
-        self._levels = written(library)
-        self._css = style + style_rules(declarations)
-        self._names = {
-            urls.lesson_path(lesson): chapter_name(lesson)
-            for part in self._levels
-            for lesson in part.lessons
-        }
+
+class _Epub:
+    def __init__(self, course: WholeCourse) -> None:
+        self._course = course
+        self._library = course.library
+        self._names = {urls.lesson_path(lesson): _lesson_name(lesson) for lesson in course.lessons}
         self._pictures: dict[str, str] = {}
         """Names of pictures in the package, by their site path."""
 
-    @property
-    def lessons(self) -> Iterator[Lesson]:
-        """The lessons that are chapters, in order."""
-        return (lesson for part in self._levels for lesson in part.lessons)
-
-    @property
-    def places(self) -> str:
-        """All that the links of a chapter depend on."""
-        return f"{self._library.course.base_url}\0{sorted(self._names.items())!r}"
-
-    def files(
-        self,
-        facts: Callable[[Lesson], Chapter],
-        picture: Callable[[str], bytes],
-    ) -> Iterator[File]:
-        """The files in order; `picture` gives the bytes at a site path.
-
-        Those of chapters are made by whoever calls, see `chapter`.
-        """
-        yield File("mimetype", lambda: MIMETYPE)
-        yield File("META-INF/container.xml", lambda: _CONTAINER)
-        items = self._items(facts)
-        opf = self._opf(items)
-        yield File("EPUB/package.opf", lambda: opf)
-        nav = self._nav()
-        yield File("EPUB/nav.xhtml", lambda: nav)
-        yield File("EPUB/style.css", self._css.encode)
-        yield File("EPUB/cover.svg", self._cover)
-        yield File("EPUB/title.xhtml", self._title)
-        for part in self._levels:
-            yield File(f"EPUB/{_level_name(part)}", functools.partial(self._level, part))
-            for lesson in part.lessons:
-                yield File(self.file_of(lesson), bytes)
+    def files(self, style: str) -> Iterator[SiteFile]:
+        yield OutputFile("mimetype", b"application/epub+zip")
+        yield OutputFile("META-INF/container.xml", _CONTAINER.encode())
+        items = [
+            EpubItem("title", "title.xhtml", _XHTML, linear=True),
+            EpubItem("nav", "nav.xhtml", _XHTML, "nav", linear=True),
+            EpubItem("style", "style.css", "text/css"),
+            EpubItem("cover", "cover.svg", _TYPES["svg"], "cover-image"),
+        ]
+        yield OutputFile("EPUB/style.css", style.encode())
+        yield OutputFile("EPUB/cover.svg", self._cover())
+        yield OutputFile("EPUB/title.xhtml", self._title())
+        yield OutputFile("EPUB/nav.xhtml", self._nav())
+        for level, lessons in self._course.levels:
+            name = _level_name(level)
+            items.append(EpubItem(f"x-{xml_id(name)}", name, _XHTML, linear=True))
+            yield OutputFile(f"EPUB/{name}", self._level(level))
+            for lesson in lessons:
+                chapter = self._chapter(lesson)
+                items.append(_chapter_item(_lesson_name(lesson), chapter))
+                yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
         for path, name in self._pictures.items():
-            yield File(f"EPUB/{name}", functools.partial(picture, path))
-
-    def file_of(self, lesson: Lesson) -> str:
-        """The path of a lesson's chapter in the archive."""
-        return f"EPUB/{self._names[urls.lesson_path(lesson)]}"
+            items.append(EpubItem(f"i-{xml_id(name)}", name, _TYPES[_ending(path)]))
+            yield KeptFile(f"EPUB/{name}", "", self._course.files[path])
+        yield OutputFile(PACKAGE, self._package(items))
 
     # --- pages
 
-    def chapter(self, lesson: Lesson, part: OpenChapter) -> bytes:
-        """A chapter with its links put in."""
-        text = filled(part.text, self._address)
+    def _chapter(self, lesson: Lesson) -> bytes:
+        path = urls.lesson_path(lesson)
+        rules = Rules(path, self._address, self._picture, xml_id)
+        text = self._course.lesson(lesson, rules, to_xml, "_top")
         return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
 
-    def _page(self, title: str, body: Markup | str, kind: str = "") -> bytes:
+    def _page(self, title: str, body: Markup, kind: str = "") -> bytes:
         language = self._library.course.language or "en"
         text = self._library.render(
             "exports/epub-page.html",
             language=language,
             direction=direction(language),
             title=title,
-            body=Markup(body),
+            body=body,
             kind=kind,
         )
         return visible(text).encode()
 
-    def _level(self, part: Part) -> bytes:
-        body = self._library.render("exports/epub-level.html", level=part)
-        return self._page(f"{part.id} {part.title}", body, "bodymatter")
+    def _level(self, level: Level) -> bytes:
+        body = self._library.render("exports/epub-level.html", level=level)
+        return self._page(f"{level.id} {level.title}", body, "bodymatter")
 
     def _title(self) -> bytes:
         course = self._library.course
@@ -166,14 +139,14 @@ class Epub:
             "exports/epub-title.html",
             title=course.title,
             summary=course.summary,
-            facts=facts(self._library, len(self._names)),
+            facts=self._course.facts(),
             licence=course.licence,
             address=course.base_url,
         )
         return self._page(course.title, body, "frontmatter")
 
     def _nav(self) -> bytes:
-        levels = tuple(map(self._entry, self._levels))
+        levels = self._course.contents(_level_name, _lesson_name)
         body = self._library.render(
             "exports/epub-nav.html",
             title=self._library.course.title,
@@ -182,46 +155,11 @@ class Epub:
         )
         return self._page(self._library.words("exports.contents"), body, "frontmatter")
 
-    def _entry(self, part: Part) -> LevelEntry:
-        lessons = tuple(
-            Entry(lesson.id, lesson.title, self._names[urls.lesson_path(lesson)])
-            for lesson in part.lessons
-        )
-        return LevelEntry(part.id, part.title, part.summary, "", _level_name(part), lessons)
-
     def _cover(self) -> bytes:
         course = self._library.course
-        picture = cover(course.title, direction(course.language or "en"))
-        return visible(picture).encode()
+        return visible(cover(course.title, direction(course.language or "en"))).encode()
 
-    # --- the package
-
-    def _items(self, facts: Callable[[Lesson], Chapter]) -> list[Item]:
-        items = [
-            Item("nav", "nav.xhtml", _XHTML, "nav", linear=True),
-            Item("style", "style.css", "text/css"),
-            Item("cover", "cover.svg", _TYPES["svg"], "cover-image"),
-            Item("title", "title.xhtml", _XHTML, linear=True),
-        ]
-        items[0], items[3] = items[3], items[0]  # the title is read first
-        for part in self._levels:
-            name = _level_name(part)
-            items.append(Item(f"x-{xml_id(name)}", name, _XHTML, linear=True))
-            for lesson in part.lessons:
-                items.append(self._lesson_item(lesson, facts(lesson)))
-        for path, name in self._pictures.items():
-            kind = _TYPES[path.lower().rpartition(".")[2]]
-            items.append(Item(f"i-{xml_id(name)}", name, kind))
-        return items
-
-    def _lesson_item(self, lesson: Lesson, chapter: Chapter) -> Item:
-        name = self._names[urls.lesson_path(lesson)]
-        for path in chapter.pictures:
-            self._pictures.setdefault(path, _picture_name(path))
-        properties = [key for key in ("mathml", "svg") if getattr(chapter, key)]
-        return Item(f"x-{xml_id(name)}", name, _XHTML, " ".join(properties), linear=True)
-
-    def _opf(self, items: list[Item]) -> bytes:
+    def _package(self, items: list[EpubItem]) -> bytes:
         course = self._library.course
         mathml = any("mathml" in item.properties for item in items)
         features = (*_FEATURES, "MathML") if mathml else _FEATURES
@@ -235,7 +173,7 @@ class Epub:
             summary=course.summary,
             licence=course.licence,
             address=course.base_url,
-            modified=MODIFIED,
+            modified=_MODIFIED,
             visual=bool(self._pictures),
             features=(*features, "alternativeText") if self._pictures else features,
             items=items,
@@ -244,34 +182,47 @@ class Epub:
 
     # --- links
 
-    def _address(self, path: str, id: str, shown: bool) -> str:
-        """Where a link of a chapter leads, or where a picture is; empty for nowhere."""
-        if shown:
-            return _picture_name(path)
+    def _address(self, path: str, anchor: str) -> str:
+        """Where a link of a chapter leads; empty for nowhere."""
         name = self._names.get(path)
-        if name is not None:
-            return f"{name}#{quoted(xml_id(id))}" if id else name
-        course = self._library.course
-        address = urls.absolute(course, path)
-        return f"{address}#{quoted(id)}" if address and id else address
+        if name is None:
+            return self._course.site_address(path, anchor)
+        return f"{name}#{urls.quoted(xml_id(anchor))}" if anchor else name
+
+    def _picture(self, path: str) -> str:
+        """Where a picture is, which is now part of the package; empty where it cannot be."""
+        if _ending(path) not in _TYPES or path not in self._course.files:
+            return ""
+        digest = hashlib.sha256(path.encode()).hexdigest()[:12]
+        name = f"images/{digest}.{_ending(path)}"
+        return self._pictures.setdefault(path, name)
 
 
-def chapter_name(lesson: Lesson) -> str:
-    """The name of a lesson's chapter in the package."""
-    return _name(f"{lesson.id}-{lesson.slug}", ".xhtml")
+def _chapter_item(name: str, chapter: bytes) -> EpubItem:
+    properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
+    return EpubItem(f"x-{xml_id(name)}", name, _XHTML, " ".join(properties), linear=True)
 
 
-def _level_name(part: Part) -> str:
-    return _name(f"level-{part.id}", ".xhtml")
+def xml_id(id: str) -> str:
+    """An id as a name of XML: characters that no name has are written as their numbers."""
+    name = re.sub(r"[^A-Za-z0-9_.-]", lambda match: f"_{ord(match[0]):x}_", id)
+    return f"_{name}" if not name or name[0] in "0123456789.-" else name
 
 
-def _picture_name(path: str) -> str:
-    digest = hashlib.sha256(path.encode()).hexdigest()[:12]
-    return f"images/{digest}.{path.lower().rpartition('.')[2]}"
+def _ending(path: str) -> str:
+    return path.lower().rpartition(".")[2]
 
 
-def _name(name: str, ending: str) -> str:
+def _lesson_name(lesson: Lesson) -> str:
+    return _file_name(f"{lesson.id}-{lesson.slug}")
+
+
+def _level_name(level: Level) -> str:
+    return _file_name(f"level-{level.id}")
+
+
+def _file_name(name: str) -> str:
     """A file name of ASCII, which every reading system takes."""
     if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
-        return name + ending
-    return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}{ending}"
+        return f"{name}.xhtml"
+    return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}.xhtml"

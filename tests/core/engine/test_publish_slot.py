@@ -6,7 +6,6 @@ import errno
 import os
 import random
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -156,14 +155,10 @@ def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others
             os.kill(os.getpid(), signal.SIGKILL)
         return b"written in the end"
 
-    def pieces() -> Iterator[bytes]:
-        return (b"%d\n" % n for n in range(1000))
-
     def files(last: bytes) -> list[SiteFile]:
         found: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
         found += [KeptFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]  # type: ignore[misc]
         found += [KeptFile(f"died {n}", "k", die) for n in range(2)]
-        found.append(KeptFile("pieces", "k", lambda: b"", pieces))
         return [*found, OutputFile("last", last)]
 
     for jobs in (1, 3):

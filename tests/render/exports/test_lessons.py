@@ -1,4 +1,4 @@
-"""Lessons as Markdown, as notebooks, and as parts of the whole course."""
+"""Lessons as Markdown, and as notebooks."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.render import SiteOptions, check_links
+from coursebuild.render import SiteOptions
 from coursebuild.render.exports import twin
-from coursebuild.render.exports.book import books
-from coursebuild.render.library import Library
 from coursebuild.render.urls import Place
-from coursebuild.results import Outcome, OutputFile, ScriptRun
-from support.rendered_course import MAP, Made, Make
+from coursebuild.results import Outcome, ScriptRun
+from support.rendered_course import Make
 
 LESSON = """## Part {#part}
 
@@ -220,55 +218,7 @@ def test_ids_of_cells_differ_whatever_the_headings(make: Make) -> None:
     assert len(set(ids)) == len(ids) == 5
 
 
-# ------------------------------------------------------------------------------ the whole course
-
-
-def test_the_whole_course_is_one_page(files: dict[str, bytes]) -> None:
-    page = files["course/index.html"].decode()
-    ids = re.findall(r' id="([^"]*)"', page)
-    assert len(ids) == len(set(ids))
-    assert "data-lab" not in page and "data-quiz" not in page and "data-script" not in page
-    assert '<meta name="robots" content="noindex">' in page
-    assert 'href="#_1.1--more"' in page and 'id="_1.1--more"' in page
-    assert 'href="#_0.1--part"' in page and 'href="#_1.1--_top"' in page
-    assert page.index('id="_0.1--_top"') < page.index('id="_1.1--_top"')
-    assert page.count("<h1") == 1
-    sound = [OutputFile(path, data) for path, data in files.items()]
-    assert check_links(sound, "https://example.org/course/") == ()
-
-
-def long_course(make: Make, written: int) -> Made:
-    """A course of so many written lessons, of which those that `MAP` names link to each other."""
-    more = [f"1.{number}" for number in range(3, written + 1)]
-    lesson = '[[level.lesson]]\nid = "{0}"\nslug = "x"\ntitle = "X"\nstatus = "draft"\n\n'
-    texts = {"1.1": OTHER, **dict.fromkeys(more, "Text.")}
-    return make(LESSON, course=MAP + "".join(map(lesson.format, more)), **texts)
-
-
-def test_a_course_is_one_page_up_to_250_lessons(make: Make) -> None:
-    def pages(written: int) -> list[str]:
-        made = long_course(make, written)
-        return [book.path for book in books(Library.of(made.course, made.results, made.assets))]
-
-    assert pages(250) == ["course/index.html"]
-    assert pages(251) == ["course/index.html", "course/0.html", "course/1.html"]
-
-
-@pytest.mark.site
-def test_a_longer_course_is_a_page_for_each_level(make: Make) -> None:
-    files = long_course(make, 251).site()
-    assert {path for path in files if path.startswith("course/")} == {
-        "course/0.html",
-        "course/1.html",
-        "course/index.html",
-    }
-    assert b'href="1.html#_1.1--more"' in files["course/0.html"]
-    assert b'href="0.html#_0.1--_top"' in files["course/index.html"]
-    sound = [OutputFile(path, data) for path, data in files.items()]
-    assert check_links(sound, "https://example.org/course/") == ()
-
-
-def test_a_course_without_written_lessons_has_no_book_and_no_notebook(make: Make) -> None:
+def test_a_course_without_written_lessons_has_no_notebook(make: Make) -> None:
     made = make("Text.")
     levels = tuple(
         replace(level, lessons=tuple(replace(x, document=None) for x in level.lessons))
@@ -276,8 +226,8 @@ def test_a_course_without_written_lessons_has_no_book_and_no_notebook(make: Make
     )
     course = replace(made.course, levels=levels)
     files = replace(made, course=course).site(SiteOptions(subset=lambda job: job.data))
-    assert not [path for path in files if path.endswith((".ipynb", ".epub")) or "course/" in path]
-    assert b"course.epub" not in files["index.html"] and b"Optional" in files["llms.txt"]
+    assert not [path for path in files if path.endswith(".ipynb")]
+    assert b"Optional" in files["llms.txt"]
 
 
 def test_numbers_of_formulas_are_written(make: Make) -> None:

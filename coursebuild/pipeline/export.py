@@ -1,4 +1,4 @@
-"""`coursebuild export`: the course, or its quizzes, as an archive for learning platforms.
+"""`coursebuild export`: the course, or its quizzes, as one file for other programs and for paper.
 
 Entry point: `export(options, kind, out)`.
 
@@ -6,14 +6,13 @@ The course is verified as for a build, and nothing is written where something is
 
 - `scorm`: the files of the site, a page that opens each lesson, and a manifest.
 - `qti`: the items of the quizzes of each document, kept under the key of its page, and a manifest.
-
-Of a file no more is held than how it is made: archives are written one file after the other.
+- `epub`, `page`: the lessons as an e-book and on one page, made from the pages of the site.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal, TypeAlias, assert_never
 
@@ -21,7 +20,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.archives import check_archive, write_archive
+from coursebuild.effects.archives import (
+    begins_with,
+    check_target,
+    holds,
+    write_archive,
+    write_single,
+)
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.prepared import prepared_folder
@@ -36,46 +41,60 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.outlines import unpack
 from coursebuild.pipeline.pages import page_key
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.reading import drawing_tools
 from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
 from coursebuild.pipeline.site import Site, site_files
 from coursebuild.render import urls
 from coursebuild.render.assets import Assets
+from coursebuild.render.exports import book, epub
+from coursebuild.render.exports.whole_course import WholeCourse
 from coursebuild.render.library import Library
 from coursebuild.render.packages import qti, scorm
 from coursebuild.render.packages.items import Loss, MadeQuiz
 from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.sheet import sheet_bytes
-from coursebuild.render.tools import Tools
 from coursebuild.report import Report
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
 
-Kind: TypeAlias = Literal["qti", "scorm"]
-NAMES: dict[Kind, str] = {"qti": "quizzes-qti.zip", "scorm": "course-scorm.zip"}
-"""What an archive is called where nothing is said."""
+Kind: TypeAlias = Literal["epub", "page", "qti", "scorm"]
+NAMES: dict[Kind, str] = {
+    "epub": "course.epub",
+    "page": "course.html",
+    "qti": "quizzes-qti.zip",
+    "scorm": "course-scorm.zip",
+}
+"""What a file is called where nothing is said."""
+_IS_OURS: dict[Kind, Callable[[Path], bool]] = {
+    "epub": functools.partial(holds, name=epub.PACKAGE),
+    "page": functools.partial(begins_with, mark=book.MARK),
+    "qti": functools.partial(holds, name=qti.MANIFEST),
+    "scorm": functools.partial(holds, name=scorm.MANIFEST),
+}
+"""Whether a file is one that an earlier export may have written."""
 _AT_ONCE = 256
 """Documents whose items are waited for before more are made."""
 
 
 def export(options: Options, kind: Kind, out: Path) -> Report:
-    """Write the archive to `out` (relative to the course's folder), or nothing."""
+    """Write the file to `out` (relative to the course's folder), or nothing."""
     progress = Progress(quiet=options.quiet)
     place = options.root / out
-    check_archive(options.root, place, qti.MANIFEST)
-    make = functools.partial(_packed, kind)
+    check_target(options.root, place, _IS_OURS[kind])
+    make = functools.partial(_exported, kind)
     with project_lock(options.root, progress.say), prepare(options, progress, make) as prepared:
         if not prepared.report.ok:
             return replace(prepared.report, remarks=("nothing was written",))
         if not prepared.files:
             raise EffectError("the course has no quiz with a question, so there is no QTI package")
         with progress.stage("packing"):
-            size = write_archive(place, prepared.files)
-    said = f"wrote {len(prepared.files)} files to {out}, {size / 1e6:.1f} MB"
+            write = write_single if kind == "page" else write_archive
+            size = write(place, prepared.files)
+    count = len(prepared.files)
+    said = f"wrote {f'{count} files to ' if count > 1 else ''}{out}, {size / 1e6:.1f} MB"
     return replace(prepared.report, remarks=(said,), depends=None)
 
 
-def _packed(
+def _exported(
     kind: Kind,
     course: Course,
     results: Results,
@@ -83,31 +102,51 @@ def _packed(
     options: Options,
     reports: Reports,
 ) -> Site:
-    """The files of a package, as the files of a site."""
+    """The files of an export, as the files of a site."""
     assets = Assets(template_texts(), Bundle(), prepared_folder())
+    library = Library.of(course, results, assets, reports)
+    if kind == "qti":
+        items = _Items(library, documents, options)
+        return Site(tuple(items.files()), None, tuple(items.diagnostics), ())
+    site = site_files(course, results, documents, options, reports)
+    files: tuple[SiteFile, ...]
     match kind:
         case "scorm":
-            site = site_files(course, results, documents, options, reports)
-            tools = drawing_tools(options.store, course.language)
-            return replace(site, files=tuple(_scorm(course, tools, assets, site)), listed=None)
-        case "qti":
-            library = Library.of(course, results, assets, reports)
-            items = _Items(library, documents, options)
-            return Site(tuple(items.files()), None, tuple(items.diagnostics), ())
+            files = tuple(_scorm(library, assets, site))
+        case "epub":
+            style = assets.template("exports/epub.css")
+            files = epub.epub_files(_whole(library, site), style, _style_sheet(site))
+        case "page":
+            page = book.book(_whole(library, site), _style_sheet(site))
+            files = (OutputFile(NAMES[kind], page),)
         case _:
             assert_never(kind)
+    return replace(site, files=files, listed=None)
 
 
-# ---------------------------------------------------------------------------------------- SCORM
+def _whole(library: Library, site: Site) -> WholeCourse:
+    return WholeCourse(library, {file.path: functools.partial(_data, file) for file in site.files})
 
 
-def _scorm(course: Course, tools: Tools, assets: Assets, site: Site) -> Iterator[SiteFile]:
+def _data(file: SiteFile) -> bytes:
+    return file.data if isinstance(file, OutputFile) else file.make()
+
+
+def _style_sheet(site: Site) -> str:
+    """The site path of the style sheet of all pages."""
+    return next(
+        f.path for f in site.files if f.path.startswith("assets/site.") and f.path.endswith(".css")
+    )
+
+
+def _scorm(library: Library, assets: Assets, site: Site) -> Iterator[SiteFile]:
+    course = library.course
     packed = [file for file in site.files if scorm.is_packed(file.path)]
     shared = tuple(scorm.shared_files(assets))
     yield from packed
     yield from shared
     for entry in scorm.written(course):
-        make = functools.partial(scorm.launch_page, course, entry, tools)
+        make = functools.partial(scorm.launch_page, course, entry, library.tools)
         yield KeptFile(scorm.launch_path(entry), "", make)
     yield scorm.manifest(course, sorted(file.path for file in (*packed, *shared)))
 
