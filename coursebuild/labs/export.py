@@ -210,15 +210,15 @@ class _Script:
         constants.append(text.DIVERGED)
         if self.lab.xml is not None:
             constants.append(f"XML = {text.long_text(self.lab.xml.text)}")
-        if any("random" in names_in(section) for section in sections):
+        if "random" in names_in(*sections):
             sections = [f"random = Random({self.lab.seed or 0})", *sections]
-        needed = helpers("\n".join(sections))
-        body = "\n\n\n".join(["\n".join(constants), *(LIBRARY[n] for n in needed), *sections])
+        parts = ["\n".join(constants), *(LIBRARY[name] for name in helpers(*sections)), *sections]
+        body = "\n\n\n".join(parts)
         try:
             body.encode()
         except UnicodeEncodeError:
             raise UntranslatableError("a text that no script can hold") from None
-        head = [*text.docstring(self.lab, self.metadata), "", *imports(body)]
+        head = [*text.docstring(self.lab, self.metadata), "", *imports(*parts)]
         return "\n".join([*head, "", body, "", "", 'if __name__ == "__main__":', "    main()", ""])
 
     # --- pieces

@@ -34,7 +34,7 @@ _SOFT = 8.0
 """The exponent up to which a spot light is soft from its middle on."""
 
 
-class Lamp(Struct, frozen=True):
+class PointLight(Struct, frozen=True):
     """A light: of parallel rays, of a point, or of a cone."""
 
     colour: Array
@@ -52,7 +52,7 @@ class Light(Struct, frozen=True):
 
     ambient: Array
     """(3,), RGB, from all sides."""
-    lamps: tuple[Lamp, ...]
+    point_lights: tuple[PointLight, ...]
     gloss: float
     """How strong highlights are."""
 
@@ -90,8 +90,8 @@ def material_of(scene: dict[str, Any], index: int) -> Material:
 def studio(forward: Array) -> Light:
     """The light of a model without lights, for a camera that looks along `forward`."""
     above = -np.array(_FROM_ABOVE) / np.linalg.norm(_FROM_ABOVE)
-    lamps = (Lamp(np.full(3, _FRONT), forward), Lamp(np.full(3, _ABOVE), above))
-    return Light(np.full(3, _AMBIENT), lamps, _WITHOUT_LIGHTS)
+    point_lights = (PointLight(np.full(3, _FRONT), forward), PointLight(np.full(3, _ABOVE), above))
+    return Light(np.full(3, _AMBIENT), point_lights, _WITHOUT_LIGHTS)
 
 
 def light_of(scene: dict[str, Any], frame: Array, forward: Array) -> Light:
@@ -102,9 +102,9 @@ def light_of(scene: dict[str, Any], frame: Array, forward: Array) -> Light:
     shining = [*lights, headlight] if headlight["active"] else lights
     start = scene["layout"]["lights"]
     rows = [frame[start + _LIGHT * i : start + _LIGHT * (i + 1)] for i in range(len(lights))]
-    own = [_lamp(light, row) for light, row in zip(lights, rows, strict=True) if row[6] != 0]
+    own = [_point_light(light, row) for light, row in zip(lights, rows, strict=True) if row[6] != 0]
     if headlight["active"]:
-        own.append(Lamp(np.array(headlight["diffuse"]), forward))
+        own.append(PointLight(np.array(headlight["diffuse"]), forward))
     diffuse = sum(sum(light["diffuse"]) for light in shining)
     specular = sum(sum(light["specular"]) for light in shining)
     gloss = min(2.0, specular / diffuse) if diffuse > 0 else 0.0
@@ -112,17 +112,17 @@ def light_of(scene: dict[str, Any], frame: Array, forward: Array) -> Light:
     return Light(ambient, tuple(lamp for lamp in own if np.isfinite(lamp.direction).all()), gloss)
 
 
-def _lamp(light: dict[str, Any], row: Array) -> Lamp:
+def _point_light(light: dict[str, Any], row: Array) -> PointLight:
     colour, position = np.array(light["diffuse"]), row[:3]
     length = float(np.linalg.norm(row[3:6]))
     direction = row[3:6] / (length if length > 0 else 1.0)
     if light["type"] == _DIRECTIONAL:
-        return Lamp(colour, direction)
+        return PointLight(colour, direction)
     if light["type"] != _SPOT or light["cutoff"] >= 90:
-        return Lamp(colour, direction, position)
+        return PointLight(colour, direction, position)
     angle = np.radians(light["cutoff"])
     bright = angle * (1 - min(1.0, _SOFT / max(_SOFT, light["exponent"])))
-    return Lamp(colour, direction, position, (float(np.cos(angle)), float(np.cos(bright))))
+    return PointLight(colour, direction, position, (float(np.cos(angle)), float(np.cos(bright))))
 
 
 def shaded(
@@ -144,7 +144,7 @@ def shaded(
     else:
         mirrored = np.full(3, 8 / (exponent + 2) * material.specular * light.gloss)
     total = emitted + light.ambient * base + np.zeros((len(points), 1))
-    for lamp in light.lamps:
+    for lamp in light.point_lights:
         back, strength = _rays(lamp, points)
         facing = np.clip(_dot(normals, back), 0.0, None) * strength
         half = _unit(back + toward)
@@ -155,7 +155,7 @@ def shaded(
     return total
 
 
-def _rays(lamp: Lamp, points: Array) -> tuple[Array, Array]:
+def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
     """Directions from points to a lamp, and how much of its light comes there."""
     if lamp.position is None:
         return -lamp.direction[None, :], np.ones(len(points))

@@ -232,23 +232,28 @@ _IMPORTS = {
 """What a script takes from modules of the standard library, by module."""
 
 
-def names_in(code: str) -> set[str]:
-    """The names that code uses."""
-    return {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
+def names_in(*sections: str) -> set[str]:
+    """The names that code uses, and that the section of it where it does so does not define."""
+    found: set[str] = set()
+    for section in sections:
+        names = [node for node in ast.walk(ast.parse(section)) if isinstance(node, ast.Name)]
+        own = {name.id for name in names if isinstance(name.ctx, ast.Store)}
+        found |= {name.id for name in names} - own
+    return found
 
 
-def helpers(code: str) -> list[str]:
+def helpers(*sections: str) -> list[str]:
     """Names of the helpers that code uses, and of those that they use, in order."""
-    wanted, new = set[str](), names_in(code) & LIBRARY.keys()
+    wanted, new = set[str](), names_in(*sections) & LIBRARY.keys()
     while new:
         wanted |= new
-        new = set[str]().union(*(names_in(LIBRARY[name]) for name in new)) & LIBRARY.keys() - wanted
+        new = names_in(*(LIBRARY[name] for name in new)) & LIBRARY.keys() - wanted
     return [name for name in LIBRARY if name in wanted]
 
 
-def imports(code: str) -> list[str]:
+def imports(*sections: str) -> list[str]:
     """The import statements that code needs, in their usual order, with lines between groups."""
-    used = names_in(code)
+    used = names_in(*sections)
     standard = [f"import {module}" for module in ("math", "struct") if module in used]
     for module, names in _IMPORTS.items():
         if taken := [name for name in names if name in used]:

@@ -1,9 +1,11 @@
 """Triangles on a screen: which surface is nearest at each sample, and what of it is there.
 
-Entry point: `Raster(size, eye, lens).add(layer, placed)`.
+Entry point: `GBuffer(eye).add(index, surface, position, rotation)`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from msgspec import Struct
@@ -12,192 +14,129 @@ from numpy.typing import NDArray
 from coursebuild.labs.shapes import Array, Surface
 
 _FAR_AWAY = 1e12
-"""m; what is beyond, or nowhere, is not drawn."""
-_AT_ONCE = 1 << 20
-"""Samples that are looked at together."""
-PLACE, NORMAL, WRAP, _KEPT = slice(0, 3), slice(3, 6), slice(6, 8), 8
+"""m; what is beyond, or nowhere, is not drawn: a simulation that blew up throws things out."""
+_AT_ONCE = 1 << 18
+"""Samples that are looked at together, where no single triangle has more."""
+POSITION, NORMAL, UV, _ATTRIBUTES = slice(0, 3), slice(3, 6), slice(6, 8), 8
 """What is kept of a surface at a sample, in the solid's own frame."""
 
 
 class Eye(Struct, frozen=True):
-    """Where a picture is seen from: a camera, or its image in a mirror."""
+    """What a picture is seen with: a camera, or its image in a mirror."""
 
+    size: tuple[int, int]
+    """Width and height of the screen, samples."""
+    focal: float
+    """Distance of the screen, samples."""
+    near: float
+    """m; what is nearer is not seen."""
     position: Array
     axes: Array
     """Rows: to the right, up and into the picture."""
-    floor: tuple[Array, float] | None = None
+    mirror: tuple[Array, float] | None = None
     """Normal and offset of the mirror, behind which nothing is seen."""
 
 
-class Layer:
+class GBuffer:
     """The nearest surface of each sample."""
 
-    def __init__(self, depth: Array) -> None:
-        self.depth = depth
-        self.solid = np.full(depth.shape, -1, np.int32)
-        self.kept = np.zeros((*depth.shape, _KEPT), np.float32)
-
-
-class Placed(Struct, frozen=True):
-    """A surface at its place in the world, and the number it has in a layer."""
-
-    index: int
-    surface: Surface
-    position: Array
-    """(3,), m."""
-    rotation: Array
-    """(3, 3)."""
-    front: bool
-    """Whether only triangles that show their outside are drawn."""
-
-
-class Raster:
-    """Draws triangles as an eye sees them."""
-
-    def __init__(self, size: tuple[int, int], eye: Eye, lens: tuple[float, float]) -> None:
-        """A screen of `size` = (width, height) samples for an eye.
-
-        `lens`: the vertical field of view, degrees, and the distance, m, from which on it sees.
-        """
-        self.width, self.height = size
+    def __init__(self, eye: Eye) -> None:
+        width, height = eye.size
         self.eye = eye
-        fovy, near = lens
-        self.focal = self.height / 2 / np.tan(np.radians(fovy) / 2)
-        self.near = max(near, 1e-6)
+        self.depth = np.full((height, width), np.inf)
+        self.solid = np.full((height, width), -1, np.int32)
+        self.attributes = np.zeros((height, width, _ATTRIBUTES), np.float32)
 
-    def add(self, layer: Layer, solid: Placed) -> None:
-        """Draw a surface into a layer."""
-        surface = solid.surface
+    def add(
+        self, index: int, surface: Surface, position: Array, rotation: Array, *, front: bool
+    ) -> None:
+        """Draw a surface at its place in the world; `front`: only triangles seen from outside."""
+        eye = self.eye
         with np.errstate(over="ignore", invalid="ignore"):
-            world = turned(surface.vertices, solid.rotation) + solid.position
-            seen = turned(world - self.eye.position, self.eye.axes)
-        wrap = np.zeros((len(seen), 2)) if surface.uv is None else surface.uv
-        # One row a vertex: place in the camera's frame, and what is kept.
-        rows = np.column_stack((seen, surface.vertices, surface.normals, wrap))
-        faces = surface.faces
-        # A simulation that blew up has no picture of what it threw out of the world.
-        known = np.all(np.abs(np.nan_to_num(rows, nan=np.inf)) < _FAR_AWAY, axis=1)
-        faces = faces[np.all(known[faces], axis=1)]
-        if solid.front:
-            faces = self._front(seen, faces)
-        near = seen[:, 2][faces] > self.near
-        for face in self._small(layer, solid, rows, faces[np.all(near, axis=1)]):
-            self._triangle(layer, solid, rows[face])
-        for face in faces[np.any(near, axis=1) & ~np.all(near, axis=1)]:
-            part = self._clipped(rows[face])
-            for k in range(1, len(part) - 1):
-                self._triangle(layer, solid, part[[0, k, k + 1]])
+            world = rotate(surface.vertices, rotation) + position
+            seen = rotate(world - eye.position, eye.axes)
+        uv = np.zeros((len(seen), 2)) if surface.uv is None else surface.uv
+        # One row a vertex: its place in the camera's frame, and its attributes.
+        vertices = np.column_stack((seen, surface.vertices, surface.normals, uv))
+        known = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
+        triangles = vertices[surface.faces[np.all(known[surface.faces], axis=1)]]
+        if front:
+            a, b, c = triangles[..., :3].transpose(1, 0, 2)
+            volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+            triangles = triangles[volume * np.linalg.det(eye.axes) < 0]
+        for part, shares, x, y in self._fragments(self._clip(triangles)):
+            # What is linear on the surface is linear in 1/z on the screen.
+            weights = shares / part[..., 2]
+            depth = 1.0 / weights.sum(axis=1)
+            near = np.flatnonzero(depth < self.depth[y, x])
+            weights, depth, x, y = weights[near], depth[near], x[near], y[near]
+            attributes = np.einsum("sk,skc->sc", weights, part[near, :, 3:]) * depth[:, None]
+            if eye.mirror is not None:
+                normal, offset = eye.mirror
+                height = attributes[:, POSITION] @ (rotation.T @ normal) + position @ normal
+                above = height > offset
+                depth, attributes, x, y = depth[above], attributes[above], x[above], y[above]
+            # The nearest is written last, and so remains.
+            order = np.argsort(-depth, kind="stable")
+            at = y[order], x[order]
+            self.depth[at] = depth[order]
+            self.solid[at] = index
+            self.attributes[at] = attributes[order]
 
-    def _front(self, seen: Array, faces: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The triangles that show their outside."""
-        a, b, c = seen[faces].transpose(1, 0, 2)
-        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-        found: NDArray[np.int64] = faces[volume * np.linalg.det(self.eye.axes) < 0]
-        return found
+    def _clip(self, triangles: Array) -> Array:
+        """The parts of triangles (n, 3, columns) in front of the camera."""
+        behind = (triangles[..., 2] <= self.eye.near).sum(axis=1)
+        parts = [triangles[behind == 0]]
+        for triangle in triangles[(behind > 0) & (behind < 3)]:
+            polygon = []
+            for here, there in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+                a, b = here[2] - self.eye.near, there[2] - self.eye.near
+                if a > 0:
+                    polygon.append(here)
+                if (a > 0) != (b > 0):
+                    polygon.append(here + (there - here) * (a / (a - b)))
+            parts += [
+                np.array([[polygon[0], polygon[k], polygon[k + 1]]])
+                for k in range(1, len(polygon) - 1)
+            ]
+        return np.concatenate(parts)
 
-    def _small(
-        self, layer: Layer, solid: Placed, rows: Array, faces: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        """Draw all small triangles at once; gives those that remain."""
-        places = self._places(rows)
-        corners = places[faces]
-        low, high = np.floor(corners.min(axis=1)), np.floor(corners.max(axis=1))
-        shown = np.all((high >= 0) & (low < (self.width, self.height)), axis=1)
-        widest = (high - low).max(axis=1)
-        below = 0
-        for side in (6, 14, 30):
-            batch = faces[shown & (widest >= below) & (widest < side)]
-            most = _AT_ONCE // side**2
-            for start in range(0, len(batch), most):
-                self._batch(layer, solid, (rows, places), batch[start : start + most], side)
-            below = side
-        rest: NDArray[np.int64] = faces[shown & (widest >= below)]
-        return rest
+    def _fragments(
+        self, triangles: Array
+    ) -> Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]:
+        """The samples that triangles cover.
 
-    def _batch(
-        self,
-        layer: Layer,
-        solid: Placed,
-        vertices: tuple[Array, Array],
-        faces: NDArray[np.int64],
-        side: int,
-    ) -> None:
-        """Triangles that fit into squares of `side` samples."""
-        rows, places = vertices
-        corners = places[faces]
-        first = np.floor(corners.min(axis=1)).astype(np.int64)
-        x = first[:, None, None, 0] + np.arange(side)[None, None, :]
-        y = first[:, None, None, 1] + np.arange(side)[None, :, None]
-        px, py = corners.transpose(2, 1, 0)[..., None, None]
-        shares, inside = _cover(px, py, x + 0.5, y + 0.5)
-        inside &= (x >= 0) & (x < self.width) & (y >= 0) & (y < self.height)
-        which, i, j = np.nonzero(inside)
-        weights = shares[:, which, i, j] / rows[faces[which], 2].T
-        depth = 1.0 / weights.sum(axis=0)
-        x, y = first[which, 0] + j, first[which, 1] + i
-        near = np.flatnonzero(depth < layer.depth[y, x])
-        values = np.einsum("ks,skc->sc", weights[:, near], rows[faces[which[near]], 3:])
-        values *= depth[near, None]
-        self._keep(layer, solid, (y[near], x[near]), depth[near], values)
-
-    def _triangle(self, layer: Layer, solid: Placed, rows: Array) -> None:
-        px, py = self._places(rows).T
-        left, right = max(int(px.min()), 0), min(int(px.max()) + 1, self.width - 1)
-        top, bottom = max(int(py.min()), 0), min(int(py.max()) + 1, self.height - 1)
-        if left > right or top > bottom:
-            return
-        gx: Array = np.arange(left, right + 1, dtype=np.float64) + 0.5
-        gy: Array = np.arange(top, bottom + 1, dtype=np.float64)[:, None] + 0.5
-        shares, inside = _cover(px, py, gx, gy)
-        i, j = np.nonzero(inside)
-        # What is linear on the surface is linear in 1/z on the screen.
-        weights = shares[:, i, j] / rows[:, 2, None]
-        depth = 1.0 / weights.sum(axis=0)
-        near = depth < layer.depth[top + i, left + j]
-        values = np.einsum("ks,kc->sc", weights[:, near], rows[:, 3:]) * depth[near, None]
-        self._keep(layer, solid, (top + i[near], left + j[near]), depth[near], values)
-
-    def _keep(
-        self,
-        layer: Layer,
-        solid: Placed,
-        samples: tuple[NDArray[np.int64], NDArray[np.int64]],
-        depth: Array,
-        values: Array,
-    ) -> None:
-        """Write a solid into samples (rows, columns) where it is nearer than what is there."""
-        order = np.arange(len(depth))
-        if self.eye.floor is not None:
-            normal, offset = self.eye.floor
-            height = values[:, PLACE] @ (solid.rotation.T @ normal) + solid.position @ normal
-            order = order[height > offset]
-        # The nearest is written last, and so remains.
-        order = order[np.argsort(-depth[order], kind="stable")]
-        at = samples[0][order], samples[1][order]
-        layer.depth[at] = depth[order]
-        layer.solid[at] = solid.index
-        layer.kept[at] = values[order]
-
-    def _places(self, rows: Array) -> Array:
-        """Where vertices are on the screen, in samples."""
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            x = self.width / 2 + self.focal * rows[:, 0] / rows[:, 2]
-            y = self.height / 2 - self.focal * rows[:, 1] / rows[:, 2]
-        return np.stack((x, y), axis=1)
-
-    def _clipped(self, triangle: Array) -> Array:
-        """The part of a triangle in front of the camera, as a polygon."""
-        kept = []
-        for here, there in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-            a, b = here[2] - self.near, there[2] - self.near
-            if a > 0:
-                kept.append(here)
-            if (a > 0) != (b > 0):
-                kept.append(here + (there - here) * (a / (a - b)))
-        return np.array(kept)
+        Of each its triangle, the shares of this one's corners in it, its column and its row.
+        """
+        width, height = self.eye.size
+        scale = self.eye.focal / triangles[..., 2]
+        px = width / 2 + scale * triangles[..., 0]
+        py = height / 2 - scale * triangles[..., 1]
+        left, right = _span(px, width)
+        top, bottom = _span(py, height)
+        columns = right - left
+        counts = np.maximum(columns, 0) * np.maximum(bottom - top, 0)
+        ends = np.cumsum(counts)
+        start = 0
+        while start < len(counts):
+            done = ends[start - 1] if start else 0
+            end = max(int(np.searchsorted(ends, done + _AT_ONCE, side="right")), start + 1)
+            which = np.repeat(np.arange(start, end), counts[start:end])
+            place = np.arange(len(which)) - (ends - counts - done)[which]
+            x, y = left[which] + place % columns[which], top[which] + place // columns[which]
+            shares, inside = _cover(px[which].T, py[which].T, x + 0.5, y + 0.5)
+            yield triangles[which[inside]], shares.T[inside], x[inside], y[inside]
+            start = end
 
 
-def turned(vectors: Array, matrix: Array) -> Array:
+def _span(places: Array, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """From and to which sample of a row or a column triangles reach."""
+    low = np.clip(np.floor(places.min(axis=1)), 0, size)
+    high = np.clip(np.floor(places.max(axis=1)) + 1, 0, size)
+    return low.astype(np.int64), high.astype(np.int64)
+
+
+def rotate(vectors: Array, matrix: Array) -> Array:
     """Each vector times the matrix, without the threads and kernels of a linear algebra library."""
     found: Array = np.einsum("ij,kj->ik", vectors, matrix)
     return found
@@ -211,7 +150,7 @@ def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[n
     """
     area = (px[1] - px[0]) * (py[2] - py[0]) - (px[2] - px[0]) * (py[1] - py[0])
     turn = np.sign(area)
-    inside = np.broadcast_to(turn != 0, np.broadcast_shapes(gx.shape, gy.shape, area.shape)).copy()
+    inside = turn != 0
     shares = []
     for a, b in ((1, 2), (2, 0), (0, 1)):
         edge = turn * ((px[a] - gx) * (py[b] - gy) - (px[b] - gx) * (py[a] - gy))

@@ -1,27 +1,27 @@
 """The static form of a lab: what its trial recorded, as a picture, plots and a table.
 
-Entry points: `draw_picture(lab, main)`, `static_form(lab, main, picture)`.
+Entry points: `draw_picture(lab, main)`, `static_form(lab, main, picture)`; `png(pixels)`.
 """
 
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coursebuild.labs.light import light_of
 from coursebuild.labs.picture import Camera, draw
 from coursebuild.labs.plots import plot_svg
-from coursebuild.labs.png import png
 from coursebuild.labs.reply import unpacked
 from coursebuild.labs.scenery import scene_solids
-from coursebuild.labs.textures import texture_of
+from coursebuild.labs.textures import SKY, texture_of
 from coursebuild.model import Lab
 from coursebuild.results import StaticForm
 
-_SKY = 2
-"""mjtTexture."""
 _WIDTH = 640
 _FROM_AFAR = 1000.0
 _LARGE = 1e9
@@ -41,9 +41,25 @@ def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
     target = tuple(camera["target"])
     seen = Camera(camera["azimuth"], camera["elevation"], distance, target, fovy)
     light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
-    skies = (texture_of(t) for t in scene["textures"] if t["type"] == _SKY)
+    skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))
     return png(draw(solids, seen, _size(lab), light, next(skies, None)))
+
+
+def png(pixels: NDArray[np.uint8]) -> bytes:
+    """An RGBA picture as a PNG file, with the same bytes each time."""
+    opaque = bool((pixels[..., 3] == 255).all())
+    height, width = pixels.shape[:2]
+    rows = pixels[..., : 3 if opaque else 4].reshape(height, -1)
+    # Each row as its difference from the one above, which is PNG's filter 2.
+    filtered = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
+    filtered = np.column_stack((np.full(height, 2, np.uint8), filtered))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
+    data = zlib.compress(filtered.tobytes(), 9)
+    file = b"\x89PNG\r\n\x1a\n"
+    for chunk in (b"IHDR" + header, b"IDAT" + data, b"IEND"):
+        file += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return file
 
 
 def _size(lab: Lab) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """Textures of a lab's static picture.
 
-Entry points: `texture_of(given)` from the record of a trial, `Dress.texels(...)`, `sky(...)`.
+Entry points: `texture_of(given)` from the record of a trial; `TextureMapping.texels`, `sky`.
 
 Texture coordinates are those of the live view (`geometry.js` and `materials.js` of the page),
 worked out anew at every point that is drawn.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from coursebuild.labs.shapes import Array, Kind
 
-_CUBE, _SKY = 1, 2
+_CUBE, SKY = 1, 2
 """mjtTexture."""
 _SHARPER = 4.0
 """How much longer than wide the place of a sample on a surface may be until it is blurred."""
@@ -34,7 +34,7 @@ class Texture(Struct, frozen=True):
     @property
     def cube(self) -> bool:
         """Whether it is looked up by a direction."""
-        return self.role in (_CUBE, _SKY)
+        return self.role in (_CUBE, SKY)
 
 
 def texture_of(given: dict[str, Any]) -> Texture | None:
@@ -45,7 +45,7 @@ def texture_of(given: dict[str, Any]) -> Texture | None:
     pixels = np.asarray(given["data"], dtype=float).reshape(height, width, channels) / 255
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     faces = colour[None]
-    if given["type"] in (_CUBE, _SKY):
+    if given["type"] in (_CUBE, SKY):
         six = height == 6 * width
         faces = colour.reshape(6, width, width, 3) if six else np.repeat(faces, 6, axis=0)
     levels = [faces]
@@ -56,7 +56,7 @@ def texture_of(given: dict[str, Any]) -> Texture | None:
     return Texture(tuple(levels), given["type"])
 
 
-class Dress(Struct, frozen=True):
+class TextureMapping(Struct, frozen=True):
     """How a texture lies on a geom."""
 
     texture: Texture
@@ -96,6 +96,7 @@ class Dress(Struct, frozen=True):
         return colours
 
     def _direction(self, places: Array, half: Array) -> Array:
+        """Where a cube's texture is looked up."""
         if self.uniform or self.kind in ("mesh", "sdf", "hfield"):
             return places
         unit = places / half
@@ -110,35 +111,35 @@ class Dress(Struct, frozen=True):
         found: Array
         if self.given:
             found = uv * repeat
-            return found
-        if self.endless:
+        elif self.endless:
             found = (1 + repeat * places[:, :2] * (1, -1)) / 2
-            return found
-        repeat = repeat * (self.size[:2] if self.uniform else 1.0)
-        found = repeat * self._once(unit, places, normals)
+        else:
+            once = self._once(unit, places, normals)
+            found = once * repeat * (self.size[:2] if self.uniform else 1.0)
         return found
 
     def _once(self, unit: Array, places: Array, normals: Array) -> Array:
         """Coordinates of a texture that is spread over the geom once."""
         x, y, z = unit.T
-        if self.kind in ("plane", "hfield"):
-            return np.column_stack((1 + x, 1 - y)) / 2
-        if self.kind in ("mesh", "sdf"):
-            return places[:, :2]
-        if self.kind == "box":
-            u = np.where(np.abs(normals[:, 0]) > 0.5, y, x)
-            return np.column_stack((1 + u, 1 - np.where(np.abs(normals[:, 2]) > 0.5, y, z))) / 2
         around = np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)
-        if self.kind == "cylinder":
-            lid = np.abs(normals[:, 2]) > _LID
-            u, v = np.where(lid, (1 + x) / 2, around), np.where(lid, (1 + y) / 2, (1 - z) / 2)
-            return np.column_stack((u, v))
-        if self.kind == "capsule":
-            beyond = (np.abs(places[:, 2]) - self.size[2]) / max(self.size[0], 1e-12)
-            rise = np.arcsin(np.clip(beyond, 0.0, 1.0)) / (np.pi / 2)
-            v = np.where(z > 1, 1 - rise, np.where(z < -1, rise, (1 - z) / 2))
-            return np.column_stack((around, v))
-        return np.column_stack((around, np.arccos(np.clip(z, -1.0, 1.0)) / np.pi))
+        match self.kind:
+            case "plane" | "hfield":
+                u, v = (1 + x) / 2, (1 - y) / 2
+            case "mesh" | "sdf":
+                u, v = places[:, :2].T
+            case "box":
+                u = (1 + np.where(np.abs(normals[:, 0]) > 0.5, y, x)) / 2
+                v = (1 - np.where(np.abs(normals[:, 2]) > 0.5, y, z)) / 2
+            case "cylinder":
+                lid = np.abs(normals[:, 2]) > _LID
+                u, v = np.where(lid, (1 + x) / 2, around), np.where(lid, (1 + y) / 2, (1 - z) / 2)
+            case "capsule":
+                beyond = (np.abs(places[:, 2]) - self.size[2]) / max(self.size[0], 1e-12)
+                rise = np.arcsin(np.clip(beyond, 0.0, 1.0)) / (np.pi / 2)
+                u, v = around, np.where(z > 1, 1 - rise, np.where(z < -1, rise, (1 - z) / 2))
+            case "sphere" | "ellipsoid":
+                u, v = around, np.arccos(np.clip(z, -1.0, 1.0)) / np.pi
+        return np.column_stack((u, v))
 
 
 def sharpness(cosines: Array) -> Array:

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from coursebuild.labs.light import Lamp, Light, Material, material_of
+from coursebuild.labs.light import Light, Material, PointLight, material_of
 from coursebuild.labs.picture import Camera, Solid, draw
-from coursebuild.labs.png import png
-from coursebuild.labs.shapes import Kind, mesh_surface, surface
-from coursebuild.labs.textures import Dress, texture_of
+from coursebuild.labs.shapes import Kind, flat_surface, surface
+from coursebuild.labs.static import png
+from coursebuild.labs.textures import TextureMapping, texture_of
+from support.png_files import read_png
 
 FRONT = Camera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
 """Looks along +y: x is to the right, z is up."""
@@ -164,13 +165,13 @@ def test_colours_stay_in_range() -> None:
     assert (pixels[30, 40, 0], pixels[30, 40, 1]) == (255, 0)
 
 
-def checkered(half: float, repeat: tuple[float, float], uniform: bool) -> Dress:
+def checkered(half: float, repeat: tuple[float, float], uniform: bool) -> TextureMapping:
     """A texture of 2 × 2 squares on a plane."""
     squares = np.kron([[255, 0], [0, 255]], np.ones((8, 8))).astype(np.uint8)
     given = {"type": 0, "width": 16, "height": 16, "channels": 1, "data": squares.ravel()}
     texture = texture_of(given)
     assert texture is not None
-    return Dress(texture, "plane", (half, half, 1.0), repeat, uniform)
+    return TextureMapping(texture, "plane", (half, half, 1.0), repeat, uniform)
 
 
 @pytest.mark.parametrize(
@@ -181,8 +182,8 @@ def test_a_pattern_has_its_width(repeat: tuple[float, float], uniform: bool, wid
     """A uniform texture is there so often in two metres, another so often on the whole plane."""
     camera = Camera(0, -90, 10, (0, 0, 0))
     floor = solid("plane", size=(3, 3, 1), rgba=(1, 1, 1, 1))
-    dress = checkered(3, repeat, uniform)
-    floor = replace(floor, dress=dress, plane=True, material=Material(specular=0.0))
+    texture = checkered(3, repeat, uniform)
+    floor = replace(floor, texture=texture, plane=True, material=Material(specular=0.0))
     row = draw((floor,), camera, (200, 200))[110, :, 0].astype(int)
     bright = row[30:170] > (row[30:170].max() + row[30:170].min()) / 2
     changes = np.nonzero(np.diff(bright))[0]
@@ -195,12 +196,12 @@ def test_a_pattern_has_its_width(repeat: tuple[float, float], uniform: bool, wid
 def test_a_pattern_far_away_is_its_mean_colour() -> None:
     """And not a noise of squares that happen to be hit."""
     floor = solid("plane", size=(300, 300, 1), rgba=(1, 1, 1, 1))
-    floor = replace(floor, dress=checkered(300, (600, 600), uniform=False), plane=True)
+    floor = replace(floor, texture=checkered(300, (600, 600), uniform=False), plane=True)
     pixels = draw((floor,), Camera(90, -60, 300, (0, 0, 0)), SIZE)[..., 0]
     assert np.ptp(pixels[20:40].astype(int)) < 25
 
 
-LAMP = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 0.0, -1.0))),), 1.0)
+LAMP = Light(np.zeros(3), (PointLight(np.ones(3), np.array((0.0, 0.0, -1.0))),), 1.0)
 """From above, and nothing else."""
 DULL = Material(specular=0.0)
 
@@ -222,13 +223,15 @@ class TestLight:
         down = Camera(0, -90, 4, (0, 0, 0))
         for angle in (0.0, 0.6, 1.2):
             towards = np.array((math.sin(angle), 0.0, -math.cos(angle)))
-            light = Light(np.zeros(3), (Lamp(np.ones(3), towards),), 1.0)
+            light = Light(np.zeros(3), (PointLight(np.ones(3), towards),), 1.0)
             found = brightness(self.floor(), light, down)
             assert found == pytest.approx(127.5 * math.cos(angle), abs=2)
 
     def test_a_cone_ends(self) -> None:
         down = Camera(0, -90, 4, (0, 0, 0))
-        narrow = Lamp(np.ones(3), np.array((0.0, 0.0, -1.0)), np.array((0.0, 0.0, 1.0)), (0.9, 0.9))
+        narrow = PointLight(
+            np.ones(3), np.array((0.0, 0.0, -1.0)), np.array((0.0, 0.0, 1.0)), (0.9, 0.9)
+        )
         light = Light(np.zeros(3), (narrow,), 1.0)
         row = draw((self.floor(),), down, SIZE, light)[30, :, 0]
         reach = np.flatnonzero(row)
@@ -249,7 +252,7 @@ class TestLight:
         assert brightness(glowing, dark) == pytest.approx(128, abs=2)
 
     def test_a_rough_surface_has_a_wide_dim_highlight(self) -> None:
-        ahead = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
+        ahead = Light(np.zeros(3), (PointLight(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
         found = []
         for roughness in (0.3, 0.8):
             scene = {"materials": [plain(roughness=roughness)]}
@@ -262,7 +265,7 @@ class TestLight:
         assert found[0][6] < found[1][6], "off the middle it is the other way round"
 
     def test_a_metal_colours_its_highlight(self) -> None:
-        ahead = Light(np.zeros(3), (Lamp(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
+        ahead = Light(np.zeros(3), (PointLight(np.ones(3), np.array((0.0, 1.0, 0.0))),), 1.0)
         shown = {}
         for metallic in (0.0, 1.0):
             scene = {"materials": [plain(metallic=metallic, roughness=0.4)]}
@@ -365,7 +368,7 @@ def test_many_small_triangles_look_as_few_large_ones() -> None:
     coarse = np.array([(0, 1, 2), (0, 2, 3)])
     camera = replace(FRONT, azimuth=70, elevation=-15)
     pictures = [
-        draw((Solid(mesh_surface(v, f), np.zeros(3), np.eye(3), RED),), camera, (120, 90))
+        draw((Solid(flat_surface(v, f), np.zeros(3), np.eye(3), RED),), camera, (120, 90))
         for v, f in ((grid.reshape(-1, 3), fine), (corners, coarse))
     ]
     assert np.array_equal(covered(pictures[0]), covered(pictures[1]))
@@ -420,3 +423,22 @@ def test_any_camera(
     )
     pixels = draw(solids, camera, (24, 18))
     assert pixels.dtype == np.uint8 and pixels.shape == (18, 24, 4)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (64, 48)])
+@pytest.mark.parametrize("opaque", [True, False])
+def test_a_file_is_read_back_as_it_was(size: tuple[int, int], opaque: bool) -> None:
+    random = np.random.default_rng(0)
+    pixels = random.integers(0, 256, (size[1], size[0], 4), dtype=np.uint8)
+    if opaque:
+        pixels[..., 3] = 255
+    else:
+        pixels[0, 0, 3] = 7
+    assert np.array_equal(read_png(png(pixels)), pixels)
+
+
+def test_an_even_picture_takes_little_room() -> None:
+    y, x = np.mgrid[:64, :64]
+    grey = (100 + 2 * x - y) % 256
+    data = png(np.dstack([grey, grey, grey, np.full_like(grey, 255)]).astype(np.uint8))
+    assert len(data) < 500

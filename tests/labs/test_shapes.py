@@ -11,9 +11,9 @@ import pytest
 from coursebuild.labs.shapes import (
     Kind,
     Surface,
-    mesh_surface,
+    flat_surface,
     ropes,
-    sharpened,
+    sharpen,
     smooth_surface,
     surface,
 )
@@ -136,7 +136,7 @@ def test_a_plane_faces_up(size: tuple[float, ...], half: tuple[float, float]) ->
 def test_a_mesh_is_shaded_flat() -> None:
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
     faces = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
-    shape = mesh_surface(vertices, faces)
+    shape = flat_surface(vertices, faces)
     assert shape.vertices.shape == (12, 3)
     corners, across = triangles(shape)
     assert np.isclose(np.einsum("ij,ij->", corners[:, 0], across) / 6, 1 / 6)
@@ -145,14 +145,13 @@ def test_a_mesh_is_shaded_flat() -> None:
 
 
 def test_a_triangle_without_area_has_no_normal_and_no_error() -> None:
-    shape = mesh_surface(np.zeros((3, 3)), np.array([(0, 1, 2)]))
+    shape = flat_surface(np.zeros((3, 3)), np.array([(0, 1, 2)]))
     assert np.array_equal(shape.normals, np.zeros((3, 3)))
 
 
 def test_what_has_no_surface() -> None:
-    assert surface("line", (1.0, 1.0, 1.0)) is None
     assert surface("mesh", (1.0, 1.0, 1.0)) is None
-    given = mesh_surface(np.eye(3), np.array([(0, 1, 2)]))
+    given = flat_surface(np.eye(3), np.array([(0, 1, 2)]))
     for kind in ("mesh", "sdf", "hfield"):
         assert surface(kind, (1.0, 1.0, 1.0), given) is given
 
@@ -195,5 +194,5 @@ def test_an_edge_is_sharp_where_the_face_is_turned_far(turned: float, sharp: boo
     corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(turned), math.sin(turned))]])
     up = np.tile((0.0, 0.0, 1.0), (1, 3, 1))
     expected = (0, -math.sin(turned), math.cos(turned)) if sharp else (0, 0, 1)
-    assert sharpened(corners, up)[0, 1] == pytest.approx(expected)
-    assert np.array_equal(sharpened(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"
+    assert sharpen(corners, up)[0, 1] == pytest.approx(expected)
+    assert np.array_equal(sharpen(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"

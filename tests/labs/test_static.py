@@ -18,6 +18,7 @@ from coursebuild.labs.reply import unpacked
 from coursebuild.labs.scenery import scene_solids
 from coursebuild.labs.static import _shown, draw_picture, static_form
 from support.lab_values import Bench, make_lab
+from support.png_files import read_png
 
 pytestmark = pytest.mark.engine
 
@@ -82,9 +83,12 @@ def test_all_geoms_have_their_shape_and_place(everything: tuple[Any, dict[str, A
     assert Counter(g["type"] for g in visible) == Counter([0, 1, 2, 3, 4, 5, 6, 7, 7, 2, 2])
     plane, hills, ball, capsule, ellipsoid, cylinder, box, first, second = found[:9]
     assert plane.plane and plane.mirror == 0 and box.mirror == pytest.approx(0.3)
-    assert plane.dress is not None and (plane.dress.repeat, plane.dress.uniform) == ((4, 4), True)
-    assert plane.dress.texture.levels[0].shape == (1, 8, 8, 3)
-    assert np.ptp(plane.dress.texture.levels[0], axis=(0, 1, 2)).tolist() == [1, 1, 0]
+    assert plane.texture is not None and (plane.texture.repeat, plane.texture.uniform) == (
+        (4, 4),
+        True,
+    )
+    assert plane.texture.texture.levels[0].shape == (1, 8, 8, 3)
+    assert np.ptp(plane.texture.texture.levels[0], axis=(0, 1, 2)).tolist() == [1, 1, 0]
     assert hills.position == pytest.approx((0, 6, 0))
     reach = [np.ptp(s.surface.vertices, axis=0) for s in (hills, ball, capsule, cylinder, box)]
     assert reach[0] == pytest.approx((4, 2, 0.6)), "with what is below 0"
@@ -188,14 +192,14 @@ def test_materials_are_recorded_and_textures_made_small(bench: Bench) -> None:
     assert sizes == [(256, 256), (64, 384), (64, 384)]
     floor, box, ball = solids(main)[:3]
     assert floor.material.reflectance == 0.25 and not floor.material.physical
-    assert floor.dress is not None and floor.dress.endless
-    squares = floor.dress.texture.levels[0][0]
+    assert floor.texture is not None and floor.texture.endless
+    squares = floor.texture.texture.levels[0][0]
     assert squares[:100, :100].min() == 1 and squares[:100, 200:].max() == 0, "still squares"
     assert box.material.physical and box.material.metallic == 0.5
     assert box.material.shininess == pytest.approx(2 / 0.5**4 - 2)
-    assert box.dress is not None and box.dress.texture.levels[0].shape == (6, 64, 64, 3)
+    assert box.texture is not None and box.texture.texture.levels[0].shape == (6, 64, 64, 3)
     assert (ball.material.shininess, ball.material.specular) == (32, 0.75)
-    assert ball.material.emission == 0.125 and ball.dress is None
+    assert ball.material.emission == 0.125 and ball.texture is None
 
 
 def test_the_light_is_that_of_the_model(bench: Bench) -> None:
@@ -203,7 +207,7 @@ def test_the_light_is_that_of_the_model(bench: Bench) -> None:
     scene, frame = unpacked(main["scene"]), unpacked(main["pictures"][0]["frame"])
     forward = np.array((0.0, 1.0, 0.0))
     light = light_of(scene, frame, forward)
-    spot, wide, head = light.lamps
+    spot, wide, head = light.point_lights
     assert spot.colour == pytest.approx((0.6, 0.5, 0.4)), "the directional one is off"
     assert spot.position == pytest.approx((0, 0, 3)) and spot.direction == pytest.approx((0, 0, -1))
     half, inner = math.cos(math.radians(30)), math.cos(math.radians(15))
@@ -227,18 +231,10 @@ def test_an_orthographic_camera(bench: Bench) -> None:
     lab, main = main_of(
         bench, xml=xml, camera={"azimuth": 90, "elevation": 0, "target": [0, 0, 0]}, height=480
     )
-    from coursebuild.labs import static
-
-    seen: list[Any] = []
-    original = static.png
-    try:
-        static.png = lambda pixels: seen.append(pixels) or b""  # type: ignore[assignment,func-returns-value]
-        draw_picture(lab, main)
-    finally:
-        static.png = original
-    rows = np.nonzero(seen[0][..., 3].any(axis=1))[0]
+    pixels = read_png(draw_picture(lab, main))
+    rows = np.nonzero(pixels[..., 3].any(axis=1))[0]
     # A box of 1 m in a view that is 2 m high.
-    assert rows.max() - rows.min() + 1 == pytest.approx(seen[0].shape[0] / 2, abs=2)
+    assert rows.max() - rows.min() + 1 == pytest.approx(pixels.shape[0] / 2, abs=2)
 
 
 def test_readouts_and_plots_belong_to_the_run(bench: Bench) -> None:
