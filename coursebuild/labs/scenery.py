@@ -86,7 +86,9 @@ class _Scene:
     def _looks(self, index: int) -> _Looks:
         """A material with its texture; -1 is none."""
         material = material_of(self.scene, index)
-        given = self.scene["materials"][index] if index >= 0 else {"texture": -1}
+        given: dict[str, Any] = {"texture": -1}
+        if index >= 0:
+            given = self.scene["materials"][index]
         texture = self.textures[given["texture"]] if given["texture"] >= 0 else None
         if texture is None or texture.role == SKY:
             return _Looks(material)
