@@ -255,7 +255,7 @@ class Reader:
 
     def _ask(self, request: Draw) -> bytes:
         """The items of a page's quizzes, and what they cannot hold."""
-        from coursebuild.render.packages.quizzes import page_quizzes
+        from coursebuild.render.packages.items import page_quizzes
 
         assert request.task is not None
         whole = self._whole(request.task)

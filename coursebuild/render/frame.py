@@ -157,7 +157,7 @@ def _own_values(library: Library, draft: Draft) -> dict[str, object]:
         "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
         "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
         "json_ld": draft.json_ld,
-        "markdown": urls.encode((urls.twin_path(draft.path) or "").rpartition("/")[2]),
+        "markdown": urls.encode((urls.markdown_path(draft.path) or "").rpartition("/")[2]),
     }
 
 

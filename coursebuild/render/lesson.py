@@ -77,7 +77,7 @@ def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
         "scripts": scripts,
         "scripts_zip": place.href(urls.lesson_zip_path(lesson)) if scripts else None,
         "notebook": place.href(urls.notebook_path(lesson)),
-        "markdown": place.href(urls.twin_path(place.path) or place.path),
+        "markdown": place.href(urls.markdown_path(place.path) or place.path),
         "edit": edit_address(library, lesson.path),
     }
     return Sheet(

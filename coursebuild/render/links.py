@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from html import unescape
+from html.parser import HTMLParser
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
@@ -267,12 +268,26 @@ def noted(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, 
     return (), (tuple(_srcset(value)) if name == "srcset" else (value,))
 
 
-def _read(html: str) -> _Page:
-    from coursebuild.render.elements import StartTags  # few pages need it
+class _StartTags(HTMLParser):
+    """Notes where elements begin: a name, attributes, and a line from 1."""
 
+    found: list[tuple[str, list[tuple[str, str | None]], int]]
+
+    def reset(self) -> None:
+        super().reset()
+        self.found = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, attrs, self.getpos()[0]))
+
+
+def _read(html: str) -> _Page:
+    reader = _StartTags(convert_charrefs=True)
+    reader.feed(html)
+    reader.close()
     ids: set[str] = set()
     addresses: list[_Address] = []
-    for tag, attributes, line in StartTags.of(html):
+    for tag, attributes, line in reader.found:
         for name, value in attributes:
             if value is not None:
                 named, urls = noted(tag, name, value)

@@ -57,13 +57,13 @@ def notebook_path(lesson: Lesson) -> str:
     return f"lessons/{lesson.id}-{lesson.slug}.ipynb"
 
 
-_WITHOUT_TWIN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
+_WITHOUT_MARKDOWN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
 """Pages that say nothing but what a script fills in."""
 
 
-def twin_path(page: str) -> str | None:
+def markdown_path(page: str) -> str | None:
     """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
-    if page in _WITHOUT_TWIN:
+    if page in _WITHOUT_MARKDOWN:
         return None
     return f"{page.removesuffix('.html')}.md"
 

@@ -12,8 +12,8 @@ from coursebuild.render.library import Library
 from coursebuild.render.offline import offline_sheet
 from coursebuild.render.pages import home_sheet, level_sheet, model_sheet, not_found_sheet
 from coursebuild.render.reader import progress_sheet
-from coursebuild.render.search.drawn import drawn_sections
 from coursebuild.render.search.page import page_text, searched, terms
+from coursebuild.render.search.sections import drawn_sections
 from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.search.values import PageText, Piece, Section
 from support.rendered_course import Make

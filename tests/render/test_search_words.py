@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.render.search import tex, words
-from coursebuild.render.search.counting import counted
 from coursebuild.render.search.index import _hash
 from coursebuild.render.search.tex import plain_formula
-from coursebuild.render.search.words import is_fuzzy, shelf_of, terms_of
+from coursebuild.render.search.words import counted, is_fuzzy, shelf_of, terms_of
 
 AGREED = json.loads(
     (Path(__file__).parents[2] / "site" / "tests" / "search-words.json").read_text("utf-8")

@@ -15,8 +15,10 @@ from __future__ import annotations
 
 import hashlib
 import re
+import unicodedata
 import uuid
 from collections.abc import Iterator
+from html import escape
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -26,7 +28,6 @@ from coursebuild.patterns import pattern
 from coursebuild.render import urls
 from coursebuild.render.characters import visible
 from coursebuild.render.direction import direction
-from coursebuild.render.exports.cover import cover
 from coursebuild.render.exports.rewrite import Rules
 from coursebuild.render.exports.whole_course import WholeCourse
 from coursebuild.render.html_tree import to_xml
@@ -226,3 +227,68 @@ def _file_name(name: str) -> str:
     if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         return f"{name}.xhtml"
     return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}.xhtml"
+
+
+_WIDTH, _HEIGHT = 1200, 1600
+_EDGE = 120
+_SIZES = (120, 100, 84, 68, 54)
+"""Of type; the largest is taken in which the title has few lines."""
+_LINES = 6
+
+
+def cover(title: str, direction: str) -> str:
+    """The picture."""
+    title = " ".join(title.split())
+    for size in _SIZES:
+        lines = _broken(title, (_WIDTH - 2 * _EDGE) / size)
+        if len(lines) <= _LINES:
+            break
+    lines = lines[: 2 * _LINES]
+    right = direction == "rtl"
+    x = _WIDTH - _EDGE if right else _EDGE
+    texts = "".join(
+        f'<text x="{x}" y="{430 + round(1.2 * size * at)}">{escape(line)}</text>\n'
+        for at, line in enumerate(lines)
+    )
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{_WIDTH}"'
+        f' height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}">\n'
+        f"<title>{escape(title)}</title>\n"
+        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#fcfbf8"/>\n'
+        f'<rect x="{_EDGE}" y="250" width="{_WIDTH - 2 * _EDGE}" height="6" fill="#17487a"/>\n'
+        f'<g font-family="Georgia, serif" font-size="{size}" fill="#1e1e1c"'
+        f' direction="{direction}">\n'
+        f"{texts}</g>\n"
+        "</svg>\n"
+    )
+
+
+def _broken(text: str, width: float) -> list[str]:
+    """Lines of at most about `width` ems; a word that is wider is cut."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}".strip()
+        if _ems(longer) <= width:
+            lines[-1] = longer
+            continue
+        if lines[-1]:
+            lines.append("")
+        for character in word:
+            if _ems(lines[-1] + character) > width:
+                lines.append("")
+            lines[-1] += character
+    return lines
+
+
+def _ems(text: str) -> float:
+    return sum(
+        0.0
+        if unicodedata.combining(c)
+        else 1.0
+        if unicodedata.east_asian_width(c) in "WF"
+        else 0.7
+        if c.isupper()
+        else 0.52
+        for c in text
+    )

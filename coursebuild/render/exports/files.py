@@ -21,9 +21,9 @@ from coursebuild.render.context import PageContext
 from coursebuild.render.exports.llms import PATH as LLMS
 from coursebuild.render.exports.llms import llms
 from coursebuild.render.exports.markdown import Same
+from coursebuild.render.exports.markdown_copy import html_copy, markdown_copy
 from coursebuild.render.exports.notebook import Notebook, notebook
 from coursebuild.render.exports.notebook_file import finished
-from coursebuild.render.exports.twin import twin, twin_of
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
 from coursebuild.render.sheet import Sheet
@@ -51,7 +51,9 @@ def page_byproducts(
     `body` is the page's HTML as published.
     """
     same: Same = {}
-    text = twin(sheet, page, body, same) if urls.twin_path(sheet.path) is not None else ""
+    text = (
+        markdown_copy(sheet, page, body, same) if urls.markdown_path(sheet.path) is not None else ""
+    )
     if sheet.kind != "lesson" or page is None:
         return PageByproducts(text, None)
     return PageByproducts(text, notebook(sheet, page, base_url, same))
@@ -87,7 +89,7 @@ class ExportContext(Struct, frozen=True):
 
 def export_paths(library: Library, pages: Iterable[str], taken: frozenset[str]) -> Iterator[str]:
     """The site paths of what `Exports` makes, in no order; `pages` are those of all pages."""
-    copies = map(urls.twin_path, pages)
+    copies = map(urls.markdown_path, pages)
     yield from (path for path in copies if path is not None and path not in taken)
     yield LLMS
     yield from (urls.notebook_path(one) for one in library.order if one.document is not None)
@@ -104,7 +106,7 @@ class Exports:
     def files(self) -> Iterator[SiteFile]:
         """All of them."""
         for page in self._source.paths:
-            path = urls.twin_path(page)
+            path = urls.markdown_path(page)
             if path is not None and path not in self._context.taken:
                 yield KeptFile(path, self._source.key(page), partial(self._markdown, page))
         yield OutputFile(LLMS, llms(self._library))
@@ -154,7 +156,7 @@ class OnDemand:
         entry = self._entries[path]
         document = entry.document(self._library)
         if document is None:
-            return PageByproducts(twin_of(path, self._body(path)), None)
+            return PageByproducts(html_copy(path, self._body(path)), None)
         sheet = entry.sheet(self._library)
         _, page = draw_whole(sheet, self._whole(document), self._library.tools)
         return page_byproducts(sheet, page, self._library.course.base_url, self._body(path))

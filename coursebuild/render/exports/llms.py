@@ -55,8 +55,8 @@ def _others(library: Library) -> list[str]:
 
 
 def _row(library: Library, path: str, title: str, text: str) -> str:
-    twin = urls.twin_path(path) or path
-    address = urls.absolute(library.course, twin) or urls.encode(twin)
+    copy = urls.markdown_path(path) or path
+    address = urls.absolute(library.course, copy) or urls.encode(copy)
     return f"- {link(_line(title), address)}" + (f": {_line(text)}" if text else "")
 
 

@@ -59,24 +59,22 @@ from coursebuild.model import (
     plain_text,
 )
 from coursebuild.patterns import pattern
-from coursebuild.render.exports.leaves import (
-    delimiter,
-    formula,
-    no_empty_lines,
-    number_text,
-    piped,
-    text_source,
-)
 from coursebuild.render.exports.marks import (
     code_span,
+    delimiter,
     escaped,
     fence,
+    formula,
     guarded,
     hang,
     link,
+    no_empty_lines,
+    number_text,
     picture,
+    piped,
     quoted,
     table,
+    text_source,
 )
 from coursebuild.render.look import OwnBlock
 from coursebuild.render.markup import escape, is_tight

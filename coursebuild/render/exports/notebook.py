@@ -34,9 +34,9 @@ from coursebuild.model import (
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.exports.markdown import Same, write_blocks
+from coursebuild.render.exports.markdown_copy import head
 from coursebuild.render.exports.marks import escaped, hang, link
 from coursebuild.render.exports.plain import Plain
-from coursebuild.render.exports.twin import head
 from coursebuild.render.sheet import Sheet
 from coursebuild.results import Outcome
 
@@ -71,7 +71,7 @@ class Notebook(Struct, frozen=True):
 
 
 def notebook(sheet: Sheet, page: PageContext, base_url: str, same: Same) -> Notebook:
-    """The cells of a lesson; `same` is what its twin has written."""
+    """The cells of a lesson; `same` is what its Markdown copy has written."""
     document, words = page.document, page.tools.words
     here = _whole(base_url, sheet.path, page.place.href(sheet.path))
     locate = functools.partial(_whole, base_url, sheet.path)

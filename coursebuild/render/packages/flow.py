@@ -17,11 +17,15 @@ from urllib.parse import urlsplit
 
 from msgspec import Struct
 
+from coursebuild.render.html_tree import HtmlContent, HtmlElement, parse_html
 from coursebuild.render.packages.formulas import mathml
-from coursebuild.render.packages.pieces import flat, joined, language_of
-from coursebuild.render.packages.tree import BLOCKS, Content, Node, parse_html
 from coursebuild.render.packages.xml import Element, add, element
 
+_BLOCKS = frozenset(
+    "address article aside blockquote center details dialog div dl fieldset figcaption figure"
+    " footer form h1 h2 h3 h4 h5 h6 header hgroup hr main nav ol p pre section summary table"
+    " ul".split()
+)
 STRUCK = "struck"
 """A class of the package's style sheet."""
 
@@ -40,10 +44,9 @@ _ACTIVE = frozenset(
 )
 _OWN = frozenset({"anchor"})
 """Classes of what a page adds for its own readers."""
-_PARTS = frozenset("caption col colgroup tbody tfoot thead tr".split())
-"""What a table may hold."""
 _SPACE = re.compile(r"[ \t\n\r\f]+")
 _NUMBER = re.compile(r"[0-9]{1,5}")
+_LANGUAGE = re.compile(r"[A-Za-z]{1,8}(?:-[A-Za-z0-9]{1,8})*")
 
 
 class Places(Struct, frozen=True):
@@ -77,11 +80,11 @@ class Flow:
 
     # --- blocks
 
-    def _blocks(self, content: Iterable[Content]) -> Iterator[Element]:
+    def _blocks(self, content: Iterable[HtmlContent]) -> Iterator[Element]:
         """Blocks, with a paragraph around each run of lines between them."""
-        run: list[Content] = []
+        run: list[HtmlContent] = []
         for child in content:
-            if isinstance(child, Node) and _is_block(child):
+            if isinstance(child, HtmlElement) and _is_block(child):
                 yield from self._paragraph(run)
                 run = []
                 yield from self._block(child)
@@ -89,12 +92,12 @@ class Flow:
                 run.append(child)
         yield from self._paragraph(run)
 
-    def _paragraph(self, run: Sequence[Content]) -> Iterator[Element]:
+    def _paragraph(self, run: Sequence[HtmlContent]) -> Iterator[Element]:
         made = element("p", {}, *self._line(run))
         if len(made) or (made.text or "").strip():
             yield made
 
-    def _block(self, node: Node) -> Iterator[Element]:
+    def _block(self, node: HtmlElement) -> Iterator[Element]:
         name = node.name
         if name in _HEADINGS:
             yield from self._lines(name, node)
@@ -126,35 +129,37 @@ class Flow:
             inner = list(self._blocks(node.children))
             yield from [element("div", language_of(node), *inner)] if len(inner) > 1 else inner
 
-    def _lines(self, name: str, node: Node) -> Iterator[Element]:
+    def _lines(self, name: str, node: HtmlElement) -> Iterator[Element]:
         """A heading and the like; blocks in it, which HTML does not allow, follow it."""
-        inside = [c for c in node.children if not (isinstance(c, Node) and _is_block(c))]
+        inside = [c for c in node.children if not (isinstance(c, HtmlElement) and _is_block(c))]
         made = element(name, language_of(node), *self._line(inside))
         if len(made) or (made.text or "").strip():
             yield made
         yield from self._blocks(c for c in node.elements if _is_block(c))
 
-    def _list(self, node: Node) -> Element:
+    def _list(self, node: HtmlElement) -> Element:
         if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
             self._lose("a numbered list counts from 1")
         made = element(node.name, language_of(node))
         for child in node.children:
-            if isinstance(child, Node) and child.name == "li":
+            if isinstance(child, HtmlElement) and child.name == "li":
                 add(made, self._holder("li", child))
             elif not (isinstance(child, str) and not child.strip()):
-                add(made, self._holder("li", Node("li", {}, [child])))
+                add(made, self._holder("li", HtmlElement("li", {}, [child])))
         return made if len(made) else element("p")
 
-    def _holder(self, name: str, node: Node, attributes: dict[str, str] | None = None) -> Element:
+    def _holder(
+        self, name: str, node: HtmlElement, attributes: dict[str, str] | None = None
+    ) -> Element:
         """What may hold lines as well as blocks; a paragraph by itself stands without its box."""
         made = element(name, language_of(node) | (attributes or {}))
-        if any(isinstance(c, Node) and _is_block(c) for c in node.children):
+        if any(isinstance(c, HtmlElement) and _is_block(c) for c in node.children):
             add(made, *self._blocks(node.children))
         else:
             add(made, *self._line(node.children))
         return made
 
-    def _definitions(self, node: Node) -> Iterator[Element]:
+    def _definitions(self, node: HtmlElement) -> Iterator[Element]:
         made = element("dl", language_of(node))
         for child in flat(node, "div"):
             if child.name == "dt":
@@ -166,46 +171,27 @@ class Flow:
 
     # --- tables
 
-    def _table(self, node: Node) -> Iterator[Element]:
-        """`caption`, `thead`, `tfoot`, then at least one `tbody`, as QTI orders them.
-
-        What stands in a table and in none of its cells comes before it, as in a browser.
-        """
-        strays: list[Content] = []
-        captions: list[Node] = []
-        groups: list[tuple[str, list[Element]]] = []
-        for child in node.children:
-            if not isinstance(child, Node) or child.name not in _PARTS:
-                strays.append(child)
-            elif child.name == "caption":
-                captions.append(child)
-            elif child.name == "tr" and (not groups or groups[-1][0] != "tr"):
-                groups.append(("tr", self._rows([child], strays)))
-            elif child.name == "tr":
-                groups[-1][1].extend(self._rows([child], strays))
-            else:
-                groups.append((child.name, self._rows(child.children, strays)))
-        yield from self._blocks([*strays, *captions[1:]])
-        groups = [(name, rows) for name, rows in groups if rows]
+    def _table(self, node: HtmlElement) -> Iterator[Element]:
+        """`caption`, `thead`, `tfoot`, then at least one `tbody`, as QTI orders them."""
+        captions = [child for child in node.elements if child.name == "caption"]
+        groups = [
+            (child.name, rows)
+            for child in node.elements
+            if child.name in ("thead", "tbody", "tfoot") and (rows := self._rows(child))
+        ]
+        yield from self._blocks(captions[1:])
         caption = element("caption", {}, *self._line(captions[:1])) if captions else None
         if groups:
             yield element("table", language_of(node), caption, *_grouped(groups))
         elif caption is not None:
             yield from self._blocks(captions[:1])
 
-    def _rows(self, content: Iterable[Content], strays: list[Content]) -> list[Element]:
-        """The rows that have cells; what is no row or cell is a stray."""
-        rows: list[Element] = []
-        for row in content:
-            if not isinstance(row, Node) or row.name != "tr":
-                strays.append(row)
-                continue
-            cells = [c for c in row.elements if c.name in ("td", "th")]
-            strays += [c for c in row.children if c not in cells]
-            rows += [element("tr", {}, *map(self._cell, cells))] if cells else []
-        return rows
+    def _rows(self, group: HtmlElement) -> list[Element]:
+        """The rows that have cells."""
+        rows = ([c for c in row.elements if c.name in ("td", "th")] for row in group.elements)
+        return [element("tr", {}, *map(self._cell, cells)) for cells in rows if cells]
 
-    def _cell(self, cell: Node) -> Element:
+    def _cell(self, cell: HtmlElement) -> Element:
         kept = {k: v for k, v in cell.attributes.items() if k in ("colspan", "rowspan")}
         kept = {key: value for key, value in kept.items() if _NUMBER.fullmatch(value)}
         scope = cell.attributes.get("scope", "")
@@ -216,14 +202,16 @@ class Flow:
 
     # --- lines
 
-    def _line(self, content: Iterable[Content], *, pre: bool = False) -> Iterator[Element | str]:
+    def _line(
+        self, content: Iterable[HtmlContent], *, pre: bool = False
+    ) -> Iterator[Element | str]:
         for child in content:
             if isinstance(child, str):
                 yield child if pre else _SPACE.sub(" ", child)
             else:
                 yield from self._inline(child, pre)
 
-    def _inline(self, node: Node, pre: bool) -> Iterator[Element | str]:
+    def _inline(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         name, inner = node.name, node.children
         if name in _GONE or node.classes & _OWN:
             return
@@ -255,7 +243,7 @@ class Flow:
         else:
             yield from self._line(inner, pre=pre)
 
-    def _ruby(self, node: Node, pre: bool) -> Iterator[Element | str]:
+    def _ruby(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         if node.name == "rt":
             yield " ("
         if node.name != "rp":
@@ -263,7 +251,7 @@ class Flow:
         if node.name == "rt":
             yield ")"
 
-    def _picture(self, node: Node) -> Iterator[Element | str]:
+    def _picture(self, node: HtmlElement) -> Iterator[Element | str]:
         place = self._places.picture(node.attributes.get("src", ""))
         alt = node.attributes.get("alt", "")
         if place is None:
@@ -275,7 +263,7 @@ class Flow:
         size = {key: value for key, value in size.items() if _NUMBER.fullmatch(value)}
         yield element("img", {"src": place, "alt": alt} | dict(sorted(size.items())))
 
-    def _link(self, node: Node, pre: bool) -> Iterator[Element | str]:
+    def _link(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         address = node.attributes.get("href", "")
         inner = list(self._line(node.children, pre=pre))
         place = self._places.link(address) if address else None
@@ -287,7 +275,7 @@ class Flow:
             self._lose(f"the link to `{address}` is text{why}")
         yield from inner
 
-    def _active(self, node: Node) -> Iterator[Element | str]:
+    def _active(self, node: HtmlElement) -> Iterator[Element | str]:
         kind = node.attributes.get("type", "").lower()
         if node.name == "input" and kind == "checkbox":
             yield "☑" if "checked" in node.attributes else "☐"
@@ -314,7 +302,7 @@ def _grouped(groups: list[tuple[str, list[Element]]]) -> Iterator[Element]:
     yield from bodies
 
 
-def tag(node: Node) -> str:
+def tag(node: HtmlElement) -> str:
     """How an element begins: `<video>`."""
     return f"`<{node.name}>`"
 
@@ -330,14 +318,61 @@ def _trim(made: Element) -> None:
         made.text = (made.text or "").rstrip("\n")
 
 
-def _holds_form(node: Node) -> bool:
+def _holds_form(node: HtmlElement) -> bool:
     return node.name in ("form", "fieldset")
 
 
-def _is_block(node: Node) -> bool:
+def _is_block(node: HtmlElement) -> bool:
     """Whether an element is, or holds, a block."""
     if node.name == "math":
         return False
     if node.name in _ACTIVE or node.name in _GONE:
         return False
-    return node.name in BLOCKS or any(map(_is_block, node.elements))
+    return node.name in _BLOCKS or any(map(_is_block, node.elements))
+
+
+def language_of(node: HtmlElement) -> dict[str, str]:
+    """An attribute for the language that an element says it is in, if it says one."""
+    said = node.attributes.get("lang", "")
+    return {"xml:lang": said} if _LANGUAGE.fullmatch(said) else {}
+
+
+def flat(node: HtmlElement, name: str) -> Iterator[HtmlElement]:
+    """The elements in one, those in groups of a name as well."""
+    for child in node.elements:
+        if child.name == name:
+            yield from flat(child, name)
+        else:
+            yield child
+
+
+def joined(content: Iterable[HtmlContent]) -> list[HtmlContent]:
+    """Content in which formulas that were cut so that a line may break in them are whole again."""
+    made: list[HtmlContent] = []
+    for child in _without_spans(content):
+        last = made[-1] if made else None
+        if isinstance(child, HtmlElement):
+            child = HtmlElement(child.name, child.attributes, joined(child.children))
+        if _is_formula(child) and _is_formula(last):
+            assert isinstance(last, HtmlElement) and isinstance(child, HtmlElement)
+            made[-1] = HtmlElement("math", last.attributes, [*last.children, *child.children])
+        else:
+            made.append(child)
+    return made
+
+
+def _without_spans(content: Iterable[HtmlContent]) -> Iterator[HtmlContent]:
+    """Content without boxes that say nothing by themselves."""
+    for child in content:
+        if isinstance(child, HtmlElement) and child.name == "span" and not language_of(child):
+            yield from _without_spans(child.children)
+        else:
+            yield child
+
+
+def _is_formula(content: HtmlContent | None) -> bool:
+    return (
+        isinstance(content, HtmlElement)
+        and content.name == "math"
+        and content.attributes.get("display") != "block"
+    )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.render.packages.tree import Node
+from coursebuild.render.html_tree import HtmlElement
 from coursebuild.render.packages.xml import Element, add, element
 
 NAMESPACE = "http://www.w3.org/1998/Math/MathML"
@@ -57,14 +57,14 @@ _COLOUR = re.compile(r"(?:^|;)\s*color\s*:\s*(#[0-9a-fA-F]{3,6}|[a-zA-Z]+)\s*(?:
 _LENGTH = re.compile(r"[+-]?\d*\.?\d+(?:%|em|ex|px|in|cm|mm|pt|pc)?|\w+mathspace")
 
 
-def mathml(node: Node) -> Element:
+def mathml(node: HtmlElement) -> Element:
     """A formula, with the prefix `m`."""
     made = element("m:math", _kept(node, "math"))
     _fill(made, node, "math")
     return made
 
 
-def _made(node: Node) -> Element:
+def _made(node: HtmlElement) -> Element:
     name = node.name if node.name in _ATTRIBUTES and node.name != "math" else "mrow"
     made = element(f"m:{name}", _kept(node, name))
     _fill(made, node, name)
@@ -73,7 +73,7 @@ def _made(node: Node) -> Element:
     return made
 
 
-def _fill(made: Element, node: Node, name: str) -> None:
+def _fill(made: Element, node: HtmlElement, name: str) -> None:
     for child in node.children:
         if isinstance(child, str):
             if name in _WORDS:
@@ -88,7 +88,7 @@ def _fill(made: Element, node: Node, name: str) -> None:
             add(made, child.text)
 
 
-def _kept(node: Node, name: str) -> dict[str, str]:
+def _kept(node: HtmlElement, name: str) -> dict[str, str]:
     allowed = _ATTRIBUTES[name].split()
     kept = {key: value for key, value in node.attributes.items() if key in allowed}
     if name == "mtd":

@@ -29,6 +29,7 @@ from coursebuild.features.quiz.model import (
     Quiz,
 )
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
+from coursebuild.model import Document, document_blocks
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
 from coursebuild.render.packages.flow import Flow, Places
@@ -48,6 +49,8 @@ from coursebuild.render.packages.processing import (
     response,
 )
 from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.render.sheet import Sheet
+from coursebuild.render.tools import Tools
 from coursebuild.source import Span
 
 NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"
@@ -310,3 +313,13 @@ class _Writer:
 
 def _is_file(path: str) -> bool:
     return path.startswith("files/") or path.startswith("models/")
+
+
+def page_quizzes(
+    sheet: Sheet, document: Document, tools: Tools, base_url: str, language: str
+) -> tuple[MadeQuiz, ...]:
+    """The quizzes of a document, in its order."""
+    assert sheet.shown is not None
+    page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
+    quizzes = (block for block in document_blocks(document) if isinstance(block, Quiz))
+    return tuple(made_items(page, quiz, base_url, language or "en") for quiz in quizzes)

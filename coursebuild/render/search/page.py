@@ -11,9 +11,9 @@ import json
 from coursebuild.model import Document
 from coursebuild.render.characters import visible
 from coursebuild.render.lesson import LessonHead
-from coursebuild.render.search.counting import TERMS, runs
 from coursebuild.render.search.sections import document_sections
 from coursebuild.render.search.values import PageText, Piece, Searched, Section
+from coursebuild.render.search.words import TERMS, runs
 from coursebuild.render.sheet import Highlighted, Sheet, Shown, ShownBench
 
 _LEFT_OUT = frozenset({"home", "notfound", "search"})
@@ -79,7 +79,7 @@ def _drawn(sheet: Sheet, body: str) -> tuple[Section, ...]:
     """The sections of a page that was made from no document."""
     if sheet.kind in _LEADS:
         return ()
-    from coursebuild.render.search.drawn import drawn_sections  # and a parser of HTML
+    from coursebuild.render.search.sections import drawn_sections  # and a parser of HTML
 
     return drawn_sections(body)
 

@@ -54,6 +54,7 @@ from coursebuild.model import (
 )
 from coursebuild.model.inlines import CodeSpan
 from coursebuild.patterns import pattern
+from coursebuild.render.html_tree import HtmlContent, parse_html
 from coursebuild.render.search.tex import plain_formula
 from coursebuild.render.search.values import Kind, Piece, Section
 
@@ -224,3 +225,66 @@ class SectionReader:
 
 def _line(text: str) -> str:
     return " ".join(text.split())
+
+
+_HEADINGS = {f"h{level}": level for level in range(1, 7)}
+_HIDDEN = frozenset(("script", "style", "nav", "svg", "pre", "template", "button", "select"))
+"""Elements that say nothing to a search; code is known from the page's sheet."""
+_LINES = frozenset(
+    "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
+)
+
+
+def drawn_sections(body: str) -> tuple[Section, ...]:
+    """The sections of a page's body."""
+    reader = _Reader()
+    reader.read(parse_html(body))
+    reader.end_line()
+    reader.end_section()
+    return tuple(reader.done)
+
+
+class _Reader:
+    def __init__(self) -> None:
+        self.done: list[Section] = []
+        self._head: tuple[str, str, int] = ("", "", 0)
+        self._pieces: list[Piece] = []
+        self._text: list[str] = []
+
+    def read(self, content: Iterable[HtmlContent]) -> None:
+        """Headings begin sections, other blocks lines."""
+        for child in content:
+            if isinstance(child, str):
+                self._text.append(child)
+            elif child.name in _HIDDEN:
+                continue
+            elif child.name in _HEADINGS:
+                self.end_line()
+                self.read(child.children)
+                heading = self._said()
+                if child.name != "h1":  # which is the page's title
+                    self.end_section()
+                    self._head = child.attributes.get("id", ""), heading, _HEADINGS[child.name]
+            elif child.name in _LINES:
+                self.end_line()
+                self.read(child.children)
+                self.end_line()
+            else:
+                self.read(child.children)
+
+    def _said(self) -> str:
+        text = " ".join("".join(self._text).split())
+        self._text.clear()
+        return text
+
+    def end_line(self) -> None:
+        """What was said since the last line is one."""
+        text = self._said()
+        if text:
+            self._pieces.append(Piece("text", text))
+
+    def end_section(self) -> None:
+        """What stands between two headings is a section, unless there is nothing."""
+        if self._head[1] or self._pieces:
+            self.done.append(Section(*self._head, tuple(self._pieces)))
+        self._pieces = []

@@ -1,6 +1,7 @@
 """A page as plain Markdown: for people, feeds and language models.
 
-Entry points: `twin(sheet, page, …)`, the text; `twin_href`, an address in it.
+Entry points: `markdown_copy(sheet, page, …)`, the text; `html_copy`, that of a page without a
+document; `markdown_href`, an address in it.
 
 A lesson or page of the course is written from its document. Every other page (the map, levels,
 models, measured figures) is written from its HTML, so that it says what the page says.
@@ -19,48 +20,34 @@ from coursebuild.render.exports.markdown import Same, write_blocks, write_footno
 from coursebuild.render.exports.marks import code_span, escaped, guarded, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
-from coursebuild.render.links import plain_target
 from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
 
 Locate: TypeAlias = Callable[[str], str]
 
 
-def twin_href(place: urls.Place, href: str) -> str:
-    """An address on a page as its twin has it: that of the other page's twin."""
-    plain = plain_target(place.path, href)
-    if plain is None:
-        return _any_twin_href(place, href)
-    target, anchor = plain
-    if not target.endswith(".html") or not _has_twin(target):
+def markdown_href(place: urls.Place, href: str) -> str:
+    """An address on a page as its copy has it: that of the other page's copy."""
+    try:
+        parts = urlsplit(href)
+    except ValueError:  # it is no address
         return href
-    path, _, _ = href.partition("#")
-    return f"{path.removesuffix('.html')}.md{f'#{anchor}' if anchor else ''}"
-
-
-def _any_twin_href(place: urls.Place, href: str) -> str:
-    """The same, however the address is written."""
-    parts = urlsplit(href)
     if parts.scheme or parts.netloc or not parts.path.endswith(".html"):
         return href
     folder = posixpath.dirname(place.path)
     target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
-    if not _has_twin(target):
+    if target.startswith(("files/", "../")) or urls.markdown_path(target) is None:
         return href
     return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
 
 
-def _has_twin(page: str) -> bool:
-    return not page.startswith(("files/", "../")) and urls.twin_path(page) is not None
-
-
-def twin(sheet: Sheet, page: PageContext | None, body: str, same: Same) -> str:
+def markdown_copy(sheet: Sheet, page: PageContext | None, body: str, same: Same) -> str:
     """The text of a page; `body` is its HTML, as published, `same` what its notebook shares."""
     if page is None:
-        return twin_of(sheet.path, body)
+        return html_copy(sheet.path, body)
     place, words, document = page.place, page.tools.words, page.document
     here = place.href(place.path)
-    context = Plain(page, lambda href: twin_href(place, href), here, same=same)
+    context = Plain(page, lambda href: markdown_href(place, href), here, same=same)
     parts = (
         *head(sheet, words, context.locate),
         write_blocks(document.blocks, context, same),
@@ -70,13 +57,13 @@ def twin(sheet: Sheet, page: PageContext | None, body: str, same: Same) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def twin_of(path: str, body: str) -> str:
+def html_copy(path: str, body: str) -> str:
     """The text of a page without a document, from its HTML."""
-    if urls.twin_path(path) is None:
+    if urls.markdown_path(path) is None:
         return ""
     from coursebuild.render.exports.fromhtml import markdown_of  # pages with one need none of it
 
-    return f"{markdown_of(body, lambda href: twin_href(urls.Place(path), href))}\n"
+    return f"{markdown_of(body, lambda href: markdown_href(urls.Place(path), href))}\n"
 
 
 def head(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
