@@ -45,10 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _end(status: int, *, alone: bool) -> int:
     """End this process at once, if it is one command's: Python takes its time to clean up."""
     if alone:
-        from coursebuild.effects.leaving import leave
+        from coursebuild.effects.exit_immediately import exit_immediately
 
         atexit._run_exitfuncs()  # of others: what is left open is closed, as ever
-        leave(status)
+        exit_immediately(status)
     return status
 
 

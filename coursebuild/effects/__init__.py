@@ -10,7 +10,7 @@ Scripts:
 
 - `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what scripts find
   around them is in `surroundings`
-- what these processes do: `forkserver` (with `warm`, `interpreter`, `preload`, `ending`),
+- what these processes do: `forkserver` (with `warm`, `interpreter`, `preload`),
   `supervisor` (with `watching`, `required`), `spawned`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made dependencies of by
   `notes`
@@ -19,7 +19,7 @@ Scripts:
 What is kept:
 
 - `store` (with `prune`), `shared`: results, here and for others
-- `conditions`, `digests`, `installed`, `code`, `tool`: what results depend on, as it is now
+- `conditions`, `digests`, `packages`, `code`, `tool`: what results depend on, as it is now
 - `prepared`: fonts that come cut with the tool
 
 Engines and processes:
@@ -29,9 +29,9 @@ Engines and processes:
 - `lab_engine` (with `lab_pieces.js`), `lab_files`, `native` (with `native_worker`): labs in the
   browser's engine and natively
 - `child`: processes that answer
-- `leaving`: the end of this process
+- `exit_immediately`: the end of this process
 
 The preview: `server`, `watch`.
 
-What is installed: `resources`, `versions`, `packages`.
+What is installed: `resources`, `versions`.
 """

@@ -34,8 +34,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypedDict
 
-from coursebuild.effects import mujoco_nudging, mujoco_tracing, mujoco_watching
-from coursebuild.effects.ending import Ending
+from coursebuild.effects import initial_state_perturbation, mujoco_tracing, mujoco_watching
 from coursebuild.effects.interpreter import Interpreter
 from coursebuild.effects.notes import Notes, read_notes
 from coursebuild.effects.preload import Recorder
@@ -161,6 +160,7 @@ class _Server:
 
     def _load(self, names: Sequence[str]) -> Loaded:
         before = _surroundings()
+        had_mujoco = "mujoco" in sys.modules
         for name in names:
             if self.trouble or name in sys.modules:
                 continue
@@ -174,7 +174,7 @@ class _Server:
             except BaseException as error:
                 self.trouble = f"importing {name} failed: {error!r}"
         self.recorder.settle()
-        if "mujoco" in names and "mujoco" in sys.modules:
+        if "mujoco" in sys.modules and not had_mujoco:
             mujoco_tracing.wrap(sys.modules["mujoco"], re)
             mujoco_watching.watch(sys.modules["mujoco"])
         # A script's collector shall not look at, and so copy, what it did not make. What imports
@@ -267,10 +267,9 @@ class _Forker:
             installed = [*installed, *library_folders(root, job["library"])]
         tracer = Tracer(root, environment["TMPDIR"], installed, notes, shared)
         mujoco_tracing.tracer = tracer
-        ending = Ending(self.recorder.offer(tracer.restored), tracer, _contents(job["path"]))
-        atexit.register(ending.check)  # the first that is registered is the last that runs
+        finder = self.recorder.offer(tracer.restored)
+        atexit.register(finder.withdraw)  # the first that is registered is the last that runs
         atexit.register(mujoco_watching.finish)
-        tracer.at_end = ending.leave
         self._watch_mujoco(job["perturbation"])
         gc.enable()
         tracer.install()
@@ -282,24 +281,13 @@ class _Forker:
         if "mujoco" not in modules:
             sys.meta_path.insert(0, Waiting(perturbation, at_end=False))
         elif perturbation:
-            mujoco_nudging.install(modules["mujoco"], modules["numpy"], perturbation)
+            initial_state_perturbation.install(modules["mujoco"], modules["numpy"], perturbation)
 
     def _notes(self, shared: mmap.mmap, notes: str, root: str, path: str) -> Notes:
         end = shared.find(b"\0\0")
         data = shared[: end if end >= 0 else len(shared)]
         shared.close()
         return read_notes(data, notes, root, path, self.recorder.looked_for)
-
-
-def _contents(path: str) -> bytes:
-    try:
-        file = os.open(path, os.O_RDONLY)
-    except OSError:
-        return b""  # Python will say so
-    try:
-        return os.read(file, os.fstat(file).st_size)
-    finally:
-        os.close(file)
 
 
 def _renew_main() -> None:

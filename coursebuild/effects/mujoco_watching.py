@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import sys
 
-from coursebuild.effects import mujoco_nudging, mujoco_tracing
+from coursebuild.effects import initial_state_perturbation, mujoco_tracing
 from coursebuild.effects.mujoco_warnings import Warnings
 
 TYPE_CHECKING = False
@@ -161,7 +161,7 @@ class _Watch:
 
     def _look_last(self, data: Any) -> None:
         self._look(data)
-        mujoco_nudging.last_look(data)
+        initial_state_perturbation.last_look(data)
 
     def _look(self, data: Any) -> None:
         """Note what is wrong with a simulation, once for each of them."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import posix
 import sys
 
-from coursebuild.effects import mujoco_nudging, mujoco_tracing, mujoco_watching, tracing
+from coursebuild.effects import initial_state_perturbation, mujoco_tracing, mujoco_watching, tracing
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Waiting:
         mujoco_tracing.wrap(mujoco, sys.modules["re"])
         mujoco_watching.watch(mujoco)
         if self._perturbation:
-            mujoco_nudging.install(mujoco, sys.modules["numpy"], self._perturbation)
+            initial_state_perturbation.install(mujoco, sys.modules["numpy"], self._perturbation)
         if self._at_end:
             sys.modules["atexit"].register(mujoco_watching.finish)
 

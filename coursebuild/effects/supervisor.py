@@ -67,7 +67,7 @@ class Job(TypedDict):
     library: str
     """A folder to import `mjcourse` from, where it is not installed."""
     perturbation: int
-    """In which direction initial states are moved (see `mujoco_nudging`); 0: in none."""
+    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
 
 
 class Report(TypedDict):

@@ -118,16 +118,6 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
     return tuple(name for name in _PRELOADED if name in found)
 
 
-def said_packages(code: bytes) -> tuple[str, ...]:
-    """Which of these packages code seems to ask for, from a look at its lines."""
-    said = _said(code)
-    if "mujoco" in said or "mjcourse" in said:
-        said.add("numpy")
-    if "numpy" in said and b".random" in code:
-        said.add("numpy.random")
-    return tuple(name for name in _PRELOADED if name in said)
-
-
 def _said(data: bytes) -> set[str]:
     """Top-level names that a text imports, or has in lines that look so."""
     return {

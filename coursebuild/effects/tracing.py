@@ -18,7 +18,8 @@ A record is a letter and what it is about, in bytes:
 - `n`, a folder, a tab and a name: a module that had been imported before scripts were, and all that
   it imports, would have been found in this folder first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
-- `p`: an initial state was moved; `s` and numbers: a state at its end (see `mujoco_nudging`)
+- `p`: an initial state was moved; `s` and numbers: a state at its end (see
+  `initial_state_perturbation`)
 - `o` and words: why there may be more
 
 This file is imported in a script's own process too, where nothing may stay behind, so it imports
@@ -121,10 +122,6 @@ class Tracer:
         self._builtin = frozenset(sys.builtin_module_names)
         self._standard = sys.stdlib_module_names
         self._is_frozen = sys.modules["_imp"].is_frozen
-        self.native = False
-        """Whether the script has loaded native code, which may do something at the end."""
-        self.at_end: Callable[[], None] | None = None
-        """Is called when the interpreter has ended, but for giving back its memory."""
 
     def install(self) -> None:
         """Begin."""
@@ -143,7 +140,6 @@ class Tracer:
             "socket.getaddrinfo": self._network,
             "socket.gethostbyname": self._network,
             "socket.gethostbyaddr": self._network,
-            "cpython.PyInterpreterState_Clear": lambda args: self.at_end and self.at_end(),
         }
         for name in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "pty.spawn"):
             handlers[name] = self._program
@@ -263,7 +259,6 @@ class Tracer:
     def _import(self, args: tuple[object, ...]) -> None:
         name, file, path = args[:3]
         if file is not None:
-            self.native = True
             at = self._relevant(file)
             if at is not None:
                 self._note(f"r{at}")
@@ -310,7 +305,6 @@ class Tracer:
 
     def _load(self, args: tuple[object, ...]) -> None:
         name = args[0]
-        self.native = True
         if isinstance(name, str) and "/" in name:
             self.library(name)
 

@@ -31,7 +31,7 @@ from coursebuild.report import Report
 from coursebuild.results import FileList, Results, SiteFile
 
 if TYPE_CHECKING:
-    from coursebuild.effects.foresight import RunAll
+    from coursebuild.effects.prewarm import RunAll
     from coursebuild.model import Course
     from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
@@ -39,8 +39,7 @@ if TYPE_CHECKING:
 
 _FOLLOWING = (
     "coursebuild.checks.course",
-    "coursebuild.scripts.printed",
-    "coursebuild.scripts.shown",
+    "coursebuild.scripts.bound_numbers",
     "coursebuild.pipeline.site",
     "coursebuild.render.exports.files",
     "coursebuild.render.reader",

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Severity, diagnose
-from coursebuild.effects.foresight import RunAll, early_server
 from coursebuild.effects.locks import project_lock
+from coursebuild.effects.prewarm import RunAll, prewarmed_runner
 from coursebuild.model import Course, Status
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
@@ -58,7 +58,7 @@ def scripts_ahead(options: Options, names: tuple[str, ...] = ()) -> Iterator[Run
     if names or options.jobs == 1 or options.executor is not None or options.run_all is not None:
         yield None
         return
-    with early_server(options.root, options.store) as run_all:
+    with prewarmed_runner(options.root, options.store) as run_all:
         yield run_all
 
 

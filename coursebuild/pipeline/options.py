@@ -21,7 +21,7 @@ from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
 
 if TYPE_CHECKING:
-    from coursebuild.effects.foresight import RunAll
+    from coursebuild.effects.prewarm import RunAll
 
 
 class Options(Struct, frozen=True):

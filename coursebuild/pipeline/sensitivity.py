@@ -3,8 +3,8 @@
 Entry point: `measure(course, options, progress, scripts, runs, documents)`.
 
 Of scripts that use MuJoCo and whose output is recorded and as recorded, four runs are made with
-their initial states moved (see `effects.mujoco_nudging`), each with three times the time limit.
-They are remembered like other runs.
+their initial states moved (`effects.initial_state_perturbation`), each with three times the time
+limit. They are remembered like other runs.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ import sys
 import threading
 
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.leaving import leave
+from coursebuild.effects.exit_immediately import exit_immediately
 from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.read import read_bytes
@@ -110,7 +110,7 @@ def serve(options: Options, port: int) -> None:
         live.close()
         options.store.close()
         sys.setswitchinterval(before)
-    leave(0)
+    exit_immediately(0)
 
 
 def live_course(options: Options) -> LiveCourse:

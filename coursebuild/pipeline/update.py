@@ -24,8 +24,8 @@ from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.foresight import RunAll
 from coursebuild.effects.locks import project_lock
+from coursebuild.effects.prewarm import RunAll
 from coursebuild.effects.runner import ScriptServer
 from coursebuild.effects.write import check_writable, write_atomic
 from coursebuild.model import Course, Recording, document_blocks

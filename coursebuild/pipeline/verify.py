@@ -49,7 +49,7 @@ from coursebuild.scripts.extract import Extraction, extract, jobs
 from coursebuild.scripts.findings import script_findings
 
 if TYPE_CHECKING:
-    from coursebuild.effects.foresight import RunAll
+    from coursebuild.effects.prewarm import RunAll
     from coursebuild.effects.runner import RunEvent
     from coursebuild.pipeline.shards import Shard
 

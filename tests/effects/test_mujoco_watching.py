@@ -92,6 +92,11 @@ def test_a_warning_is_noticed_with_its_line_time_and_model(run: Run) -> None:
     assert found(run(HEAD + STEP * 4 + FAST + STEP)) == warned(LINE + 6, "0.0080")
 
 
+def test_a_warning_is_noticed_once_when_more_packages_were_imported_later(run: Run) -> None:
+    for more in ("", "import numpy.random\n"):
+        assert found(run(HEAD + more + FAST + STEP))[1:] == ()
+
+
 @pytest.mark.parametrize(
     ("value", "sign"),
     [

@@ -1,6 +1,6 @@
-"""What a simulation with moved initial states has come through, for `mujoco_nudging`.
+"""What a simulation with moved initial states has come through, for `initial_state_perturbation`.
 
-Entry point: `Past`, of an `MjData`.
+Entry point: `TrajectoryExtent`, of an `MjData`.
 
 From its beginning (new data, or the clock went back) to its end a simulation covers positions and
 velocities: the largest are the sizes that its final state is compared by, since it may well end
@@ -21,7 +21,7 @@ _LOST = 1e10
 """Larger numbers, and none, are those of a simulation that is lost."""
 
 
-class Past:
+class TrajectoryExtent:
     """What MuJoCo last computed from, or led to, and how far it came."""
 
     def __init__(self, data: Any, number: int) -> None:

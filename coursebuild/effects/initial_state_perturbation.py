@@ -14,7 +14,7 @@ lets go of.
    not be moved at all: its coordinates become ±SIZE, and its bodies turn by as much.
 4. A state that the script puts back bit by bit is no initial state: it was moved already. Nor is a
    correction in the last places, such as the length of a quaternion.
-5. The final state is told, with the sizes that it is compared by (`mujoco_past`).
+5. The final state is told, with the sizes that it is compared by (`trajectory_extent`).
 
 The model, the time, controls and forces stay as they are.
 """
@@ -25,7 +25,7 @@ import _weakref
 import sys
 
 from coursebuild.effects import mujoco_tracing
-from coursebuild.effects.mujoco_past import Past
+from coursebuild.effects.trajectory_extent import TrajectoryExtent
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -64,26 +64,26 @@ _FIELDS = ("qpos", "qvel", "act")
 
 def install(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
     """Move the initial states of this process from now on; the run's number counts from 1."""
-    global _nudging
-    _nudging = _Nudging(mujoco, numpy, run)
-    _nudging.install()
+    global _perturbation
+    _perturbation = _Perturbation(mujoco, numpy, run)
+    _perturbation.install()
 
 
 def last_look(data: Any) -> None:
     """Tell of the final state of an `MjData`."""
-    if _nudging is not None:
-        _nudging.last_look(data)
+    if _perturbation is not None:
+        _perturbation.last_look(data)
 
 
-_nudging: _Nudging | None = None
+_perturbation: _Perturbation | None = None
 
 
-class _Nudging:
+class _Perturbation:
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
         self._run = run
-        self._pasts: dict[int, Past] = {}
+        self._extents: dict[int, TrajectoryExtent] = {}
         self._known: set[int] = set()
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
@@ -112,35 +112,35 @@ class _Nudging:
 
     def _before(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         model, data = _model_and_data(args, keywords)
-        past = self._pasts.get(id(data))
-        if past is None or past.of() is not data:
-            past = self._pasts[id(data)] = Past(data, self._count)
+        extent = self._extents.get(id(data))
+        if extent is None or extent.of() is not data:
+            extent = self._extents[id(data)] = TrajectoryExtent(data, self._count)
             self._count += 1
-        elif _states(data) == past.states and data.time >= past.time:
+        elif _states(data) == extent.states and data.time >= extent.time:
             return
-        self._move(model, data, past)
+        self._move(model, data, extent)
 
     def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], made: Any) -> None:
         data = _model_and_data(args, keywords)[1]
-        past = self._pasts.get(id(data))
-        if past is not None and past.of() is data:
-            past.cover(data)
-            self._remember(past, data)
+        extent = self._extents.get(id(data))
+        if extent is not None and extent.of() is data:
+            extent.cover(data)
+            self._remember(extent, data)
 
     def _nothing(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         """It goes on with a state that was looked at."""
 
-    def _remember(self, past: Past, data: Any) -> None:
-        past.time = data.time
-        past.states = states = _states(data)
+    def _remember(self, extent: TrajectoryExtent, data: Any) -> None:
+        extent.time = data.time
+        extent.states = states = _states(data)
         if len(self._known) < _MOST_KNOWN:
             self._known.update(hash((i, state)) for i, state in enumerate(states))
 
-    def _move(self, model: Any, data: Any, past: Past) -> None:
-        begins = not past.states or data.time < past.time
+    def _move(self, model: Any, data: Any, extent: TrajectoryExtent) -> None:
+        begins = not extent.states or data.time < extent.time
         plan = self._plan(model)
         arrays = [getattr(data, name) for name in _FIELDS]
-        befores = past.states if past.states else (None,) * len(_FIELDS)
+        befores = extent.states if extent.states else (None,) * len(_FIELDS)
         new = [
             self._new(i, array, before, begins)
             for i, (array, before) in enumerate(zip(arrays, befores, strict=True))
@@ -149,13 +149,13 @@ class _Nudging:
         zeros = qpos == 0
         moved = plan.move(qpos, qvel, act, new, begins)
         if begins:
-            past.begin(data.time)
-        past.cover(data)
-        past.from_zero = past.from_zero or bool((qpos[zeros] != 0).any())
+            extent.begin(data.time)
+        extent.cover(data)
+        extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
         if moved and not self._told:
             self._told = True
             self._note("p")
-        self._remember(past, data)
+        self._remember(extent, data)
 
     def _new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
         """Which numbers of a field are those of an initial state."""
@@ -219,15 +219,15 @@ class _Nudging:
     # --- the end
 
     def last_look(self, data: Any) -> None:
-        past = self._pasts.get(id(data))
-        if past is None or past.of() is not data:
+        extent = self._extents.get(id(data))
+        if extent is None or extent.of() is not data:
             return
-        del self._pasts[id(data)]
+        del self._extents[id(data)]
         numbers = [*data.qpos.tolist(), *data.qvel.tolist()]
         self._numbers += len(numbers)
         if self._numbers <= _MOST_NUMBERS:
-            parts = [str(past.number), str(len(data.qpos))]
-            parts += [x.hex() for x in (*past.sizes(), *numbers)]
+            parts = [str(extent.number), str(len(data.qpos))]
+            parts += [x.hex() for x in (*extent.sizes(), *numbers)]
             self._note(f"s{' '.join(parts)}")
 
     def _note(self, record: str) -> None:
