@@ -21,8 +21,8 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.update import changed_text
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts
 from coursebuild.report import Report
-from coursebuild.scripts.adopt import adopted, block_text
 from coursebuild.scripts.edit import apply_edits
+from coursebuild.scripts.extract import adopted, block_text
 from coursebuild.scripts.extract import extract as extract_course
 from coursebuild.source import Source
 

@@ -30,7 +30,7 @@ from coursebuild.scripts.held import Borne, Held, Leans
 from coursebuild.source import Span
 
 if TYPE_CHECKING:
-    from coursebuild.scripts.printed import PrintedLine
+    from coursebuild.scripts.bound_numbers import PrintedLine
 
 _FAILED = (
     Outcome.FAILED,
@@ -114,7 +114,7 @@ class Printed:
         if key not in self._lines:
             if len(self._lines) >= _REMEMBERED:
                 self._lines.clear()
-            from coursebuild.scripts.printed import printed_lines
+            from coursebuild.scripts.bound_numbers import printed_lines
 
             self._lines[key] = printed_lines(verdict.recording)
         return self._lines[key]
@@ -175,7 +175,7 @@ def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnosti
 
     `before` are those by which it held before, if that is known.
     """
-    from coursebuild.scripts.printed import lines_of_run
+    from coursebuild.scripts.bound_numbers import lines_of_run
 
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
@@ -234,7 +234,7 @@ def _unrecorded(
         )
     if run.outcome is not Outcome.OK:
         return Borne()
-    from coursebuild.scripts.printed import lines_of_run
+    from coursebuild.scripts.bound_numbers import lines_of_run
 
     lines = lines_of_run(run.stdout)
     if _holds(binding, lines):
@@ -245,7 +245,10 @@ def _unrecorded(
 
 
 def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
-    from coursebuild.scripts.shown import Shown, text_places  # of bindings that nobody remembers
+    from coursebuild.scripts.bound_numbers import (  # of bindings that nobody remembers
+        Shown,
+        text_places,
+    )
 
     shown = Shown.of(binding.text)
     if not shown.numbers:
@@ -299,7 +302,7 @@ def _changed(
 
 
 def _leans_at(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
-    from coursebuild.scripts.shown import Shown, text_places
+    from coursebuild.scripts.bound_numbers import Shown, text_places
 
     shown = Shown.of(binding.text)
     if not shown.numbers:

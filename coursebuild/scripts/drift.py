@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.results import Change, DriftKind, Verdict
 from coursebuild.scripts.bindings import Leaning
-from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.bound_numbers import Shown, shows
+from coursebuild.scripts.diff import shortened
 from coursebuild.scripts.numbers import scan
-from coursebuild.scripts.shown import Shown, shows
 
 _NAMED = 20
 _WIDTH = 60

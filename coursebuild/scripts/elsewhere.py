@@ -18,7 +18,7 @@ from coursebuild.model import Course
 from coursebuild.results import Change, Outcome, ScriptRun, Verdict
 from coursebuild.scripts.align import StepKind, align
 from coursebuild.scripts.compare import verify
-from coursebuild.scripts.difftext import diff_text
+from coursebuild.scripts.diff import diff_text
 from coursebuild.scripts.lines import LineMatcher
 from coursebuild.scripts.traced import Side
 

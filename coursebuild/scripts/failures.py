@@ -19,7 +19,7 @@ from coursebuild.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.model import Recording
 from coursebuild.patterns import pattern
 from coursebuild.results import Outcome, ScriptRun
-from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.diff import shortened
 from coursebuild.scripts.extract import Extraction
 from coursebuild.source import Span
 

@@ -36,11 +36,11 @@ from coursebuild.model.sensitivity import (
     Standing,
 )
 from coursebuild.results import Change, Outcome, ScriptRun
+from coursebuild.scripts.bound_numbers import printed_lines
 from coursebuild.scripts.compare import compare
-from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.diff import shortened
 from coursebuild.scripts.lines import same_number
 from coursebuild.scripts.numbers import Number, difference, round_like, scan, unit
-from coursebuild.scripts.printed import printed_lines
 from coursebuild.source import Span
 
 _NAMED = 20

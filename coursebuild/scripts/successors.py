@@ -22,9 +22,8 @@ from decimal import Decimal
 
 from msgspec import Struct
 
+from coursebuild.scripts.bound_numbers import PrintedLine, Shown, Window
 from coursebuild.scripts.lines import canonical
-from coursebuild.scripts.printed import PrintedLine
-from coursebuild.scripts.shown import Shown, Window
 
 
 class Succession(Struct, frozen=True):

@@ -18,9 +18,9 @@ from coursebuild.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.model import Comparison, Filter, Mode, Recording, Table
 from coursebuild.scripts.lines import canonical, same_number
 from coursebuild.scripts.numbers import Number, round_like
+from coursebuild.scripts.repeat import unstable
 from coursebuild.scripts.tables import RowCell, RowMatch, match_rows, rows_match, table_rows
 from coursebuild.scripts.traced import Side
-from coursebuild.scripts.unstable import unstable
 from coursebuild.source import Span
 
 MINUS = "\u2212"

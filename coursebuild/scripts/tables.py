@@ -20,7 +20,7 @@ from coursebuild.model import Cell, Comparison, Filter, Recording, Table
 from coursebuild.results import Change, DriftKind, Verdict
 from coursebuild.scripts.celltext import cell_text, plain
 from coursebuild.scripts.changes import number_change
-from coursebuild.scripts.difftext import shortened
+from coursebuild.scripts.diff import shortened
 from coursebuild.scripts.lines import (
     Canon,
     SameNumber,

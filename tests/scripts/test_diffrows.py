@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from coursebuild.model import Comparison, Mode, Recording, document_blocks
 from coursebuild.scripts.compare import compare
-from coursebuild.scripts.diffrows import diff_rows
+from coursebuild.scripts.diff import diff_rows
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 

@@ -37,7 +37,7 @@ from coursebuild.pipeline.preview.live import LiveCourse
 from coursebuild.report import Report
 from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import document_bindings
-from coursebuild.scripts.diffrows import DiffRow, diff_rows
+from coursebuild.scripts.diff import DiffRow, diff_rows
 from coursebuild.scripts.edit import apply_edits, updated_body
 
 _MOST = 60
