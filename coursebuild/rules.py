@@ -84,6 +84,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("fence-key-repeated", "error", "A fence has the same key twice."),
     ("fence-key-value", "error", "A key of a fence has an impossible value."),
     ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
+    ("feature-broken", "error", "A feature of the course's own cannot be loaded."),
     ("feature-missing", "error", "A fence needs a feature that is not installed."),
     ("math-syntax", "error", "A formula does not parse."),
     ("math-unclosed", "error", "Display math is never closed."),

@@ -5,7 +5,7 @@ there are; `fence_kind` and `kind_of_block`, which find one.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
-(`features = ["content/features/NAME.py"]`; see `use_course_features`). All three are alike.
+(`features = ["features/NAME.py"]`; see `use_course_features`). All three are alike.
 docs/features.md says how to write one.
 
 What the core asks of a block after it was parsed are the methods of `FeatureBlock`
@@ -15,10 +15,13 @@ What the core asks of a block after it was parsed are the methods of `FeatureBlo
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib
+import importlib.util
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from markupsafe import Markup
@@ -27,6 +30,7 @@ from msgspec import Struct
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.model import Course, Document, FeatureBlock
 from coursebuild.results import ScriptRun
+from coursebuild.rules import RULES, Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
     from coursebuild.render.context import PageContext
@@ -65,18 +69,27 @@ class Feature(Struct, frozen=True, kw_only=True):
 
     name: str
     fences: tuple[FenceKind[Any], ...] = ()
+    rules: tuple[Rule, ...] = ()
+    """Mistakes that it can name, in addition to the catalogue (`coursebuild.rules`)."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """What is wrong once the scripts have run."""
     schemas: Mapping[str, tuple[type[Struct], str]] = {}
     """JSON Schemas for editors, by the name that `coursebuild schema` takes: type and title."""
+    texts: Mapping[str, str] = {}
+    """Interface texts by language, as TOML; those in English (`en`) stand for missing ones."""
     style: str = ""
     """CSS that every page of the site gets."""
-    script: str = ""
-    """JavaScript of the pages that show a block of the feature. It runs when the page is parsed."""
     mark: str = ""
-    """A piece of HTML by which such a page is known, as `data-tabs`; needed with a `script`."""
+    """A piece of HTML by which a page is known that the feature's script belongs to, as
+    `data-tabs`; without it there is no script."""
+    script: str = ""
+    """The script, run when the page is parsed. A feature of coursebuild itself has its own in the
+    bundle (`site/js/NAME.js`), and the page's script loads it when a reader comes near."""
+    script_texts: tuple[str, ...] = ()
+    """Keys of interface texts that the script asks for, or beginnings of such, which end in a dot.
+    """
 
 
 _INSTALLED_BY = {
@@ -87,6 +100,7 @@ _INSTALLED_BY = {
 """What has to be installed for fences that a course written for coursebuild may have."""
 
 _of_course: tuple[Feature, ...] = ()
+_digest = ""
 
 
 def features() -> tuple[Feature, ...]:
@@ -94,12 +108,17 @@ def features() -> tuple[Feature, ...]:
     return _sorted((*_installed(), *_of_course))
 
 
-def use_course_features(found: Iterable[Feature]) -> None:
-    """Set the features that the course at hand brings itself, in place of those of another."""
-    global _of_course
-    _of_course = _sorted(found)
+def use_course_features(found: Iterable[Feature], digest: str) -> None:
+    """Set the features that the course at hand brings itself, and a hash of their code."""
+    global _of_course, _digest
+    _of_course, _digest = _sorted(found), digest
     _by_fence.cache_clear()
     _by_block.cache_clear()
+
+
+def features_digest() -> str:
+    """A hash over the code of all features but those of coursebuild itself."""
+    return hashlib.sha256("\0".join((_digest, *_package_lines())).encode()).hexdigest()
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:
@@ -122,6 +141,11 @@ def missing_package(name: str) -> str:
     return "" if name in _by_fence() else _INSTALLED_BY.get(name, "")
 
 
+def is_loaded_late(name: str) -> bool:
+    """Whether the page's script loads the script of a feature, and not the page itself."""
+    return any(feature.name == name and not feature.script for feature in features())
+
+
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:
     """What features find wrong once the scripts have run."""
     runs = tuple(runs)
@@ -134,12 +158,33 @@ def _installed() -> tuple[Feature, ...]:
     package = importlib.import_module("coursebuild.features")
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     found = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
-    found += [point.load() for point in entry_points(group=GROUP)]
+    found += [point.load() for point in _entry_points()]
     return _sorted(found)
 
 
+@functools.cache
+def _entry_points() -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=GROUP))
+
+
+@functools.cache
+def _package_lines() -> tuple[str, ...]:
+    """A line for each file of the modules that packages offer as features."""
+    lines: list[str] = []
+    for point in _entry_points():
+        spec = importlib.util.find_spec(point.module)
+        for folder in (spec.submodule_search_locations or ()) if spec else ():
+            for file in sorted(Path(folder).rglob("*")):
+                if file.is_file() and "__pycache__" not in file.parts:
+                    status = file.stat()
+                    lines.append(f"{file}\0{status.st_size}\0{status.st_mtime_ns}")
+    return tuple(lines)
+
+
 def _sorted(found: Iterable[Feature]) -> tuple[Feature, ...]:
-    return tuple(sorted(found, key=lambda feature: feature.name))
+    known = tuple(sorted(found, key=lambda feature: feature.name))
+    RULES.update((rule.name, rule) for feature in known for rule in feature.rules)
+    return known
 
 
 @functools.cache

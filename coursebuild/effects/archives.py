@@ -25,7 +25,7 @@ _LEVEL = 6
 _FIRST = "mimetype"
 """What an e-book must begin with, stored."""
 _STORED = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _FIRST)
-_AUTHORED = ("models", "examples", ".coursebuild", ".git")
+_AUTHORED = ("features", "models", "examples", ".coursebuild", ".git")
 
 
 def check_target(root: Path, out: Path, is_ours: Callable[[Path], bool]) -> None:

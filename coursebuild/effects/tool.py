@@ -15,14 +15,19 @@ import os
 import sys
 from collections.abc import Iterator
 
+from coursebuild.core.features import features_digest
 from coursebuild.effects.resources import assets_dir, templates_dir
 
 _PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
 
 
-@functools.cache
 def tool_digest() -> str:
-    """A hash over everything that the tool consists of, and the Python that runs it."""
+    """A hash over everything that the tool consists of, features of others and Python included."""
+    return hashlib.sha256(f"{_tool()}\0{features_digest()}".encode()).hexdigest()
+
+
+@functools.cache
+def _tool() -> str:
     return _digest(_PACKAGE, str(templates_dir()), str(assets_dir()))
 
 

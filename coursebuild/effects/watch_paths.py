@@ -5,7 +5,7 @@ Entry points: `FOLDERS`, watched with all that is in them; `is_source`.
 
 from __future__ import annotations
 
-FOLDERS = ("content", "models", "mjcourse")
+FOLDERS = ("content", "features", "models", "mjcourse")
 LOOK = 0.200
 """Seconds from one look for new and removed folders to the next."""
 

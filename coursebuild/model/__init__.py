@@ -45,6 +45,7 @@ from coursebuild.model.blocks import Table as Table
 from coursebuild.model.blocks import ThematicBreak as ThematicBreak
 from coursebuild.model.course import CalloutKind as CalloutKind
 from coursebuild.model.course import Course as Course
+from coursebuild.model.course import CourseFeature as CourseFeature
 from coursebuild.model.course import Lesson as Lesson
 from coursebuild.model.course import Level as Level
 from coursebuild.model.course import MjcfModel as MjcfModel

@@ -95,6 +95,13 @@ class Silence(Struct, frozen=True):
     path: str | None
 
 
+class CourseFeature(Struct, frozen=True):
+    """A feature of the course's own: a Python file of the project."""
+
+    path: str
+    span: Span
+
+
 class Course(Struct, frozen=True):
     """A whole course."""
 
@@ -121,6 +128,7 @@ class Course(Struct, frozen=True):
     to the root."""
     declarations: tuple[Declarations, ...] = ()
     """What `models/NAME.toml` say, each of a model that is there."""
+    features: tuple[CourseFeature, ...] = ()
     id: str = ""
     """Names the course where its title may change; see `key`."""
 

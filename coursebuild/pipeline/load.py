@@ -20,6 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.effects.course_features import load_course_features
 from coursebuild.effects.read import CourseFiles, read_course, read_sources
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import Course, Declarations, Document, Lesson, Level, Page, Status
@@ -152,6 +153,8 @@ class _Loader:
             return None
         parsed = self.course_map(self.files.map)
         self.found += parsed.diagnostics
+        if parsed.value is not None:
+            self.found += load_course_features(self.root, parsed.value)
         return parsed.value
 
     def declared(self, parse: ParseDeclarations | None) -> tuple[Declarations, ...]:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
+from coursebuild.core.features import features
 from coursebuild.render.strings import DEFAULT_LANGUAGE, Strings, parse_strings
 
 SCRIPTS = {
@@ -25,7 +26,6 @@ SCRIPTS = {
     "offline.js": "js/offline-page.js",
     "map.js": "js/map-page.js",
     "reader.js": "js/reader-page.js",
-    "quiz.js": "js/quiz.js",
     "search.js": "js/search.js",
 }
 """What plain scripts of pages are published as, and the bundled modules that they are."""
@@ -75,12 +75,20 @@ def page_script(code: bytes) -> bytes:
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
 
 
-@functools.lru_cache(maxsize=8)
 def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
-    """The interface texts of a language (`pt-BR`): its file over `pt` over English."""
-    texts = dict(templates)
-    strings = parse_strings(texts[f"strings/{DEFAULT_LANGUAGE}.toml"], None, language)
-    for name in (language.split("-")[0].lower(), language):
-        if name != DEFAULT_LANGUAGE and f"strings/{name}.toml" in texts:
-            strings = parse_strings(texts[f"strings/{name}.toml"], strings, language)
+    """The interface texts of a language (`pt-BR`): its own over those of `pt` over English ones."""
+    added = (feature.texts.items() for feature in features())
+    return _strings_for(templates, tuple(text for texts in added for text in texts), language)
+
+
+@functools.lru_cache(maxsize=8)
+def _strings_for(
+    templates: tuple[tuple[str, str], ...], added: tuple[tuple[str, str], ...], language: str
+) -> Strings:
+    files = [(path, text) for path, text in templates if path.startswith("strings/")]
+    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
+    strings = Strings((), language)
+    for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
+        for text in (text for of, text in (*texts, *added) if of == name):
+            strings = parse_strings(text, strings, language)
     return strings

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
 from collections.abc import Mapping
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 
+from coursebuild.core.features import features, is_loaded_late
 from coursebuild.patterns import pattern
 from coursebuild.render import meta, urls
 from coursebuild.render.characters import visible
@@ -45,7 +45,6 @@ PAGE_WORDS = (
 _LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
 _PARTS = {
     "labs": ("data-script=", ("lab.live.", "overlay.", *_LAB_KEYS)),
-    "quiz": ("data-quiz=", ("quiz.live.",)),
     "offline": ("data-keep", ("offline.live.",)),
     "map": ("data-mark", ("progress.map.",)),
     "lesson": ('data-progress="lesson"', ("progress.lesson.", "progress.trouble.")),
@@ -53,7 +52,8 @@ _PARTS = {
     "review": ('data-progress="review"', ("review.live.", "quiz.live.", "progress.trouble.")),
 }
 """What not every page has and the page's script brings to life: a mark by which it is known in a
-body, and the interface texts that it needs; of some, the beginnings of their keys."""
+body, and the interface texts that it needs; of some, the beginnings of their keys. Features have
+more of them (`known_parts`)."""
 
 
 class Names(Struct, frozen=True):
@@ -71,10 +71,10 @@ class Names(Struct, frozen=True):
     """Of the pages about the reader's progress."""
     map_script: str
     """Of pages that list lessons."""
-    quiz_script: str
-    """Loaded when a reader comes near to questions."""
     search_script: str
     """Loaded when a reader opens the search."""
+    feature_scripts: tuple[tuple[str, str], ...] = ()
+    """Of features that have one, by the feature's name."""
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
@@ -122,14 +122,14 @@ def frame(library: Library, draft: Draft, names: Names) -> str:
 _HERE = Markup("<!--here-->")
 
 
-_MARKS = pattern("|".join(re.escape(mark) for mark, _ in _PARTS.values()))
-"""No two of them can overlap."""
+def known_parts() -> dict[str, tuple[str, tuple[str, ...]]]:
+    """What the page's scripts bring to life: its mark and its interface texts, by name."""
+    return _PARTS | {f.name: (f.mark, f.script_texts) for f in features() if f.mark}
 
 
 def parts_of(body: str) -> tuple[str, ...]:
     """Which parts with scripts of their own a page's body has: `labs`, `quiz`."""
-    found = set(_MARKS.findall(body))
-    return tuple(part for part, (mark, _) in _PARTS.items() if mark in found)
+    return tuple(part for part, (mark, _) in known_parts().items() if mark in body)
 
 
 def frame_around(
@@ -179,7 +179,11 @@ def _shared_values(
         "style": place.href(names.style),
         "theme_script": place.href(names.theme_script),
         "script": place.href(names.script),
-        "quiz_script": place.href(names.quiz_script) if "quiz" in parts else "",
+        "feature_scripts": tuple(
+            (name, place.href(path), is_loaded_late(name))
+            for name, path in names.feature_scripts
+            if name in parts
+        ),
         "search_script": place.href(names.search_script),
         "manifest": place.href(urls.MANIFEST),
         "touch_icon": place.href(names.touch_icon),
@@ -268,7 +272,8 @@ def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
 def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     """Keys of the texts that the page carries for its scripts."""
     keys = library.words.keys
-    needed = [key for part in parts for key in _PARTS[part][1]]
+    known = known_parts()
+    needed = [key for part in parts for key in known[part][1]]
     begun = tuple(key for key in needed if key.endswith("."))
     found = sorted(key for key in keys if begun and key.startswith(begun))
     return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))

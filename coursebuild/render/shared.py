@@ -18,6 +18,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.features import Feature, features
 from coursebuild.patterns import pattern
 from coursebuild.render import fonts, formulas, styles
 from coursebuild.render.assets import SCRIPTS, Assets, hashed_name, page_script
@@ -110,7 +111,8 @@ def shared_files(
     jobs = needed_fonts(assets, facts)
     fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
-    own = styles.style_rules(facts.declarations)
+    own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
+    scripts = ((f.name, feature_script(f, assets)) for f in features() if f.mark)
     names = Names(
         style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
         theme_script=script("theme.js"),
@@ -121,10 +123,15 @@ def shared_files(
         offline_script=script("offline.js"),
         map_script=script("map.js"),
         reader_script=script("reader.js"),
-        quiz_script=script("quiz.js"),
         search_script=script("search.js"),
+        feature_scripts=tuple((n, publish(f"{n}.js", page_script(code))) for n, code in scripts),
     )
     return tuple(files), names
+
+
+def feature_script(feature: Feature, assets: Assets) -> bytes:
+    """The script of a feature: its own, or that of the same name in the bundle."""
+    return feature.script.encode() or assets.file(f"js/{feature.name}.js")
 
 
 def _licences(assets: Assets) -> bytes:

@@ -69,6 +69,19 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         | None,
         Meta(description="the version of MuJoCo that the course is written for"),
     ] = None
+    features: Annotated[
+        tuple[
+            Annotated[
+                str,
+                Meta(
+                    pattern=r"^features/[\w-]+(/[\w-]+)*\.py$",
+                    extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
+                ),
+            ],
+            ...,
+        ],
+        Meta(description="features of the course's own, as files in `features/`"),
+    ] = ()
 
 
 class FilterTable(Struct, frozen=True, forbid_unknown_fields=True):

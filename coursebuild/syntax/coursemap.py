@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
-from coursebuild.model import Course, Lesson, Level, Page, Status
+from coursebuild.model import Course, CourseFeature, Lesson, Level, Page, Status
 from coursebuild.source import Source, Span
 from coursebuild.syntax.course_schema import CourseFile, LessonTable, LevelTable, PageTable
 from coursebuild.syntax.course_settings import (
@@ -97,7 +97,14 @@ def _course(
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
+        features=_features(table, about.features),
     )
+
+
+def _features(table: Node | None, paths: tuple[str, ...]) -> tuple[CourseFeature, ...]:
+    array = table.get("features") if isinstance(table, ObjectNode) else None
+    items = array.items if isinstance(array, ArrayNode) else ()
+    return tuple(CourseFeature(p, item.span) for p, item in zip(paths, items, strict=True))
 
 
 # --------------------------------------------------------------------------- levels and lessons

@@ -21,8 +21,8 @@ NAMES = Names(
     offline_script="assets/o.js",
     reader_script="assets/r.js",
     map_script="assets/m.js",
-    quiz_script="assets/q.js",
     search_script="assets/f.js",
+    feature_scripts=(("quiz", "assets/q.js"),),
 )
 HOSTILE = 'a "b" <c> & \x07 d\'s \ue000title\ue001 — é'
 

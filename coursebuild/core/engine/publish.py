@@ -48,7 +48,7 @@ from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
 
 _NO_PATH = pattern(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """A part of a path that is empty or stands for a folder, a control character, a backslash."""
-_AUTHORED = ("content", "models", "examples", ".coursebuild", ".git")
+_AUTHORED = ("content", "features", "models", "examples", ".coursebuild", ".git")
 
 
 def check_out(root: Path, out: Path) -> Path:

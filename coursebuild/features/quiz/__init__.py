@@ -27,5 +27,7 @@ FEATURE = Feature(
     ),
     check=check_quizzes,
     check_runs=check_output_lines,
+    mark="data-quiz=",
+    script_texts=("quiz.live.",),
     schemas={"quiz": (QuizFile, "A quiz fence")},
 )

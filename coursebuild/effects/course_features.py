@@ -1,0 +1,53 @@
+"""The features that a course brings itself: Python files that its map names, run here.
+
+Entry point: `load_course_features`. They are as trusted as the course's scripts are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from types import ModuleType
+
+from coursebuild.core.features import Feature, use_course_features
+from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.read import read_bytes
+from coursebuild.model import Course, CourseFeature
+
+
+def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
+    """Make the features of a course those of this process; what is wrong with them."""
+    found: list[Feature] = []
+    wrong: list[Diagnostic] = []
+    digest = hashlib.sha256()
+    for named in course.features:
+        try:
+            code = read_bytes(root, named.path)
+        except EffectError as error:
+            wrong.append(diagnose("feature-broken", named.span, str(error)))
+            continue
+        digest.update(named.path.encode() + b"\0" + code + b"\0")
+        feature = _run(named, code)
+        if isinstance(feature, Feature):
+            found.append(feature)
+        else:
+            wrong.append(feature)
+    use_course_features(found, digest.hexdigest() if course.features else "")
+    return tuple(wrong)
+
+
+def _run(named: CourseFeature, code: bytes) -> Feature | Diagnostic:
+    module = ModuleType(named.path.removesuffix(".py").replace("/", "."))
+    module.__file__ = named.path
+    try:
+        exec(compile(code, named.path, "exec"), module.__dict__)
+    except Exception as error:  # whatever an author's code raises
+        message = f"{named.path} fails: {type(error).__name__}: {error}"
+        return diagnose("feature-broken", named.span, message)
+    feature = getattr(module, "FEATURE", None)
+    if isinstance(feature, Feature):
+        return feature
+    message = f"{named.path} has no FEATURE"
+    help = "give it one, of the type coursebuild.core.features.Feature"
+    return diagnose("feature-broken", named.span, message, help=help)

@@ -1,0 +1,99 @@
+"""Tabs: versions of a text, of which a reader looks at one at a time.
+
+A `tabs` fence holds Markdown, cut by lines `=== Title`. Without a script all versions stand below
+each other under their titles; the script makes tabs of them.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.features import Feature, FenceKind
+from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.model import Block, FeatureBlock
+from coursebuild.render.context import PageContext
+from coursebuild.render.exports.plain import Plain
+from coursebuild.render.search.sections import SectionReader
+from coursebuild.rules import Rule
+from coursebuild.source import Span
+from coursebuild.syntax.fence import Fence
+from coursebuild.syntax.texts import TextParser
+
+TITLE = re.compile(r"===[ \t]+(?P<title>\S.*?)[ \t]*$", re.MULTILINE)
+"""A line that begins a tab."""
+
+
+class Tab(Struct, frozen=True):
+    """One version of the text."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+
+class Tabs(FeatureBlock, frozen=True):
+    """All versions, the one that is shown first at the front."""
+
+    tabs: tuple[Tab, ...]
+
+    def child_blocks(self) -> tuple[Block, ...]:
+        """The texts of all tabs."""
+        return tuple(block for tab in self.tabs for block in tab.blocks)
+
+
+def parse(fence: Fence, texts: TextParser) -> Parsed[Tabs | None]:
+    """The tabs of a fence."""
+    text = fence.body.text
+    titles = list(TITLE.finditer(text))
+    wrong: list[Diagnostic] = []
+    if text[: titles[0].start() if titles else None].strip():
+        message, help = "this text stands in no tab", "begin with a line `=== Title`"
+        wrong.append(_wrong(fence.body.span().first_line(), message, help))
+    if len(titles) < 2:
+        message = f"there are {len(titles)} tabs here"
+        wrong.append(_wrong(fence.head, message, "two or more make sense"))
+    tabs: list[Tab] = []
+    for title, following in zip(titles, [*titles[1:], None], strict=True):
+        end = following.start() if following else len(text)
+        parsed = texts.blocks(fence.body.slice(title.end(), end))
+        tabs.append(Tab(title["title"], parsed.value))
+        wrong += parsed.diagnostics
+    return Parsed(Tabs(fence.span, tuple(tabs)), tuple(wrong))
+
+
+def _wrong(place: Span, message: str, help: str) -> Diagnostic:
+    return diagnose("tabs", place, message, help=help)
+
+
+def draw(page: PageContext, block: Tabs) -> Markup:
+    """The tabs in a page."""
+    part = Markup('<section><p class="tab-title">{}</p>\n{}</section>\n')
+    parts = (part.format(tab.title, page.blocks(tab.blocks)) for tab in block.tabs)
+    return Markup('<div class="tabs" data-tabs>\n{}</div>').format(Markup().join(parts))
+
+
+def markdown(writer: Plain, block: Tabs) -> str:
+    """The versions below each other."""
+    return "\n\n".join(f"**{tab.title}**\n\n{writer.blocks(tab.blocks)}" for tab in block.tabs)
+
+
+def index(reader: SectionReader, block: Tabs) -> None:
+    """All versions can be found."""
+    for tab in block.tabs:
+        reader.add("text", tab.title)
+        reader.blocks(tab.blocks)
+
+
+FEATURE = Feature(
+    name="tabs",
+    fences=(
+        FenceKind(name="tabs", block=Tabs, parse=parse, draw=draw, markdown=markdown, index=index),
+    ),
+    rules=(Rule("tabs", "error", "A block of tabs cannot be read."),),
+    style=Path(__file__).with_name("tabs.css").read_text(encoding="utf-8"),
+    mark="data-tabs",
+    script=Path(__file__).with_name("tabs.js").read_text(encoding="utf-8"),
+)
