@@ -92,6 +92,9 @@ class Feature(Struct, frozen=True, kw_only=True):
     """
 
 
+CORE_FENCES = ("bench", "io", "lab", "mjcf", "python", "text")
+"""The kinds of fences that the core reads."""
+
 _INSTALLED_BY = {
     "mermaid": "coursebuild-mermaid",
     "quiz": "coursebuild with its quizzes",
@@ -105,12 +108,14 @@ _digest = ""
 
 def features() -> tuple[Feature, ...]:
     """All features that a course can use, in the order of their names."""
-    return _sorted((*_installed(), *_of_course))
+    return _sorted((*installed_features(), *_of_course))
 
 
 def use_course_features(found: Iterable[Feature], digest: str) -> None:
     """Set the features that the course at hand brings itself, and a hash of their code."""
     global _of_course, _digest
+    for rule in (rule for feature in _of_course for rule in feature.rules):
+        RULES.pop(rule.name, None)
     _of_course, _digest = _sorted(found), digest
     _by_fence.cache_clear()
     _by_block.cache_clear()
@@ -119,6 +124,16 @@ def use_course_features(found: Iterable[Feature], digest: str) -> None:
 def features_digest() -> str:
     """A hash over the code of all features but those of coursebuild itself."""
     return hashlib.sha256("\0".join((_digest, *_package_lines())).encode()).hexdigest()
+
+
+def clash(added: Feature, known: Iterable[Feature]) -> str:
+    """Why a feature cannot be used beside others; empty where it can."""
+    known = tuple(known)
+    if any(feature.name == added.name for feature in known):
+        return f"two features are called `{added.name}`"
+    read = {*CORE_FENCES, *(kind.name for feature in known for kind in feature.fences)}
+    twice = [kind.name for kind in added.fences if kind.name in read]
+    return f"the fence `{twice[0]}` is read already" if twice else ""
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:
@@ -154,11 +169,22 @@ def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, .
 
 
 @functools.cache
-def _installed() -> tuple[Feature, ...]:
+def installed_features() -> tuple[Feature, ...]:
+    """The features of coursebuild itself, and of packages that are installed beside it.
+
+    Raises:
+        RuntimeError: two of them cannot be used together, or one is broken.
+    """
     package = importlib.import_module("coursebuild.features")
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     found = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
-    found += [point.load() for point in _entry_points()]
+    for point in _entry_points():
+        feature = point.load()
+        if not isinstance(feature, Feature):
+            raise RuntimeError(f"the entry point {point.value} is no feature")
+        if reason := clash(feature, found):
+            raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")
+        found.append(feature)
     return _sorted(found)
 
 

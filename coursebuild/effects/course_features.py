@@ -9,7 +9,7 @@ import hashlib
 from pathlib import Path
 from types import ModuleType
 
-from coursebuild.core.features import Feature, use_course_features
+from coursebuild.core.features import Feature, clash, installed_features, use_course_features
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.read import read_bytes
@@ -25,14 +25,16 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         try:
             code = read_bytes(root, named.path)
         except EffectError as error:
-            wrong.append(diagnose("feature-broken", named.span, str(error)))
+            wrong.append(diagnose("feature-broken", named.span, error.message))
             continue
         digest.update(named.path.encode() + b"\0" + code + b"\0")
         feature = _run(named, code)
-        if isinstance(feature, Feature):
-            found.append(feature)
-        else:
+        if isinstance(feature, Diagnostic):
             wrong.append(feature)
+        elif reason := clash(feature, (*installed_features(), *found)):
+            wrong.append(diagnose("feature-broken", named.span, f"{named.path}: {reason}"))
+        else:
+            found.append(feature)
     use_course_features(found, digest.hexdigest() if course.features else "")
     return tuple(wrong)
 
@@ -42,7 +44,7 @@ def _run(named: CourseFeature, code: bytes) -> Feature | Diagnostic:
     module.__file__ = named.path
     try:
         exec(compile(code, named.path, "exec"), module.__dict__)
-    except Exception as error:  # whatever an author's code raises
+    except (Exception, SystemExit) as error:  # whatever an author's code raises
         message = f"{named.path} fails: {type(error).__name__}: {error}"
         return diagnose("feature-broken", named.span, message)
     feature = getattr(module, "FEATURE", None)

@@ -76,6 +76,12 @@ class Names(Struct, frozen=True):
     feature_scripts: tuple[tuple[str, str], ...] = ()
     """Of features that have one, by the feature's name."""
 
+    def paths(self) -> frozenset[str]:
+        """The site paths alone."""
+        named = (getattr(self, field) for field in self.__struct_fields__)
+        single = (path for path in named if isinstance(path, str))
+        return frozenset((*single, *(path for _, path in self.feature_scripts)))
+
 
 def policy(json_ld: str, *, form: bool = False) -> str:
     """The Content-Security-Policy of a page: nothing from elsewhere, no code or style in the page.

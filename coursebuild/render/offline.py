@@ -113,8 +113,7 @@ def file_list(names: Names, key: str) -> FileList:
 def shell_of(names: Names) -> frozenset[str]:
     """What every page needs, but for the fonts, and what is there when nothing else is."""
     pages = {urls.HOME, urls.OFFLINE, urls.MANIFEST}
-    shared = {getattr(names, field) for field in Names.__struct_fields__}
-    return frozenset(pages | {path for path in shared if path.endswith(_NEEDED)})
+    return frozenset(pages | {path for path in names.paths() if path.endswith(_NEEDED)})
 
 
 def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:

@@ -11,16 +11,12 @@ import re
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
-from coursebuild.core.features import fence_names, missing_package
+from coursebuild.core.features import CORE_FENCES, fence_names, missing_package
 from coursebuild.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.info import first_word, kind_of, parse_info
 from coursebuild.syntax.spans import Placed, Row, locate, trimmed
-
-_OWN = ("bench", "io", "lab", "mjcf", "python", "text")
-"""The kinds of fences that the core reads."""
-
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
@@ -60,7 +56,7 @@ class Fence(Struct, frozen=True):
 
 def is_ours(kind: str) -> bool:
     """Whether a block of a kind is more than code."""
-    return kind in _OWN or kind in fence_names()
+    return kind in CORE_FENCES or kind in fence_names()
 
 
 def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
@@ -126,7 +122,11 @@ def near_kind(fence: Fence) -> Diagnostic | None:
         return diagnose("script-kind", kind.span(), message, help=help)
     if name in _LANGUAGES:
         return None
-    near = "lab simlab" if name == "simlab" else nearest(name, (*_OWN, *fence_names()), cutoff=0.75)
+    near = (
+        "lab simlab"
+        if name == "simlab"
+        else nearest(name, (*CORE_FENCES, *fence_names()), cutoff=0.75)
+    )
     if near is None:
         return None
     message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"

@@ -53,8 +53,8 @@ def parse(fence: Fence, texts: TextParser) -> Parsed[Tabs | None]:
         message, help = "this text stands in no tab", "begin with a line `=== Title`"
         wrong.append(_wrong(fence.body.span().first_line(), message, help))
     if len(titles) < 2:
-        message = f"there are {len(titles)} tabs here"
-        wrong.append(_wrong(fence.head, message, "two or more make sense"))
+        message = "there is only one tab" if titles else "there are no tabs"
+        wrong.append(_wrong(fence.head, message, "begin each of two or more with `=== Title`"))
     tabs: list[Tab] = []
     for title, following in zip(titles, [*titles[1:], None], strict=True):
         end = following.start() if following else len(text)

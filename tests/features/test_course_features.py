@@ -1,0 +1,150 @@
+"""A course's own features: a Python file that the map names brings a kind of fence."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from support.scratch_course import ROOT, Folder
+
+pytestmark = pytest.mark.site
+
+SHOUT = '''"""Text in capitals."""
+
+from markupsafe import Markup, escape
+
+from coursebuild.core.features import Feature, FenceKind
+from coursebuild.diagnostics import Parsed, diagnose
+from coursebuild.model import FeatureBlock
+from coursebuild.rules import Rule
+
+
+class Shout(FeatureBlock, frozen=True):
+    text: str
+
+
+def parse(fence, texts):
+    wrong = ()
+    if "?" in fence.body.text:
+        wrong = (diagnose("shout", fence.head, "nobody shouts a question"),)
+    return Parsed(Shout(fence.span, fence.body.text.strip()), wrong)
+
+
+FEATURE = Feature(
+    name="shout",
+    fences=(
+        FenceKind(
+            name="shout",
+            block=Shout,
+            parse=parse,
+            draw=lambda page, block: Markup(f"<p>{escape(block.text.upper())}</p>"),
+            markdown=lambda writer, block: block.text.upper(),
+            index=lambda reader, block: reader.add("text", block.text),
+        ),
+    ),
+    rules=(Rule("shout", "error", "What is shouted is no shout."),),
+    style=".shout { color: red }\\n",
+)
+'''
+LESSON = "## Hello\n\n```shout\nlisten <now>\n```\n"
+PAGE = "public/lessons/1.1-one.html"
+MAP = "content/course.toml"
+
+
+@pytest.fixture
+def course(tmp_path: Path, stores: Path) -> Folder:
+    """A course that uses a feature of its own."""
+    folder = Folder(tmp_path / "a course")
+    folder.fill([LESSON], stores)
+    folder.write("features/shout.py", SHOUT)
+    folder.replace(MAP, "[course]\n", '[course]\nfeatures = ["features/shout.py"]\n')
+    return folder
+
+
+def test_a_fence_of_a_feature_is_on_the_page_and_in_the_copy(course: Folder) -> None:
+    done = course.main("build")
+    assert done.status == 0, done.out
+    assert "<p>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
+    assert "LISTEN <NOW>" in course.text("public/lessons/1.1-one.md")
+    styles = [text for path, text in course.tree("public").items() if path.endswith(".css")]
+    assert any(b".shout { color: red }" in text for text in styles)
+
+
+def test_a_change_of_a_feature_changes_the_page(course: Folder) -> None:
+    course.main("build")
+    course.replace("features/shout.py", "<p>{escape", "<p class='loud'>{escape")
+    assert course.main("build").status == 0
+    assert "<p class='loud'>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
+
+
+def test_without_the_map_naming_it_a_feature_is_not_there(course: Folder) -> None:
+    course.main("build")
+    course.replace(MAP, 'features = ["features/shout.py"]\n', "")
+    assert course.main("build").status == 0
+    assert "LISTEN" not in course.text(PAGE)
+
+
+def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder) -> None:
+    course.replace("content/lessons/1.1-one.md", "listen <now>", "who?")
+    done = course.main("check")
+    assert done.status == 1
+    assert done.out.startswith(
+        "error[shout]: nobody shouts a question\n  --> content/lessons/1.1-one.md:3:1\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("1 / 0\n", "features/shout.py fails: ZeroDivisionError: division by zero"),
+        ("def (\n", "features/shout.py fails: SyntaxError: "),
+        ("FEATURE = 'shout'\n", "features/shout.py has no FEATURE"),
+        ("raise SystemExit\n", "features/shout.py fails: SystemExit: "),
+        (
+            SHOUT.replace('"shout",\n    f', '"quiz",\n    f'),
+            "features/shout.py: two features are called `quiz`",
+        ),
+        (
+            SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'),
+            "features/shout.py: the fence `lab` is read already",
+        ),
+    ],
+)
+def test_a_feature_that_cannot_be_loaded_is_told_at_its_place_in_the_map(
+    course: Folder, code: str, message: str
+) -> None:
+    course.write("features/shout.py", code)
+    done = course.main("check")
+    assert done.status == 1
+    assert f"error[feature-broken]: {message}" in done.out
+    assert f"  --> {MAP}:2:13\n" in done.out
+
+
+def test_a_feature_whose_file_is_not_there_is_told(course: Folder) -> None:
+    (course.root / "features/shout.py").unlink()
+    done = course.main("check")
+    assert done.status == 1
+    assert "error[feature-broken]: features/shout.py cannot be read: " in done.out
+
+
+@pytest.mark.parametrize("path", ["shout.py", "../shout.py", "features/shout", "features/../a.py"])
+def test_a_feature_stands_in_its_folder(course: Folder, path: str) -> None:
+    course.replace(MAP, "features/shout.py", path)
+    done = course.main("check")
+    assert done.status == 1
+    assert "error[field-value]: " in done.out
+    assert "a Python file in `features/`, as in `features/tabs.py`" in done.out
+
+
+def test_the_example_of_the_docs_works(course: Folder) -> None:
+    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    course.write("features/shout.py", code[0])
+    course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\nDo **this**.\n```\n")
+    done = course.main("build")
+    assert done.status == 0, done.out
+    assert '<div class="task"><p>Do <strong>this</strong>.</p></div>' in course.text(PAGE)
+    course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
+    assert course.main("check").out.startswith("error[task-empty]: this task says nothing\n")
