@@ -15,7 +15,7 @@ Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, TypeAlias
 
 from msgspec import Struct
@@ -29,7 +29,7 @@ Entry: TypeAlias = tuple[str | int, ...]
 _NAMES = "{model, data, mj, sim, ctx, lib}"
 
 
-class Piece(Struct, frozen=True):
+class LabCode(Struct, frozen=True):
     """A piece of lab code."""
 
     entry: Entry
@@ -44,11 +44,15 @@ class Piece(Struct, frozen=True):
     @property
     def function(self) -> str:
         """It as it stands in the module, a function."""
-        if self.form == "target":
-            return _setter(f"({self.code}\n) = value;")
-        if self.form == "expression":
-            return _expression(self.code)
-        return _setter(self.code) if self.takes_value else _statements(self.code)
+        # A line end closes a comment with which a piece may end.
+        match self.form:
+            case "target":
+                return f"({_NAMES}, value) => {{ ({self.code}\n) = value;\n}}"
+            case "expression":
+                return f"({_NAMES}) => ({self.code}\n)"
+            case "statements":
+                value = ", value" if self.takes_value else ""
+                return f"({_NAMES}{value}) => {{ {self.code}\n}}"
 
 
 class LabModule(Struct, frozen=True):
@@ -64,29 +68,29 @@ class LabModule(Struct, frozen=True):
     """What is data, as JSON."""
 
 
-def pieces(lab: Lab) -> tuple[Piece, ...]:
+def pieces(lab: Lab) -> tuple[LabCode, ...]:
     """Every piece of code of a lab, in the order of its fields."""
     return tuple(_pieces(lab))
 
 
-def _pieces(lab: Lab) -> Iterator[Piece]:
+def _pieces(lab: Lab) -> Iterator[LabCode]:
     for name, code in (("setup", lab.setup), ("controller", lab.controller)):
         if code:
-            yield Piece((name,), "statements", code, lab.span)
+            yield LabCode((name,), "statements", code, lab.span)
     for i, control in enumerate(lab.controls):
         if control.set is not None:
-            yield Piece(("controls", i, "set"), "target", control.set, control.span, True)
+            yield LabCode(("controls", i, "set"), "target", control.set, control.span, True)
         if control.apply is not None:
-            yield Piece(("controls", i, "apply"), "statements", control.apply, control.span, True)
+            yield LabCode(("controls", i, "apply"), "statements", control.apply, control.span, True)
         if control.run is not None:
-            yield Piece(("controls", i, "run"), "statements", control.run, control.span)
+            yield LabCode(("controls", i, "run"), "statements", control.run, control.span)
     for i, readout in enumerate(lab.readouts):
-        yield Piece(("readouts", i, "expr"), "expression", readout.expr, readout.span)
+        yield LabCode(("readouts", i, "expr"), "expression", readout.expr, readout.span)
     for i, plot in enumerate(lab.plots):
         for j, trace in enumerate(plot.traces):
-            yield Piece(("plots", i, "traces", j, "expr"), "expression", trace.expr, trace.span)
+            yield LabCode(("plots", i, "traces", j, "expr"), "expression", trace.expr, trace.span)
     for i, claim in enumerate(lab.expect):
-        yield Piece(("expect", i, "expr"), "expression", claim.expr, claim.span)
+        yield LabCode(("expect", i, "expr"), "expression", claim.expr, claim.span)
 
 
 def compile_lab(lab: Lab, name: str) -> LabModule:
@@ -98,42 +102,32 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
 
 
 def _members(lab: Lab) -> Iterator[tuple[str, str]]:
-    if lab.setup:
-        yield "setup", _statements(lab.setup)
-    if lab.controller:
-        yield "controller", _statements(lab.controller)
-    yield "controls", _list(_control(control) for control in lab.controls)
-    yield "readouts", _list(_expression(readout.expr) for readout in lab.readouts)
-    yield "plots", _list(_list(_expression(t.expr) for t in plot.traces) for plot in lab.plots)
-    yield "expect", _list(_expression(claim.expr) for claim in lab.expect)
+    functions = {piece.entry: piece.function for piece in pieces(lab)}
+    for name in ("setup", "controller"):
+        if (name,) in functions:
+            yield name, functions[(name,)]
+    yield "controls", _list(_control(functions, i, one) for i, one in enumerate(lab.controls))
+    yield "readouts", _list(functions["readouts", i, "expr"] for i in range(len(lab.readouts)))
+    yield (
+        "plots",
+        _list(
+            _list(functions["plots", i, "traces", j, "expr"] for j in range(len(plot.traces)))
+            for i, plot in enumerate(lab.plots)
+        ),
+    )
+    yield "expect", _list(functions["expect", i, "expr"] for i in range(len(lab.expect)))
 
 
 def _list(items: Iterator[str]) -> str:
     return "[" + ", ".join(items) + "]"
 
 
-def _control(control: LabControl) -> str:
-    if control.run is not None:
-        return "{run: " + _statements(control.run) + "}"
-    if control.set is not None:
-        return "{set: " + _setter(f"({control.set}\n) = value;") + "}"
-    if control.apply is not None:
-        return "{set: " + _setter(control.apply) + "}"
+def _control(functions: Mapping[Entry, str], i: int, control: LabControl) -> str:
+    for field, member in (("run", "run"), ("set", "set"), ("apply", "set")):
+        if ("controls", i, field) in functions:
+            return f"{{{member}: {functions['controls', i, field]}}}"
     name = json.dumps(control.param or control.label)
     return f"{{set: ({{ctx}}, value) => {{ ctx[{name}] = value; }}}}"
-
-
-# A line end closes a comment with which a piece may end.
-def _statements(code: str) -> str:
-    return f"({_NAMES}) => {{ {code}\n}}"
-
-
-def _setter(code: str) -> str:
-    return f"({_NAMES}, value) => {{ {code}\n}}"
-
-
-def _expression(code: str) -> str:
-    return f"({_NAMES}) => ({code}\n)"
 
 
 # --- data

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from coursebuild.labs.reply import unpacked
+from coursebuild.labs.reply import unpack_arrays
 
 _RELATIVE = 1e-9
 _ABSOLUTE = 1e-12
@@ -26,17 +26,17 @@ def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
     if steps < stride:
         return None
     row = max(1, min(horizon, steps) // stride)
-    states = unpacked(run["states"])
+    states = unpack_arrays(run["states"])
     return {
         "steps": steps,
-        "last": int(unpacked(run["checksums"])[-1]),
+        "last": int(unpack_arrays(run["checksums"])[-1]),
         "near": row * stride,
         "state": states[(row - 1) * width : row * width].tolist(),
     }
 
 
 def difference(
-    main: dict[str, Any], told: dict[str, Any], *, exact: bool, rtol: float
+    main: dict[str, Any], run: dict[str, Any], *, exact: bool, rtol: float
 ) -> str | None:
     """How a script's run differs from the main run of the trial, in words; `None` if it does not.
 
@@ -44,17 +44,17 @@ def difference(
     apart by `rtol`, relative to its largest number, which counts as at least 1.
     """
     kept = main["recorded"]
-    if told["steps"] != kept["steps"]:
-        return f"it makes {told['steps']} steps, and the lab {kept['steps']}"
-    if exact and told["last"] != kept["last"]:
+    if run["steps"] != kept["steps"]:
+        return f"it makes {run['steps']} steps, and the lab {kept['steps']}"
+    if exact and run["last"] != kept["last"]:
         return "its state at the end is not that of the lab"
-    apart = _apart(told["state"], kept["state"])
+    apart = _apart(run["state"], kept["state"])
     if not exact and not apart <= rtol:
         return f"its state after {kept['near']} steps is apart from the lab's by {apart:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
-    found = _readouts(first["readouts"], told["start"], "start")
+    found = _readouts(first["readouts"], run["start"], "start")
     if found is None and exact:
-        found = _readouts(last["readouts"], told["end"], "end")
+        found = _readouts(last["readouts"], run["end"], "end")
     return found
 
 
@@ -67,7 +67,7 @@ def _apart(mine: Sequence[float], theirs: Sequence[float]) -> float:
 
 def _readouts(theirs: Any, mine: list[list[Any]], when: str) -> str | None:
     for (label, value), known in zip(mine, theirs or (), strict=False):
-        if known is None:  # not finite, which is told where it is found
+        if known is None:  # not finite, which the trial reports
             continue
         if isinstance(value, str) or isinstance(known, str):
             same = value == known

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.labs.shapes import Array
+from coursebuild.labs.shapes import Array, unit
 
 _AMBIENT, _FRONT, _ABOVE = 0.45, 0.4, 0.4
 """A model without lights: light from all sides, from the camera, and from above."""
@@ -147,7 +147,7 @@ def shaded(
     for lamp in light.point_lights:
         back, strength = _rays(lamp, points)
         facing = np.clip(_dot(normals, back), 0.0, None) * strength
-        half = _unit(back + toward)
+        half = unit(back + toward)
         fresnel = np.exp2((-5.55473 * (vh := np.clip(_dot(toward, half), 0, 1)) - 6.98316) * vh)
         peak = (exponent + 2) / 8 * np.clip(_dot(normals, half), 0.0, 1.0) ** exponent
         shine = (mirrored * (1 - fresnel[:, None]) + fresnel[:, None]) * peak[:, None]
@@ -159,7 +159,7 @@ def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
     """Directions from points to a lamp, and how much of its light comes there."""
     if lamp.position is None:
         return -lamp.direction[None, :], np.ones(len(points))
-    back = _unit(lamp.position - points)
+    back = unit(lamp.position - points)
     if lamp.cone is None:
         return back, np.ones(len(points))
     edge, bright = lamp.cone
@@ -170,8 +170,3 @@ def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
 def _dot(a: Array, b: Array) -> Array:
     found: Array = (a * b).sum(axis=-1)
     return found
-
-
-def _unit(vectors: Array) -> Array:
-    lengths = np.sqrt(_dot(vectors, vectors))[..., None]
-    return vectors / np.where(lengths > 0, lengths, 1.0)

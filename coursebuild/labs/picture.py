@@ -67,7 +67,7 @@ class Solid(Struct, frozen=True):
         return self.rgba[3] >= _OPAQUE
 
 
-class Camera(Struct, frozen=True):
+class FreeCamera(Struct, frozen=True):
     """MuJoCo's free camera."""
 
     azimuth: float
@@ -100,7 +100,7 @@ class Camera(Struct, frozen=True):
 
 def draw(
     solids: Sequence[Solid],
-    camera: Camera,
+    camera: FreeCamera,
     size: tuple[int, int],
     light: Light | None = None,
     background: Texture | None = None,

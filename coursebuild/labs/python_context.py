@@ -60,7 +60,7 @@ def _assigned(nodes: Iterable[Node]) -> Iterator[tuple[str, Node | None]]:
 
 
 def _guess(value: Node, given: Type | None, types: Mapping[str, Type]) -> Type:
-    """The type of a value, as far as it can be told without knowing variables."""
+    """The type of a value, as far as it is known without variables."""
     path = dotted_name(value)
     match value.type:
         case "true" | "false":

@@ -15,7 +15,7 @@ from coursebuild.labs.compile import Entry
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
 
 
-class Failure(Struct, frozen=True):
+class TrialFailure(Struct, frozen=True):
     """Something that went wrong in a trial."""
 
     entry: Entry
@@ -29,20 +29,20 @@ class Failure(Struct, frozen=True):
     """What was being tried."""
 
 
-class Trial(Struct, frozen=True):
+class TrialReply(Struct, frozen=True):
     """A reply. `main` is what the main run recorded, `None` where it did not come to its end."""
 
     version: str
     tried: tuple[str, ...]
-    failures: tuple[Failure, ...]
+    failures: tuple[TrialFailure, ...]
     main: dict[str, Any] | None
     steps_per_second: int | None
 
 
-def read_trial(reply: dict[str, Any]) -> Trial:
+def read_trial(reply: dict[str, Any]) -> TrialReply:
     """A reply of the trial's JavaScript."""
     failures = tuple(
-        Failure(
+        TrialFailure(
             tuple(failure["entry"]),
             failure["kind"],
             failure.get("message") or "something that has no text",
@@ -53,17 +53,17 @@ def read_trial(reply: dict[str, Any]) -> Trial:
     )
     tried = tuple(step["what"] for step in reply["tried"])
     speed = reply.get("stepsPerSecond")
-    return Trial(reply["version"], tried, failures, reply["main"], speed)
+    return TrialReply(reply["version"], tried, failures, reply["main"], speed)
 
 
-def unpacked(value: Any) -> Any:
+def unpack_arrays(value: Any) -> Any:
     """The value with arrays in place of base64."""
     if isinstance(value, list):
-        return [unpacked(item) for item in value]
+        return [unpack_arrays(item) for item in value]
     if not isinstance(value, dict):
         return value
     if set(value) == {"type", "data"} and value["type"] in _KINDS:
         import numpy as np  # most replies that are read hold no array
 
         return np.frombuffer(base64.b64decode(value["data"]), _KINDS[value["type"]])
-    return {key: unpacked(item) for key, item in value.items()}
+    return {key: unpack_arrays(item) for key, item in value.items()}

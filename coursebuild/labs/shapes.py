@@ -62,17 +62,15 @@ def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) ->
         case "capsule":
             return _capsule(size[0], size[1], _AROUND)
         case "sphere" | "ellipsoid":
-            unit = _capsule(1.0, 0.0, _AROUND).normals
+            ball = _capsule(1.0, 0.0, _AROUND)
             axes = np.array(size[:3] if kind == "ellipsoid" else (size[0],) * 3)
-            return Surface(
-                unit * axes, _unit(unit / axes), grid_faces(_AROUND // 2 + 2, _AROUND + 1)
-            )
+            return Surface(ball.normals * axes, unit(ball.normals / axes), ball.faces)
 
 
 def flat_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
     """A mesh shaded flat: every triangle has vertices of its own."""
     corners = vertices[faces]
-    normals = np.repeat(_unit(_across(corners)), 3, axis=0)
+    normals = np.repeat(unit(_across(corners)), 3, axis=0)
     return Surface(corners.reshape(-1, 3), normals, np.arange(3 * len(faces)).reshape(-1, 3))
 
 
@@ -80,12 +78,12 @@ def smooth_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
     """A mesh whose normals are the mean of those of the faces around, by their area."""
     normals = np.zeros_like(vertices)
     np.add.at(normals, faces, _across(vertices[faces])[:, None])
-    return Surface(vertices, _unit(normals), faces)
+    return Surface(vertices, unit(normals), faces)
 
 
 def sharpen(corners: Array, normals: Array) -> Array:
     """Normals (m, 3, 3) of triangles' corners (m, 3, 3): the face's where they are far off."""
-    face = _unit(_across(corners))[:, None]
+    face = unit(_across(corners))[:, None]
     sharp = (face * normals).sum(axis=2, keepdims=True) < _SMOOTH
     known = np.any(face != 0, axis=2, keepdims=True)
     found: Array = np.where(sharp & known, face, normals)
@@ -97,8 +95,8 @@ def ropes(points: Array, ends: NDArray[np.int64], radius: float) -> Surface:
     parts = []
     for a, b in points[ends]:
         along = b - a if np.any(a != b) else np.array((0.0, 0.0, 1.0))
-        z = _unit(along)
-        x = _unit(np.cross(z, np.eye(3)[np.abs(z).argmin()]))
+        z = unit(along)
+        x = unit(np.cross(z, np.eye(3)[np.abs(z).argmin()]))
         axes = np.stack((x, np.cross(z, x), z))
         capsule = _capsule(radius, float(np.linalg.norm(b - a)) / 2, _AROUND_ROPE)
         middle = (a + b) / 2
@@ -132,7 +130,8 @@ def _across(corners: Array) -> Array:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _unit(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
+    """Vectors of length 1; those of length 0 stay."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
 

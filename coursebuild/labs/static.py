@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coursebuild.labs.light import light_of
-from coursebuild.labs.picture import Camera, draw
+from coursebuild.labs.picture import FreeCamera, draw
 from coursebuild.labs.plots import plot_svg
-from coursebuild.labs.reply import unpacked
+from coursebuild.labs.reply import unpack_arrays
 from coursebuild.labs.scenery import scene_solids
 from coursebuild.labs.textures import SKY, texture_of
 from coursebuild.model import Lab
@@ -31,15 +31,15 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
     """The start of the main run of a lab's trial, as PNG."""
-    scene = unpacked(main["scene"])
-    frame = unpacked(main["pictures"][0]["frame"])
+    scene = unpack_arrays(main["scene"])
+    frame = unpack_arrays(main["pictures"][0]["frame"])
     camera = scene["camera"]
     distance, fovy = camera["distance"], camera["fovy"]
     if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
         distance *= _FROM_AFAR
         fovy = math.degrees(2 * math.atan(fovy / 2 / distance))
     target = tuple(camera["target"])
-    seen = Camera(camera["azimuth"], camera["elevation"], distance, target, fovy)
+    seen = FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
     light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
     skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))

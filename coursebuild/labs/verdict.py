@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.labs.compile import Entry, Piece
-from coursebuild.labs.reply import Failure, Trial
+from coursebuild.labs.compile import Entry, LabCode
+from coursebuild.labs.reply import TrialFailure, TrialReply
 from coursebuild.model import Lab
 from coursebuild.source import Span
 
@@ -97,7 +97,7 @@ def _named(lab: Lab, entry: Entry) -> str:
             return "the lab"
 
 
-def code_diagnostic(lab: Lab, piece: Piece, message: str) -> Diagnostic:
+def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
     """A piece of code that cannot be part of a lab."""
     message = message[:1].lower() + message[1:].rstrip(".")
     what = f"{_named(lab, piece.entry)} has code that cannot run: {message}"
@@ -111,7 +111,7 @@ _HELP = {
 }
 
 
-def trial_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
+def trial_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
     """Each failure of a trial, at its entry.
 
     What MuJoCo says of the main run it says again of every act; once is enough.
@@ -125,7 +125,7 @@ _OF_MUJOCO = ("warning", "diverged")
 _DEEP = "deep"
 
 
-def deep_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
+def deep_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
     """Bodies that lie deep in each other, and are not to; once where the main run has some."""
     if lab.verify_deep:
         return ()
@@ -134,7 +134,7 @@ def deep_diagnostics(lab: Lab, trial: Trial) -> tuple[Diagnostic, ...]:
     return tuple(_failure(lab, failure) for failure in always or failures)
 
 
-def shallow_diagnostics(lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
+def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """That no bodies lie deep in each other, though the lab says that they are to."""
     if lab.verify_deep and not any(failure.kind == _DEEP for failure in trial.failures):
         what = "the lab says `deep`, and no bodies lay deep in each other"
@@ -142,14 +142,14 @@ def shallow_diagnostics(lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
         yield diagnose("lab-shallow", span, what, help="take `deep` away")
 
 
-def _failure(lab: Lab, failure: Failure) -> Diagnostic:
+def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
     tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
-    text, help = _told(lab, failure)
+    text, help = _explain(lab, failure)
     span = entry_span(lab, failure.entry)
     return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
 
 
-def _told(lab: Lab, failure: Failure) -> tuple[str, str]:
+def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
     """What is wrong, and what helps."""
     name = _named(lab, failure.entry)
     when = f" at t = {failure.time:.6g} s" if failure.time else ""
@@ -196,7 +196,7 @@ def _claim(lab: Lab, entry: Entry) -> str:
             return "the claim"
 
 
-def reset_diagnostics(lab: Lab, trial: Trial) -> Iterator[Diagnostic]:
+def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """A reset after the main run that led to another state than that of the start."""
     found = trial.main["resetDiffers"] if trial.main is not None else None
     if found is None:

@@ -112,11 +112,11 @@ def _checked(
     if found is not None:
         return found.decode()
     try:
-        told = native.script(request)
+        run = native.script(request)
     except NativeError as error:
         return f"the script {error}"
-    reason = told["failure"] and f"the script fails: {told['failure']}"
-    reason = reason or export_check.difference(main, told, exact=exact, rtol=rtol) or ""
+    reason = run["failure"] and f"the script fails: {run['failure']}"
+    reason = reason or export_check.difference(main, run, exact=exact, rtol=rtol) or ""
     store.keep("exports", key, reason.encode())
     return reason
 

@@ -33,8 +33,8 @@ from coursebuild.effects.mjcf import model_files
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
-from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
-from coursebuild.labs.reply import Trial, read_trial
+from coursebuild.labs.compile import LabCode, LabModule, compile_lab, pieces
+from coursebuild.labs.reply import TrialReply, read_trial
 from coursebuild.labs.verdict import (
     Parity,
     code_diagnostic,
@@ -309,7 +309,7 @@ class _Attempt(Struct, frozen=True):
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
-    def _export(self, trial: Trial, parity: Parity | None) -> Offer:
+    def _export(self, trial: TrialReply, parity: Parity | None) -> Offer:
         """The script that does what the lab does."""
         if trial.main is None:
             return Offer(None)
@@ -318,12 +318,12 @@ class _Attempt(Struct, frozen=True):
             self.memory.store, self.root, self.engines.native, self.course, lab, trial.main, parity
         )
 
-    def _version(self, trial: Trial) -> Iterator[Diagnostic]:
+    def _version(self, trial: TrialReply) -> Iterator[Diagnostic]:
         if trial.version != engine_version():
             message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
             yield diagnose("lab-engine", self.lab.span.first_line(), message)
 
-    def _static(self, key: str, trial: Trial) -> StaticForm | None:
+    def _static(self, key: str, trial: TrialReply) -> StaticForm | None:
         from coursebuild.labs.static import draw_picture, static_form
 
         lab, main = self.lab, trial.main
@@ -347,7 +347,7 @@ def _is_kept(reply: dict[str, Any]) -> bool:
     return all(failure["kind"] not in _PASSING for failure in reply["failures"])
 
 
-def _to_parse(piece: Piece) -> tuple[str, str, str, bool]:
+def _to_parse(piece: LabCode) -> tuple[str, str, str, bool]:
     return piece.code, piece.form, piece.function, piece.takes_value
 
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.labs.compile import LabModule, Piece, compile_lab, pieces
+from coursebuild.labs.compile import LabCode, LabModule, compile_lab, pieces
 from support.lab_values import make_lab
 
 pytestmark = pytest.mark.engine
@@ -28,7 +28,7 @@ def engine() -> Iterator[LabEngine]:
 
 
 def mistake(engine: LabEngine, code: str, form: Any, takes_value: bool = False) -> str | None:
-    piece = Piece(("x",), form, code, SPAN, takes_value or form == "target")
+    piece = LabCode(("x",), form, code, SPAN, takes_value or form == "target")
     return engine.mistakes([(piece.code, piece.form, piece.function, piece.takes_value)])[0]
 
 

@@ -13,13 +13,13 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.labs.light import Light, Material, PointLight, material_of
-from coursebuild.labs.picture import Camera, Solid, draw
+from coursebuild.labs.picture import FreeCamera, Solid, draw
 from coursebuild.labs.shapes import Kind, flat_surface, surface
 from coursebuild.labs.static import png
 from coursebuild.labs.textures import TextureMapping, texture_of
 from support.png_files import read_png
 
-FRONT = Camera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
+FRONT = FreeCamera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
 """Looks along +y: x is to the right, z is up."""
 SIZE = (80, 60)
 RED, GREEN, BLUE = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)
@@ -79,10 +79,12 @@ def test_right_is_right_and_up_is_up(at: tuple[float, float, float], x: int, y: 
 def test_cameras_of_mujoco() -> None:
     """MuJoCo's free camera: azimuth 0 looks along +x, elevation −90 down, with +x up then."""
     front = solid(at=(0, -1, 0), size=(0.1, 0.1, 0.1))
-    pixels = draw((front,), Camera(0, 0, 4, (0, 0, 0)), SIZE)
+    pixels = draw((front,), FreeCamera(0, 0, 4, (0, 0, 0)), SIZE)
     columns = np.nonzero(covered(pixels))[1]
     assert columns.min() > 40, "looking along +x, −y is to the right"
-    above = draw((solid(at=(1, 0, 0), size=(0.1, 0.1, 0.1)),), Camera(0, -90, 4, (0, 0, 0)), SIZE)
+    above = draw(
+        (solid(at=(1, 0, 0), size=(0.1, 0.1, 0.1)),), FreeCamera(0, -90, 4, (0, 0, 0)), SIZE
+    )
     assert np.nonzero(covered(above))[0].max() < 30, "from above +x is up"
 
 
@@ -108,7 +110,7 @@ def test_what_goes_through_each_other_is_cut_where_they_meet() -> None:
 
 
 def test_a_plane_that_goes_on_behind_the_camera() -> None:
-    camera = Camera(90, -10, 4, (0, 0, 0.5))
+    camera = FreeCamera(90, -10, 4, (0, 0, 0.5))
     pixels = draw((solid("plane", size=(0, 0, 1)),), camera, SIZE)
     assert covered(pixels)[-1].all(), "it reaches the lower edge"
     assert not covered(pixels)[0].any()
@@ -180,7 +182,7 @@ def checkered(half: float, repeat: tuple[float, float], uniform: bool) -> Textur
 )
 def test_a_pattern_has_its_width(repeat: tuple[float, float], uniform: bool, wide: float) -> None:
     """A uniform texture is there so often in two metres, another so often on the whole plane."""
-    camera = Camera(0, -90, 10, (0, 0, 0))
+    camera = FreeCamera(0, -90, 10, (0, 0, 0))
     floor = solid("plane", size=(3, 3, 1), rgba=(1, 1, 1, 1))
     texture = checkered(3, repeat, uniform)
     floor = replace(floor, texture=texture, plane=True, material=Material(specular=0.0))
@@ -197,7 +199,7 @@ def test_a_pattern_far_away_is_its_mean_colour() -> None:
     """And not a noise of squares that happen to be hit."""
     floor = solid("plane", size=(300, 300, 1), rgba=(1, 1, 1, 1))
     floor = replace(floor, texture=checkered(300, (600, 600), uniform=False), plane=True)
-    pixels = draw((floor,), Camera(90, -60, 300, (0, 0, 0)), SIZE)[..., 0]
+    pixels = draw((floor,), FreeCamera(90, -60, 300, (0, 0, 0)), SIZE)[..., 0]
     assert np.ptp(pixels[20:40].astype(int)) < 25
 
 
@@ -207,7 +209,7 @@ DULL = Material(specular=0.0)
 
 
 def brightness(
-    made: Solid, light: Light, camera: Camera = FRONT, at: tuple[int, int] = (30, 40)
+    made: Solid, light: Light, camera: FreeCamera = FRONT, at: tuple[int, int] = (30, 40)
 ) -> int:
     return int(draw((made,), camera, SIZE, light)[at][0])
 
@@ -220,7 +222,7 @@ class TestLight:
         return replace(made, plane=True, material=material, **fields)  # type: ignore[arg-type]
 
     def test_a_lamp_lights_by_its_angle(self) -> None:
-        down = Camera(0, -90, 4, (0, 0, 0))
+        down = FreeCamera(0, -90, 4, (0, 0, 0))
         for angle in (0.0, 0.6, 1.2):
             towards = np.array((math.sin(angle), 0.0, -math.cos(angle)))
             light = Light(np.zeros(3), (PointLight(np.ones(3), towards),), 1.0)
@@ -228,7 +230,7 @@ class TestLight:
             assert found == pytest.approx(127.5 * math.cos(angle), abs=2)
 
     def test_a_cone_ends(self) -> None:
-        down = Camera(0, -90, 4, (0, 0, 0))
+        down = FreeCamera(0, -90, 4, (0, 0, 0))
         narrow = PointLight(
             np.ones(3), np.array((0.0, 0.0, -1.0)), np.array((0.0, 0.0, 1.0)), (0.9, 0.9)
         )
@@ -241,7 +243,7 @@ class TestLight:
 
     def test_from_below_a_plane_is_lit_as_above_and_half_there(self) -> None:
         """As MuJoCo's renderer draws it."""
-        up = Camera(0, 90, 4, (0, 0, 0))
+        up = FreeCamera(0, 90, 4, (0, 0, 0))
         pixels = draw((self.floor(),), up, SIZE, LAMP)
         assert pixels[30, 40].tolist() == pytest.approx([128, 128, 128, 128], abs=2)
 
@@ -285,7 +287,7 @@ def plain(**fields: float) -> dict[str, float]:
 class TestMirror:
     """Looking along +y and down at a dark floor, a red ball over it."""
 
-    CAMERA = Camera(90, -30, 5, (0, 0, 0))
+    CAMERA = FreeCamera(90, -30, 5, (0, 0, 0))
     BALL = solid("sphere", at=(0, 0, 1), size=(0.4,), rgba=RED)
 
     def floor(self, reflectance: float, alpha: float = 1.0, **fields: object) -> Solid:
@@ -294,7 +296,7 @@ class TestMirror:
         material = Material(specular=0.0, reflectance=reflectance)
         return replace(made, material=material, **given)  # type: ignore[arg-type]
 
-    def reds(self, *solids: Solid, camera: Camera = CAMERA) -> NDArray[np.int64]:
+    def reds(self, *solids: Solid, camera: FreeCamera = CAMERA) -> NDArray[np.int64]:
         """Red in each row, in the middle column."""
         return draw(solids, camera, (80, 60))[:, 40, 0].astype(int)
 
@@ -339,7 +341,7 @@ def test_a_sky_is_behind_everything() -> None:
     texture = texture_of(given)
     seen = {}
     for name, azimuth, elevation in (("up", 0, 90), ("down", 0, -90), ("x", 0, 0), ("y", 90, 0)):
-        camera = Camera(azimuth, elevation, 4, (0, 0, 0))
+        camera = FreeCamera(azimuth, elevation, 4, (0, 0, 0))
         pixels = draw((solid(size=(0.1, 0.1, 0.1)),), camera, SIZE, background=texture)
         assert (pixels[..., 3] == 255).all()
         seen[name] = tuple(int(v) for v in pixels[30, 15, :3])
@@ -415,7 +417,7 @@ def test_any_camera(
     target: tuple[float, float, float],
     fovy: float,
 ) -> None:
-    camera = Camera(azimuth, elevation, distance, target, fovy)
+    camera = FreeCamera(azimuth, elevation, distance, target, fovy)
     solids = (
         solid("plane", size=(0, 0, 1)),
         solid("sphere", size=(0.5,), rgba=GREEN),

@@ -14,7 +14,7 @@ import pytest
 
 from coursebuild.labs.light import light_of
 from coursebuild.labs.picture import Solid
-from coursebuild.labs.reply import unpacked
+from coursebuild.labs.reply import unpack_arrays
 from coursebuild.labs.scenery import scene_solids
 from coursebuild.labs.static import _shown, draw_picture, static_form
 from support.lab_values import Bench, make_lab
@@ -68,7 +68,9 @@ def main_of(bench: Bench, **fields: Any) -> tuple[Any, dict[str, Any]]:
 
 
 def solids(main: dict[str, Any]) -> list[Solid]:
-    return list(scene_solids(unpacked(main["scene"]), unpacked(main["pictures"][0]["frame"])))
+    return list(
+        scene_solids(unpack_arrays(main["scene"]), unpack_arrays(main["pictures"][0]["frame"]))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -132,8 +134,8 @@ def test_the_picture_is_the_same_each_time(everything: tuple[Any, dict[str, Any]
 
 
 def test_broken_rows_of_a_frame_are_left_out(everything: tuple[Any, dict[str, Any]]) -> None:
-    scene = unpacked(everything[1]["scene"])
-    frame = unpacked(everything[1]["pictures"][0]["frame"]).copy()
+    scene = unpack_arrays(everything[1]["scene"])
+    frame = unpack_arrays(everything[1]["pictures"][0]["frame"]).copy()
     whole = len(list(scene_solids(scene, frame)))
     start = scene["layout"]["geoms"]
     for i, value in ((2, math.nan), (3, math.inf), (4, -math.inf)):
@@ -204,7 +206,7 @@ def test_materials_are_recorded_and_textures_made_small(bench: Bench) -> None:
 
 def test_the_light_is_that_of_the_model(bench: Bench) -> None:
     _, main = main_of(bench, xml=SHINY)
-    scene, frame = unpacked(main["scene"]), unpacked(main["pictures"][0]["frame"])
+    scene, frame = unpack_arrays(main["scene"]), unpack_arrays(main["pictures"][0]["frame"])
     forward = np.array((0.0, 1.0, 0.0))
     light = light_of(scene, frame, forward)
     spot, wide, head = light.point_lights
@@ -297,10 +299,10 @@ def test_arrays_come_back_as_they_were() -> None:
     ):
         array = np.array([0, 1, 250], dtype=dtype)
         packed = {"type": kind, "data": base64.b64encode(array.tobytes()).decode()}
-        found = unpacked({"a": [packed], "type": 3, "data": packed})
+        found = unpack_arrays({"a": [packed], "type": 3, "data": packed})
         assert np.array_equal(found["a"][0], array) and found["a"][0].dtype == array.dtype
         assert np.array_equal(found["data"], array)
-    assert unpacked({"type": 5, "data": 2}) == {"type": 5, "data": 2}
+    assert unpack_arrays({"type": 5, "data": 2}) == {"type": 5, "data": 2}
 
 
 def test_the_size_of_the_picture_follows_the_lab(tmp_path: Path) -> None:

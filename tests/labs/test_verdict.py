@@ -8,7 +8,7 @@ import pytest
 
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.labs.compile import pieces
-from coursebuild.labs.reply import Failure, Trial, read_trial
+from coursebuild.labs.reply import TrialFailure, TrialReply, read_trial
 from coursebuild.labs.verdict import (
     Parity,
     code_diagnostic,
@@ -184,25 +184,27 @@ FAILURES = [
 def test_failures_in_words(
     kind: str, entry: tuple[str | int, ...], message: str, time: float | None, wanted: str
 ) -> None:
-    failure = Failure(entry, kind, message, time, "start")
-    (told,) = trial_diagnostics(make_lab(LINES), Trial("3.14.0", (), (failure,), None, None))
+    failure = TrialFailure(entry, kind, message, time, "start")
+    (told,) = trial_diagnostics(make_lab(LINES), TrialReply("3.14.0", (), (failure,), None, None))
     assert f"{told.rule}: {told.message}" == wanted
 
 
 def test_what_was_tried_is_said_beside_the_place() -> None:
-    trial = Trial("", (), (Failure(("setup",), "throws", "x", None, 'button "Kick"'),), None, None)
+    trial = TrialReply(
+        "", (), (TrialFailure(("setup",), "throws", "x", None, 'button "Kick"'),), None, None
+    )
     (told,) = trial_diagnostics(make_lab(LINES), trial)
     assert told.label == 'while trying: button "Kick"'
 
 
 def test_what_is_so_from_the_start_is_told_once() -> None:
     failures = (
-        Failure((), "diverged", "qpos[0] is NaN", 1.0, "start"),
-        Failure(("controls", 0), "diverged", "qpos[0] is NaN", 1.5, "a"),
-        Failure(("controls", 1), "warning", "badctrl", 1.5, "b"),
-        Failure(("controls", 2, "run"), "throws", "x", 1.5, "c"),
+        TrialFailure((), "diverged", "qpos[0] is NaN", 1.0, "start"),
+        TrialFailure(("controls", 0), "diverged", "qpos[0] is NaN", 1.5, "a"),
+        TrialFailure(("controls", 1), "warning", "badctrl", 1.5, "b"),
+        TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, "c"),
     )
-    told = trial_diagnostics(make_lab(LINES), Trial("", (), failures, None, None))
+    told = trial_diagnostics(make_lab(LINES), TrialReply("", (), failures, None, None))
     assert [d.rule for d in told] == ["lab-diverged", "lab-warning", "lab-throws"]
 
 
@@ -269,7 +271,7 @@ def test_a_reply_with_holes_is_read() -> None:
     trial = read_trial(reply)
     assert trial.tried == ("start",)
     assert trial.steps_per_second is None
-    assert trial.failures == (Failure((), "throws", "something that has no text", None, ""),)
+    assert trial.failures == (TrialFailure((), "throws", "something that has no text", None, ""),)
 
 
 RESETS = [
@@ -283,7 +285,7 @@ RESETS = [
 def test_a_reset_that_leads_elsewhere(entry: tuple[str | int, ...], place: str, help: str) -> None:
     lab = make_lab(LINES)
     main = {"resetDiffers": {"what": "qvel[0]", "entry": list(entry)}}
-    (found,) = reset_diagnostics(lab, Trial("3", (), (), main, None))
+    (found,) = reset_diagnostics(lab, TrialReply("3", (), (), main, None))
     assert found.rule == "lab-reset"
     assert found.message == "a reset does not lead back to the start: `qvel[0]` differs"
     assert found.span.text.startswith(place)
@@ -292,4 +294,4 @@ def test_a_reset_that_leads_elsewhere(entry: tuple[str | int, ...], place: str, 
 
 @pytest.mark.parametrize("main", [None, {"resetDiffers": None}])
 def test_a_reset_that_leads_back_is_no_matter(main: dict[str, None] | None) -> None:
-    assert list(reset_diagnostics(make_lab(LINES), Trial("3", (), (), main, None))) == []
+    assert list(reset_diagnostics(make_lab(LINES), TrialReply("3", (), (), main, None))) == []
