@@ -60,6 +60,8 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """The block in a page."""
     markdown: Callable[[Plain, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
+    wide: bool = True
+    """Whether it takes the whole width of the text, so that no docked lab can stand beside it."""
     index: Callable[[SectionReader, B], None] = lambda reader, block: None
     """Gives the search what can be found of the block."""
 
@@ -92,10 +94,11 @@ class Feature(Struct, frozen=True, kw_only=True):
     """
 
 
-CORE_FENCES = ("bench", "io", "lab", "mjcf", "python", "text")
+CORE_FENCES = ("bench", "lab", "mjcf", "python", "text")
 """The kinds of fences that the core reads."""
 
 _INSTALLED_BY = {
+    "io": "coursebuild with its io cards",
     "mermaid": "coursebuild-mermaid",
     "quiz": "coursebuild with its quizzes",
     "tabs": "coursebuild-tabs",

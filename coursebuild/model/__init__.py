@@ -31,7 +31,6 @@ from coursebuild.model.blocks import Footnote as Footnote
 from coursebuild.model.blocks import Heading as Heading
 from coursebuild.model.blocks import HtmlBlock as HtmlBlock
 from coursebuild.model.blocks import HtmlFlow as HtmlFlow
-from coursebuild.model.blocks import Io as Io
 from coursebuild.model.blocks import ListBlock as ListBlock
 from coursebuild.model.blocks import ListItem as ListItem
 from coursebuild.model.blocks import MathBlock as MathBlock

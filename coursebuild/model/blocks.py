@@ -207,15 +207,6 @@ class Recording(Struct, frozen=True):
     """Whether the fence says in a right way how to compare; if not, nothing is compared."""
 
 
-class Io(Struct, frozen=True):
-    """The io card: what the script takes, does and gives."""
-
-    span: Span
-    input: tuple[Inline, ...]
-    process: tuple[Inline, ...]
-    output: tuple[Inline, ...]
-
-
 class Mjcf(Struct, frozen=True):
     """A model or fragment.
 
@@ -302,7 +293,6 @@ Block: TypeAlias = (
     | Table
     | Script
     | Recording
-    | Io
     | Mjcf
     | Bench
     | Lab

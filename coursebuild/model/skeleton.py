@@ -31,7 +31,6 @@ from coursebuild.model.blocks import (
     Heading,
     HtmlBlock,
     HtmlFlow,
-    Io,
     ListBlock,
     MathBlock,
     Mjcf,
@@ -67,7 +66,7 @@ def skeleton(document: Document) -> Document:
 def _bones(block: Block) -> Iterator[Block]:
     """What stays of a block, without the blocks in it, which come by themselves."""
     match block:
-        case Paragraph() | HtmlFlow() | Io() | Table():
+        case Paragraph() | HtmlFlow() | Table():
             yield from _text(block.span, _inlines(block))
         case Heading():
             yield replace(block, children=_inlines(block))

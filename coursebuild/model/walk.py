@@ -18,7 +18,6 @@ from coursebuild.model.blocks import (
     Heading,
     HtmlBlock,
     HtmlFlow,
-    Io,
     ListBlock,
     Paragraph,
     Recording,
@@ -69,7 +68,6 @@ _INLINES: dict[type, Callable[[Any], tuple[Inline, ...]]] = {
         i for row in (table.header, *table.rows) for cell in row for i in cell.children
     ),
     Recording: lambda recording: recording.caption,
-    Io: lambda io: (*io.input, *io.process, *io.output),
 }
 
 

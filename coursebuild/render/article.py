@@ -8,6 +8,7 @@ from __future__ import annotations
 from markupsafe import Markup
 from msgspec import Struct
 
+from coursebuild.core.features import kind_of_block
 from coursebuild.model import (
     Bench,
     Block,
@@ -56,8 +57,14 @@ class _Group(Struct, frozen=True):
     after: tuple[Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Bench, FeatureBlock, Lab, Table, HtmlBlock)
-"""Blocks that take the whole width, so that no lab can stand beside them."""
+_WIDE = (Script, Recording, Mjcf, Bench, Lab, Table, HtmlBlock)
+
+
+def _is_wide(block: Block) -> bool:
+    """Whether a block takes the whole width, so that no lab can stand beside it."""
+    if isinstance(block, FeatureBlock):
+        return kind_of_block(block).wide
+    return isinstance(block, _WIDE)
 
 
 def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
@@ -72,12 +79,16 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
     ) is not None:
         lab = rest[at]
         assert isinstance(lab, Lab)
-        start = next((i + 1 for i in range(at - 1, -1, -1) if isinstance(rest[i], _WIDE)), 0)
+        start = next((i + 1 for i in range(at - 1, -1, -1) if _is_wide(rest[i])), 0)
         start = next(
             (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
         )
         end = next(
-            (i for i in range(at + 1, len(rest)) if isinstance(rest[i], (*_WIDE, Heading))),
+            (
+                i
+                for i in range(at + 1, len(rest))
+                if _is_wide(rest[i]) or isinstance(rest[i], Heading)
+            ),
             len(rest),
         )
         if start:

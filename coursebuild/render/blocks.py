@@ -17,7 +17,6 @@ from msgspec import Struct
 from coursebuild.model import (
     Callout,
     Comparison,
-    Io,
     Mjcf,
     Mode,
     NumberBinding,
@@ -99,17 +98,6 @@ def callout(page: PageContext, block: Callout) -> Markup:
         title=page.inlines(block.title),
         body=page.blocks(block.blocks),
     )
-
-
-def io(page: PageContext, block: Io) -> Markup:
-    """What a script takes, does and gives."""
-    words = page.tools.words
-    rows = (
-        (words("io.input"), page.inlines(block.input)),
-        (words("io.process"), page.inlines(block.process)),
-        (words("io.output"), page.inlines(block.output)),
-    )
-    return page.template("blocks/io.html", rows=rows)
 
 
 def mjcf(page: PageContext, block: Mjcf) -> Markup:

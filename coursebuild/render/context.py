@@ -23,7 +23,6 @@ from coursebuild.model import (
     Document,
     FeatureBlock,
     Inline,
-    Io,
     Lab,
     ListBlock,
     Mjcf,
@@ -137,8 +136,6 @@ class PageContext(Struct, frozen=True):
             case Recording():
                 joined = any(block in recordings for recordings in self.joined.values())
                 return Markup() if joined else blocks.recording(self, block)
-            case Io():
-                return blocks.io(self, block)
             case Mjcf():
                 return blocks.mjcf(self, block)
             case Bench():

@@ -15,7 +15,6 @@ from coursebuild.model import (
     Bench,
     Callout,
     FeatureBlock,
-    Io,
     Lab,
     Mjcf,
     NumberBinding,
@@ -25,9 +24,7 @@ from coursebuild.model import (
     Target,
 )
 
-OwnBlock: TypeAlias = (
-    Bench | Callout | Io | Lab | Mjcf | PlainCode | FeatureBlock | Recording | Script
-)
+OwnBlock: TypeAlias = Bench | Callout | Lab | Mjcf | PlainCode | FeatureBlock | Recording | Script
 """The blocks that are more than Markdown."""
 
 

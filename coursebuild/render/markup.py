@@ -34,7 +34,6 @@ from coursebuild.model import (
     HtmlFlow,
     Image,
     Inline,
-    Io,
     Lab,
     Link,
     ListBlock,
@@ -184,7 +183,7 @@ class _Writer:
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
-            case Bench() | Callout() | Io() | Lab() | Mjcf() | PlainCode():
+            case Bench() | Callout() | Lab() | Mjcf() | PlainCode():
                 return self.context.block(block)
             case Recording() | Script() | FeatureBlock():
                 return self.context.block(block)

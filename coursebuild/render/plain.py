@@ -17,7 +17,6 @@ from coursebuild.model import (
     Document,
     ExampleTarget,
     FeatureBlock,
-    Io,
     Lab,
     LessonTarget,
     LevelTarget,
@@ -118,11 +117,6 @@ class PlainContext:
                 if isinstance(block.body, Table):
                     return caption + render_table(block.body, self, PLAIN)
                 return caption + self.code("text", block.body.text)
-            case Io():
-                parts = (block.input, block.process, block.output)
-                return Markup(
-                    "".join(f"<p>{render_inlines(part, self, PLAIN)}</p>\n" for part in parts)
-                )
             case Bench():
                 return Markup(f"<p>{escape(block.model)}</p>\n")
             case Lab():

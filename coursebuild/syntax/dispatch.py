@@ -10,7 +10,6 @@ from coursebuild.diagnostics import Note, diagnose
 from coursebuild.model import Block, CodeBlock, FeatureBlock, Script
 from coursebuild.syntax.fence import Fence, missing_feature, near_kind
 from coursebuild.syntax.info import parse_info, read_keys
-from coursebuild.syntax.io import parse_io
 from coursebuild.syntax.mjcf import parse_mjcf
 from coursebuild.syntax.recording import stray_keys
 from coursebuild.syntax.script import parse_python
@@ -34,10 +33,6 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
             for wrong in stray_keys(fence):
                 session.report(wrong)
             return fence.code()
-        case "io":
-            io = parse_io(fence, texts)
-            session.diagnostics += io.diagnostics
-            return io.value
         case "mjcf":
             mjcf = parse_mjcf(fence)
             session.diagnostics += mjcf.diagnostics

@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from coursebuild.effects.v8 import MathEngine
+from coursebuild.features.io.model import Io
 from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, OrderQuestion, Quiz
 from coursebuild.model import (
     CodeBlock,
@@ -23,7 +24,6 @@ from coursebuild.model import (
     Heading,
     Image,
     Inline,
-    Io,
     Lab,
     Math,
     MathBlock,

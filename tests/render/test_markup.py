@@ -170,7 +170,6 @@ def test_plain_html_of_own_blocks() -> None:
         "> [!note] *T*\n> a\n\n"
         "```python file=examples/x.py\nprint(1)\n```\n\n"
         "Output:\n\n```text\n1\n```\n\nOutput:\n\n| 1 |\n|---|\n\n"
-        "```io\nINPUT: a\nPROCESS: b\nOUTPUT: c\n```\n\n"
         "```mjcf\n<mujoco/>\n```\n\n`1`{out} [a](page:b#c) [d](model:e) [f](examples/x.py)\n"
     )
     assert str(plain_html(parsed(text))) == (
@@ -179,7 +178,6 @@ def test_plain_html_of_own_blocks() -> None:
         '<p>Output:</p>\n<pre><code class="language-text">1\n</code></pre>\n'
         '<p>Output:</p>\n<table>\n<thead>\n<tr>\n<th scope="col">1</th>\n</tr>\n'
         "</thead>\n</table>\n"
-        "<p>a</p>\n<p>b</p>\n<p>c</p>\n"
         '<pre><code class="language-mjcf">&lt;mujoco/&gt;\n</code></pre>\n'
         '<p><code>1</code> <a href="page:b#c">a</a> <a href="model:e">d</a>'
         ' <a href="examples/x.py">f</a></p>\n'

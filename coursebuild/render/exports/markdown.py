@@ -34,7 +34,6 @@ from coursebuild.model import (
     HtmlFlow,
     Image,
     Inline,
-    Io,
     Lab,
     Link,
     ListBlock,
@@ -138,7 +137,7 @@ def write_footnotes(
 
 
 _APART = (
-    *(HtmlBlock, Callout, PlainCode, Script, Recording, Io, Mjcf, Bench, Lab, FeatureBlock),
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, Bench, Lab, FeatureBlock),
     *(Table, MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
@@ -215,7 +214,7 @@ class _Writer:
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case Table():
                 return self._once(block, lambda: self._table(block))
-            case Callout() | PlainCode() | Script() | Recording() | Io() | Mjcf():
+            case Callout() | PlainCode() | Script() | Recording() | Mjcf():
                 return self.context.own(block)
             case Bench() | Lab() | FeatureBlock():
                 return self.context.own(block)

@@ -21,7 +21,6 @@ from coursebuild.model import (
     Callout,
     FeatureBlock,
     Inline,
-    Io,
     Lab,
     Mjcf,
     ModelTarget,
@@ -103,8 +102,6 @@ class Plain(Struct, frozen=True):
             case Recording():
                 joined = any(block in some for some in self.page.joined.values())
                 return "" if joined else self.recording(block)
-            case Io():
-                return self._io(block)
             case Mjcf():
                 return self._mjcf(block)
             case Bench():
@@ -136,12 +133,6 @@ class Plain(Struct, frozen=True):
         head = f"{label} {title}" if title else label
         inner = self.blocks(block.blocks)
         return quoted(f"{head}\n\n{inner}" if inner else head)
-
-    def _io(self, block: Io) -> str:
-        rows = (("input", block.input), ("process", block.process), ("output", block.output))
-        return "\n".join(
-            f"- **{self.words(f'io.{name}')}:** {self.inlines(text)}" for name, text in rows
-        )
 
     def _mjcf(self, block: Mjcf) -> str:
         shown = self.page.shown

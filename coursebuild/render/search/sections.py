@@ -31,7 +31,6 @@ from coursebuild.model import (
     HtmlFlow,
     Image,
     Inline,
-    Io,
     Lab,
     Link,
     ListBlock,
@@ -144,7 +143,7 @@ class SectionReader:
                 pass
             case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
                 self._code(block)
-            case Bench() | Io() | Lab():
+            case Bench() | Lab():
                 self._card(block)
             case FeatureBlock():
                 kind_of_block(block).index(self, block)
@@ -166,14 +165,11 @@ class SectionReader:
             case _:
                 assert_never(block)
 
-    def _card(self, block: Bench | Io | Lab) -> None:
+    def _card(self, block: Bench | Lab) -> None:
         match block:
             case Bench():
                 self._also[block.model] = None
                 self.add("text", self._measured.get(block.span.start, ""))
-            case Io():
-                for part in (block.input, block.process, block.output):
-                    self.add("text", self.text(part))
             case Lab():
                 self.add("text", block.title)
                 self.blocks(block.note)

@@ -7,7 +7,8 @@ the lines after it continue it. All three must be there, once, in this order.
 from __future__ import annotations
 
 from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
-from coursebuild.model import Inline, Io
+from coursebuild.features.io.model import Io
+from coursebuild.model import Inline
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.fence import Fence

@@ -1,0 +1,47 @@
+"""Io cards: three lines that say what a script takes, does and gives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from coursebuild.core.features import Feature, FenceKind
+from coursebuild.features.io.model import Io
+from coursebuild.features.io.parse import parse_io
+
+if TYPE_CHECKING:
+    from coursebuild.render.context import PageContext
+    from coursebuild.render.exports.plain import Plain
+    from coursebuild.render.search.sections import SectionReader
+
+
+def draw(page: PageContext, card: Io) -> Markup:
+    """The card as a list of terms."""
+    rows = tuple((page.tools.words(name), page.inlines(text)) for name, text in card.parts())
+    return page.template("io/io.html", rows=rows)
+
+
+def markdown(writer: Plain, card: Io) -> str:
+    """The card as a list."""
+    rows = ((writer.words(name), writer.inlines(text)) for name, text in card.parts())
+    return "\n".join(f"- **{label}:** {text}" for label, text in rows)
+
+
+def index(reader: SectionReader, card: Io) -> None:
+    """All lines can be found."""
+    for _, text in card.parts():
+        reader.add("text", reader.text(text))
+
+
+KIND = FenceKind(
+    name="io",
+    block=Io,
+    parse=parse_io,
+    draw=draw,
+    markdown=markdown,
+    index=index,
+    nested=True,
+    wide=False,
+)
+FEATURE = Feature(name="io", fences=(KIND,))
