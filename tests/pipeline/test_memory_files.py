@@ -132,24 +132,22 @@ def test_a_moved_course_runs_what_printed_its_place(desk: Desk, tmp_path: Path) 
     assert desk.recall() is None
 
 
-def test_a_module_of_another_version(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    from coursebuild.effects import installed
-
-    desk.run(Trace((), (), (), ("numpy",), ""), replace(JOB, requires=("nowhere.at_all",)))
-    needing = replace(JOB, requires=("nowhere.at_all",))
+def test_a_module_that_changed_or_is_there_now(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "site-packages"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    (folder / "wobble.py").write_text("SIZE = 1\n")
+    needing = replace(JOB, requires=("nowhere_at_all",))
+    trace = Trace((), (), (), ("wobble",), "")
+    desk.run(trace, needing)
     assert desk.recall(needing) is not None
-    real = installed.Installed._version
-    monkeypatch.setattr(
-        installed.Installed,
-        "_version",
-        lambda self, name: "numpy 0.1" if name == "numpy" else real(self, name),
-    )
+    (folder / "wobble.py").write_text("SIZE = 200\n")
     assert desk.recall(needing) is None
-    monkeypatch.setattr(
-        installed.Installed,
-        "_version",
-        lambda self, name: "found 1" if name == "nowhere" else real(self, name),
-    )
+    desk.run(trace, needing)
+    assert desk.recall(needing) is not None
+    (folder / "nowhere_at_all.py").write_text("")
     assert desk.recall(needing) is None
 
 
