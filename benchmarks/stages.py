@@ -23,6 +23,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.checks.formulas import course_formulas
+from coursebuild.core.values import encode
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.store import kept
 from coursebuild.effects.v8 import MathEngine
@@ -30,7 +31,6 @@ from coursebuild.model import Course
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.outlines import pack
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
 from coursebuild.render.assets import Assets
@@ -162,7 +162,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     documents = [document for _, document in drawn]
     steps: dict[str, Callable[[], object]] = {
         "parse": parses,
-        "its outline": lambda: [pack(skeleton(d)) for d in documents],
+        "its outline": lambda: [encode(skeleton(d)) for d in documents],
         "modules that scripts import": modules,
         "draw": draws,
         "settle, facts and links": lambda: [record(d, course.base_url) for d in drafts],

@@ -23,7 +23,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"diagnostics"}),
     frozenset({"model"}),
     frozenset({"results", "vocabulary", "numerics"}),
-    frozenset({"core.features"}),
+    frozenset({"core.features", "core.values"}),
     frozenset(
         {"syntax", "checks", "scripts", "labs", "render", "report", "effects", "core.engine"}
     ),

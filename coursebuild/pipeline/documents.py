@@ -17,12 +17,13 @@ from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
+from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.faces import course_face
-from coursebuild.pipeline.outlines import Outline, Task, pack, unpack, unpacked
+from coursebuild.pipeline.outlines import Outline, Task
 from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Drawn, Later, Read, Request
 from coursebuild.source import Source, key_of
 
@@ -123,7 +124,7 @@ class Documents:
     def _has(self, task: Task) -> bool:
         """Whether the outline of a text is in the store."""
         data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
-        outline = None if data is None else unpacked(data, task.source)
+        outline = decode(data, Outline, task.source)
         if outline is not None:
             self._outlines[task.source.path] = outline
         return outline is not None
@@ -131,7 +132,7 @@ class Documents:
     def _read(self, tasks: Sequence[Task]) -> None:
         answers, readers = self._work("reading lessons and pages", self._requests(tasks))
         for task, data, reader in zip(tasks, answers, readers, strict=True):
-            outline = unpacked(data, task.source)
+            outline = decode(data, Outline, task.source)
             assert outline is not None
             self._outlines[task.source.path] = outline
             if reader is not None:
@@ -178,11 +179,11 @@ class Documents:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
         key = key_of(tool_digest(), source.path, source.text)
         data = None if self._store.fresh else self._store.peek(kind, key)
-        found = None if data is None else unpack(data, source)
-        if isinstance(found, Parsed):
+        found = decode(data, Parsed, source)
+        if found is not None:
             return found
         parsed = parse(source)
-        self._store.keep(kind, key, pack(parsed), local=True)
+        self._store.keep(kind, key, encode(parsed), local=True)
         return parsed
 
     def task(self, path: str) -> Task:

@@ -19,6 +19,7 @@ from typing import Literal, TypeAlias, assert_never
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.archives import (
     begins_with,
@@ -38,7 +39,6 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.outlines import unpack
 from coursebuild.pipeline.pages import page_key
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
@@ -51,7 +51,6 @@ from coursebuild.render.library import Library
 from coursebuild.render.packages import qti, scorm
 from coursebuild.render.packages.items import Loss, MadeQuiz
 from coursebuild.render.page_list import PageEntry, page_list
-from coursebuild.render.sheet import sheet_bytes
 from coursebuild.report import Report
 from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
@@ -206,8 +205,8 @@ class _Items:
                 yield OutputFile(place, read_bytes(self._options.root, path))
 
     def _unpacked(self, data: bytes, source: Source) -> tuple[MadeQuiz, ...]:
-        found = unpack(data, source)
-        assert isinstance(found, tuple)
+        found = decode(data, tuple, source)
+        assert found is not None
         return found
 
     def _asked(self) -> Iterator[_Asked]:
@@ -216,7 +215,7 @@ class _Items:
         for page in page_list(library):
             document = page.document(library)
             if document is not None and any(map(_is_quiz, document_blocks(document))):
-                sheet = sheet_bytes(page.sheet(library))
+                sheet = encode(page.sheet(library))
                 key = page_key(library.course, self._documents, document.source.path, sheet)
                 yield _Asked(document.source, key, page)
 
@@ -225,7 +224,7 @@ class _Items:
         store, made, new = self._options.store, dict[str, bytes](), list[_Asked]()
         for one in asked:
             data = None if store.fresh else store.peek(ITEMS, one.key)
-            if data is None or not isinstance(unpack(data, one.source), tuple):
+            if data is None or decode(data, tuple, one.source) is None:
                 new.append(one)
             else:
                 made[one.key] = data
@@ -239,7 +238,7 @@ class _Items:
     def _request(self, asked: _Asked) -> Ask:
         course = self._library.course
         task = self._documents.task(asked.source.path)
-        sheet = sheet_bytes(asked.page.sheet(self._library))
+        sheet = encode(asked.page.sheet(self._library))
         return Ask(Draw(sheet, task, course.language, course.base_url, asked.key))
 
 

@@ -10,14 +10,10 @@ for other pages is that of before, and where nothing was found wrong nothing is 
 
 from __future__ import annotations
 
-import copyreg
-import hashlib
-import io
-import pickle
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from coursebuild import model, results, source
+from coursebuild.core.values import fingerprint
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import (
     Course,
@@ -32,65 +28,18 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.results import Results
 from coursebuild.source import Excerpt, Source, Span
 
-
-def _place(span: Span) -> tuple[type[tuple[()]], tuple[()]]:
-    return tuple, ()
-
-
-def _text(excerpt: Excerpt) -> tuple[type[str], tuple[str]]:
-    return str, (excerpt.text,)
-
-
-def _file(source: Source) -> tuple[type[str], tuple[str, str]]:
-    return str, (source.path, source.text)
-
-
-_PLACELESS: dict[type, Any] = {
-    **copyreg.dispatch_table,
-    Span: _place,
-    Excerpt: _text,
-    Source: _file,
+_SHOWN: dict[type, Callable[[Any], object]] = {
+    Span: lambda span: None,
+    Excerpt: lambda excerpt: excerpt.text,
+    Source: lambda source: (source.path, source.text),
 }
-
-
-_NAMED = sorted(
-    {
-        kind
-        for names in (vars(model), vars(results), vars(source), {"": tuple})
-        for kind in names.values()
-        if isinstance(kind, type)
-    },
-    key=lambda kind: (kind.__module__, kind.__qualname__),
-)
-_NUMBERS = pickle.Pickler(io.BytesIO(), 5)
-"""Knows these classes by number: else each value would be written with the name of its class, which
-takes longer than the value."""
-_NUMBERS.memo = {id(kind): (number, kind) for number, kind in enumerate(_NAMED)}
-
-
-def _face(value: object, documents: Mapping[int, str] | None = None) -> str:
-    """The same for values that are equal but for places; documents have the faces that are given.
-
-    A set counts in the order that it happens to have, so that equal ones may differ: that costs
-    time, and is never wrong.
-    """
-    out = io.BytesIO()
-    pickler = pickle.Pickler(out, 5)
-    pickler.fast = True  # what is written depends on what is equal, not on what is one object
-    pickler.memo = _NUMBERS.memo
-    known = documents or {}
-    pickler.dispatch_table = {
-        **_PLACELESS,
-        Document: lambda document: (str, (document.source.path, known[id(document)])),
-    }
-    pickler.dump(value)
-    return hashlib.sha256(out.getbuffer()).hexdigest()
+"""What can be seen of places from elsewhere."""
 
 
 def outline_face(skeleton: Document) -> str:
     """The face of a document, by its skeleton."""
     raw = tuple(_raw(skeleton))
-    return _face((skeleton.blocks, skeleton.footnotes, skeleton.lexicon, raw))
+    return fingerprint((skeleton.blocks, skeleton.footnotes, skeleton.lexicon, raw), _SHOWN)
 
 
 def _raw(skeleton: Document) -> Iterator[str]:
@@ -108,7 +57,8 @@ def course_face(course: Course, documents: Iterable[tuple[Document, str]]) -> st
     known = {id(document): face for document, face in documents}
     if not all(known.get(id(document)) for document in course.documents):
         return None
-    return _face((tool_digest(), course), known)
+    shown = {Document: lambda document: (document.source.path, known[id(document)])}
+    return fingerprint((tool_digest(), course), {**_SHOWN, **shown})
 
 
 def results_face(results: Results, reports: Reports) -> str:
@@ -127,4 +77,4 @@ def results_face(results: Results, reports: Reports) -> str:
         for lab in results.labs
     )
     rest = results.formulas, results.models, results.python, results.engine
-    return _face((tool_digest(), runs, verdicts, labs, rest, reports))
+    return fingerprint((tool_digest(), runs, verdicts, labs, rest, reports), _SHOWN)

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
@@ -32,12 +33,7 @@ from coursebuild.pipeline.faces import results_face
 from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.page_facts import Facts
 from coursebuild.pipeline.page_keys import PageKeys
-from coursebuild.pipeline.records import (
-    part,
-    searched_part,
-    unpack_record,
-    unpack_value,
-)
+from coursebuild.pipeline.records import KeptPage
 from coursebuild.pipeline.requests import BYPRODUCTS, PAGES, Draw, Later
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
@@ -47,7 +43,6 @@ from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.files import Entry
 from coursebuild.render.shared import PageFacts
-from coursebuild.render.sheet import fingerprint, sheet_bytes
 from coursebuild.results import KeptFile
 from coursebuild.source import key_of
 
@@ -115,13 +110,13 @@ class Pages:
     def found_by(self, path: str) -> tuple[bytes, bytes]:
         """The text and the terms that a page is found by."""
         page = self._at(path)
-        data = self._store.peek(PAGES, page.key)
-        text, terms = (b"", b"") if data is None else searched_part(data)
-        if not text:  # it was damaged, or the store cannot be written
-            searched = self._documents.drawn(self._request(page)).searched
-            assert searched is not None
-            text, terms = searched.text, searched.terms
-        return text, terms
+        kept = KeptPage.read(self._store.peek(PAGES, page.key))
+        if kept is not None and kept.text:
+            return kept.text, kept.terms
+        # It was damaged, or the store cannot be written.
+        searched = self._documents.drawn(self._request(page)).searched
+        assert searched is not None
+        return searched.text, searched.terms
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
@@ -163,7 +158,7 @@ class Pages:
         from coursebuild.render.exports.files import PageByproducts
 
         page = self._at(path)
-        found = unpack_value(self._store.peek(BYPRODUCTS, page.key), PageByproducts)
+        found = decode(self._store.peek(BYPRODUCTS, page.key), PageByproducts)
         return found or self._documents.drawn(self._request(page)).byproducts
 
     def _at(self, path: str) -> _Wanted:
@@ -189,7 +184,7 @@ class Pages:
         if key is None:
             sheet = page.sheet(self._library)
             assert sheet.document == path
-            data = sheet_bytes(sheet)
+            data = encode(sheet)
             key = page_key(self._library.course, self._documents, path, data)
             keys.add(page.path, task, key)
             self._sheets[page.path] = data
@@ -201,7 +196,7 @@ class Pages:
         task = self._documents.task(path) if path is not None else None
         sheet = self._sheets.pop(wanted.path, None)
         if sheet is None:
-            sheet = sheet_bytes(wanted.page.sheet(self._library))
+            sheet = encode(wanted.page.sheet(self._library))
         return Draw(sheet, task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
@@ -244,7 +239,7 @@ class Pages:
                     records[page.path] = record
 
         for page, data in zip(new, self._documents.draw(missing()), strict=True):
-            record = unpack_record(data)
+            record = decode(data, PageRecord)
             assert record is not None
             records[page.path] = record
         self.drawn = tuple(page.path for page in new)
@@ -264,16 +259,17 @@ class Pages:
 
     def _known(self, key: str) -> PageRecord | None:
         """The record of a page that was drawn before."""
-        kept = None if self._store.fresh else self._store.peek(PAGES, key)
-        return None if kept is None else unpack_record(part(kept)[0])
+        kept = None if self._store.fresh else KeptPage.read(self._store.peek(PAGES, key))
+        return None if kept is None else kept.record
 
     def _framed(self, page: _Wanted, frames: Frames) -> bytes:
-        data = self._store.peek(PAGES, page.key)
-        packed, body = (b"", b"") if data is None else part(data)
-        record = unpack_record(packed)
-        if record is None:  # it was damaged, or the store cannot be written
+        kept = KeptPage.read(self._store.peek(PAGES, page.key))
+        record = None if kept is None else kept.record
+        if kept is None or record is None:  # it was damaged, or the store cannot be written
             drawn = self._documents.drawn(self._request(page))
             record, body = drawn.record, drawn.body.encode()
+        else:
+            body = kept.body
         before, after = frames.around(record.draft, record.parts)
         return before.encode() + body + after.encode()
 

@@ -18,11 +18,13 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self, assert_never
 
+import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
+from coursebuild.core.values import encode
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.resources import template_texts
@@ -32,8 +34,8 @@ from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.skeleton import skeleton
 from coursebuild.pipeline.faces import outline_face
-from coursebuild.pipeline.outlines import Outline, Task, pack, packed
-from coursebuild.pipeline.records import join, pack_record, pack_value
+from coursebuild.pipeline.outlines import Outline, Task
+from coursebuild.pipeline.records import KeptPage
 from coursebuild.pipeline.requests import (
     BYPRODUCTS,
     ITEMS,
@@ -172,7 +174,7 @@ class Reader:
     def _read(self, task: Task) -> bytes:
         whole = self._whole(task)
         outline = self._outline(whole)
-        data = packed(outline)
+        data = encode(outline)
         if outline.lasting:  # that a formula took too long may not happen again
             self._store.keep(OUTLINES, task.key, data, local=True)
         size = len(task.source.text)
@@ -246,12 +248,11 @@ class Reader:
 
     def _draw(self, request: Draw) -> bytes:
         drawn = self.draw(request)
-        packed_record = pack_record(drawn.record)
-        data = join(packed_record, drawn.body, drawn.searched)
-        self._store.keep(BYPRODUCTS, request.key, pack_value(drawn.byproducts), local=True)
+        page = KeptPage.of(drawn.record, drawn.body, drawn.searched)
+        self._store.keep(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
         # At last, since a page that is there is not drawn again.
-        self._store.keep(PAGES, request.key, data, local=True)
-        return packed_record
+        self._store.keep(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
+        return page.packed_record
 
     def _ask(self, request: Draw) -> bytes:
         """The items of a page's quizzes, and what they cannot hold."""
@@ -262,7 +263,7 @@ class Reader:
         tools = replace(self._tools_for(request.language), formulas=whole.formulas)
         language, base_url = request.language, request.base_url
         made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
-        data = pack(made)
+        data = encode(made)
         self._store.keep(ITEMS, request.key, data, local=True)
         return data
 

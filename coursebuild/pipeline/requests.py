@@ -5,12 +5,12 @@ Entry points: `Read`, `Draw`; `Later`, a page that is put together when it is se
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec import Struct
 
+from coursebuild.core.values import decode
 from coursebuild.pipeline.outlines import Task
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.values import Searched
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from coursebuild.render.exports.files import PageByproducts
 
 OUTLINES, PAGES, BYPRODUCTS, ITEMS = "outlines", "pages", "byproducts", "items"
-"""Kinds of entries in the store. They stay on this machine: reading them may run code."""
+"""Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
 
 
 class Read(Struct, frozen=True):
@@ -45,8 +45,8 @@ class Draw(Struct, frozen=True):
     @property
     def sheet(self) -> Sheet:
         """The sheet, read anew."""
-        found = pickle.loads(self.packed)
-        assert isinstance(found, Sheet)
+        found = decode(self.packed, Sheet)
+        assert found is not None
         return found
 
 

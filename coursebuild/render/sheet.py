@@ -1,7 +1,6 @@
 """A page that is to be drawn, as a value: everything that it shows but the text of its document.
 
-Entry points: `Sheet`; `sheet_bytes(value)`, by which two of them are known to show the same, and
-`fingerprint(value)`, a hash of these.
+Entry point: `Sheet`.
 
 A page is drawn from its sheet, its document, and the tool's templates and words, and from nothing
 else: so it need be drawn again only when one of these is another. What a sheet is made of are plain
@@ -11,9 +10,6 @@ course (where a link leads, what a script printed) stands in it as the answer.
 
 from __future__ import annotations
 
-import hashlib
-import io
-import pickle
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
@@ -171,20 +167,3 @@ class Sheet(Struct, frozen=True):
     document: str | None = None
     """The path of its document, whose text and contents the template gets as well."""
     shown: Shown | None = None
-
-
-def sheet_bytes(value: object) -> bytes:
-    """The same for equal values of the same types; the order of a mapping counts.
-
-    `pickle` reads the value out of it.
-    """
-    out = io.BytesIO()
-    pickler = pickle.Pickler(out, 5)
-    pickler.fast = True  # what is written depends on what is equal, not on what is one object
-    pickler.dump(value)
-    return out.getvalue()
-
-
-def fingerprint(value: object) -> str:
-    """A hash of what `sheet_bytes` gives."""
-    return hashlib.sha256(sheet_bytes(value)).hexdigest()

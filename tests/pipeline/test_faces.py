@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.checks.course import check_course
+from coursebuild.core.values import fingerprint
 from coursebuild.model import Course, Document
 from coursebuild.model.skeleton import skeleton
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.faces import course_face, outline_face, results_face
 from coursebuild.render.lookup.lexicon import lexicon
 from coursebuild.render.page_list import page_list
-from coursebuild.render.sheet import fingerprint
 from coursebuild.results import Outcome, Results, ScriptRun
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.extract import extract

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.checks.course import check_course
+from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.quiz.checks import check_output_lines
 from coursebuild.features.quiz.model import OutputQuestion, Quiz
 from coursebuild.model import (
@@ -25,10 +26,9 @@ from coursebuild.model import (
     document_has,
 )
 from coursebuild.model.skeleton import skeleton
-from coursebuild.pipeline.outlines import Outline, packed, unpacked
+from coursebuild.pipeline.outlines import Outline
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.lexicon import lexicon
-from coursebuild.render.sheet import fingerprint
 from coursebuild.render.shown import shown
 from coursebuild.render.urls import Place
 from coursebuild.results import Outcome, Results, ScriptRun
@@ -58,7 +58,7 @@ def courses(*texts: str) -> tuple[Course, Course]:
 def again(document: Document) -> Document:
     """The skeleton as it comes from the store."""
     bare = replace(skeleton(document), lexicon=lexicon(document, {}))
-    found = unpacked(packed(Outline(bare, (), {}, True)), document.source)
+    found = decode(encode(Outline(bare, (), (), True)), Outline, document.source)
     assert found is not None
     return found.skeleton
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable
 from typing import Any
 
+from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
-from coursebuild.render.sheet import fingerprint, sheet_bytes
+from coursebuild.render.sheet import Sheet
 
 TEXT = """\
 See [itself](lesson:1.1) and *terms*{term=spin}, by $x^2$.
@@ -30,10 +30,10 @@ def test_a_sheet_comes_back_as_it_was(make: Callable[..., Any]) -> None:
     kinds = set()
     for page in page_list(library):
         sheet = page.sheet(library)
-        back = pickle.loads(sheet_bytes(sheet))
+        back = decode(encode(sheet), Sheet)
         assert back == sheet
         # What it is made of is not the same objects: equal sheets have equal bytes.
-        assert sheet_bytes(back) == sheet_bytes(sheet) == sheet_bytes(page.sheet(library))
+        assert encode(back) == encode(sheet) == encode(page.sheet(library))
         assert fingerprint(back) == fingerprint(sheet)
         kinds.add(sheet.kind)
     assert {"home", "level", "lesson"} <= kinds

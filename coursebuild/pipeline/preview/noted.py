@@ -5,15 +5,15 @@ Entry point: `Noted`.
 
 from __future__ import annotations
 
+from coursebuild.core.values import encode
 from coursebuild.effects.store import Store
 from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.pages import text_page_key
-from coursebuild.pipeline.records import part, unpack_record
+from coursebuild.pipeline.records import KeptPage
 from coursebuild.pipeline.requests import PAGES
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import PageEntry
 from coursebuild.render.shared import PageFacts
-from coursebuild.render.sheet import sheet_bytes
 
 
 class Noted:
@@ -29,7 +29,7 @@ class Noted:
         """
         if self._store.fresh:
             return None
-        key = text_page_key(library.course, task, sheet_bytes(page.sheet(library)))
-        data = self._store.peek(PAGES, key)
-        record = None if data is None else unpack_record(part(data)[0])
+        key = text_page_key(library.course, task, encode(page.sheet(library)))
+        kept = KeptPage.read(self._store.peek(PAGES, key))
+        record = None if kept is None else kept.record
         return None if record is None else record.facts

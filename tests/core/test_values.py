@@ -1,0 +1,120 @@
+"""Values as bytes: they come back as they were, and bytes of somebody else's run nothing."""
+
+from __future__ import annotations
+
+import enum
+import os
+import sys
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.core.values import decode, encode, fingerprint
+from coursebuild.diagnostics import Severity, diagnose
+from coursebuild.model import Heading, Text
+from coursebuild.model.equations import DisplayFormula
+from coursebuild.source import Excerpt, Source, Span
+
+SOURCE = Source("content/a.md", "# One\n\ntwo\n")
+SPAN = SOURCE.span(2, 5)
+
+ATOMS = st.one_of(
+    *(st.none(), st.booleans(), st.integers(), st.floats(allow_nan=False), st.binary(max_size=9)),
+    *(st.text(max_size=9), st.text("\ud800a", max_size=3), st.decimals(allow_nan=False)),
+    st.just(Markup("<b>")),
+)
+VALUES = st.recursive(
+    ATOMS,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4),
+        st.lists(inner, max_size=4).map(tuple),
+        st.dictionaries(st.text(max_size=4) | st.integers(), inner, max_size=4),
+        st.frozensets(ATOMS, max_size=4),
+    ),
+    max_leaves=12,
+)
+
+
+@given(VALUES)
+def test_what_is_kept_comes_back(value: object) -> None:
+    found = decode(encode(value), object)
+    assert found == value or value is None
+    assert type(found) is type(value)
+    assert fingerprint(value) == fingerprint(found)
+
+
+def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
+    value = (
+        Heading(SPAN, 1, (Text(SPAN, "One"),), "one", SPAN),
+        Excerpt(SOURCE, "One\ntwo", ((0, 2), (4, 7))),
+        diagnose("link-broken", SPAN, "nowhere"),
+        Severity.ERROR,
+        DisplayFormula(*range(len(DisplayFormula._fields))),
+        SOURCE,
+    )
+    data = encode(value)
+    assert decode(data, tuple, SOURCE) == value
+    assert SOURCE.text.encode() not in data
+    assert decode(data, list, SOURCE) is None
+    assert fingerprint(value) != fingerprint(value, {Span: lambda span: None})
+    moved = (SOURCE.span(0, 1), SOURCE.span(7, 8))
+    assert len({fingerprint(span, {Span: lambda span: None}) for span in moved}) == 1
+
+
+def test_equal_sets_have_one_fingerprint() -> None:
+    names = [f"name{number}" for number in range(50)]
+    assert fingerprint(frozenset(names)) == fingerprint(frozenset(reversed(names)))
+
+
+def test_what_is_no_value_is_refused() -> None:
+    for value in (object(), os.system, [lambda: None], {"a": sys}):
+        with pytest.raises(TypeError):
+            encode(value)
+
+
+@given(st.binary(max_size=60))
+def test_any_bytes_are_read(data: bytes) -> None:
+    decode(data, object)
+
+
+class Trap(enum.Enum):
+    """An enum is made by name only, and nothing else of its module."""
+
+    SPRUNG = "sprung"
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("os:system", ["exit 1"]),
+        ("builtins:eval", ["1"]),
+        ("builtins:tuple", [[]]),
+        ("subprocess:Popen", ["true"]),
+        ("coursebuild.source:Source.span", [1]),
+        ("coursebuild.core.values:decode", [b""]),
+        ("coursebuild.features.__main__:x", []),
+        ("coursebuild.cli.commands:build_command", [1]),
+        ("no.such.module:X", []),
+        ("coursebuild.model.blocks:NoSuch", []),
+        ("coursebuild.model.blocks:Heading", []),
+        ("coursebuild.model.blocks:Mode", ["NO_SUCH"]),
+        ("", []),
+    ],
+)
+def test_bytes_of_somebody_elses_make_nothing_but_values(name: str, arguments: list[Any]) -> None:
+    loaded = set(sys.modules)
+    assert decode(msgspec.msgpack.encode(([name], [16, *arguments])), object) is None
+    assert not {module for module in set(sys.modules) - loaded if "coursebuild" not in module}
+
+
+def test_deep_bytes_are_refused() -> None:
+    packed: list[Any] = [0]
+    for _ in range(100_000):
+        packed = [0, packed]
+    with pytest.raises(RecursionError):
+        msgspec.msgpack.encode(packed)
+    assert decode(b"\x92\x90" + b"\x91" * 1_000_000 + b"\x00", object) is None
