@@ -23,9 +23,9 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.checks.formulas import course_formulas
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.values import encode
 from coursebuild.effects.resources import bundled_files, template_texts
-from coursebuild.effects.store import kept
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.model import Course
 from coursebuild.model.skeleton import skeleton
@@ -117,7 +117,7 @@ def stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     assets = Assets(template_texts(), bundled_files())
 
     def subset(job: FontJob) -> bytes:
-        return kept(root, "fonts", job.key, lambda: subset_font(job))
+        return Memo(root).get_or_create("fonts", job.key, lambda: subset_font(job))
 
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),

@@ -36,13 +36,13 @@ print(total)
 RUNNER = """
 import pathlib, sys, time
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.effects.store import Store
+from coursebuild.core.engine.memo import Memo
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run
 root = pathlib.Path.cwd()
-options = Options(root, int(sys.argv[1]), True, Store(root, fresh=True))
+options = Options(root, int(sys.argv[1]), True, Memo(root, fresh=True))
 chosen = extract_scripts(load(root).course, options).runnable
 with ScriptServer() as server:
     for _ in range(2):

@@ -195,7 +195,7 @@ def _maker(name: str) -> Callable[..., Any]:
     for part in inner.split("."):
         kind = vars(kind)[part]
     if isinstance(kind, type) and issubclass(kind, enum.Enum):
-        return lambda member: kind[member]  # type: ignore[index]
+        return lambda member: kind[member]
     if isinstance(kind, type) and issubclass(kind, Struct | tuple) and kind is not tuple:
         return kind
     raise TypeError(f"{name} is no class of values")

@@ -18,7 +18,6 @@ Scripts:
 
 What is kept:
 
-- `store` (with `prune`), `shared`: results, here and for others
 - `conditions`, `digests`, `packages`, `code`, `tool`: what results depend on, as it is now
 - `prepared`: fonts that come cut with the tool
 

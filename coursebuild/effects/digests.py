@@ -19,9 +19,9 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.errors import reason
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.effects.store import Store
 
 ABSENT = "absent"
 FOLDER = "folder"
@@ -43,7 +43,7 @@ Signature = tuple[int, int, int, int, int]
 class Digests:
     """The states of files and folders; not for several threads."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
         self._known: dict[str, tuple[Signature, str]] | None = None
         self._seen: dict[str, tuple[Signature, str]] = {}
@@ -112,7 +112,7 @@ class Digests:
         kept = {**self._loaded(), **self._seen}
         if len(kept) > _MOST:
             kept = dict(self._seen)
-        self._store.keep(_KIND, _KEY, json.dumps(kept).encode(), local=True)
+        self._store.put(_KIND, _KEY, json.dumps(kept).encode(), local=True)
 
     def _read(self, path: str) -> str:
         try:
@@ -145,7 +145,7 @@ class Digests:
 class Clock:
     """The clock of the file system that the course lies on: a file in the store is touched."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._path = store.folder / "clock"
 
     def now(self) -> int:

@@ -28,9 +28,9 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.effects.errors import EffectError, UsageError, reason
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.effects.prune import TEMPORARY
 from coursebuild.effects.surroundings import Place, library_folder
 from coursebuild.effects.versions import engine_version
 

@@ -20,8 +20,8 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.digests import Digests
-from coursebuild.effects.store import Store
 from coursebuild.results import OutputFile
 
 if TYPE_CHECKING:
@@ -43,9 +43,7 @@ def site_folders() -> tuple[str, ...]:
 class Installed:
     """What is installed for the interpreter that runs the scripts."""
 
-    def __init__(
-        self, store: Store, digests: Digests, folders: Sequence[str] | None = None
-    ) -> None:
+    def __init__(self, store: Memo, digests: Digests, folders: Sequence[str] | None = None) -> None:
         self._digests = digests
         self._folders = site_folders() if folders is None else tuple(folders)
         self._store = store
@@ -80,7 +78,7 @@ class Installed:
         return digest.hexdigest()[:16]
 
 
-def distributions(store: Store, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
+def distributions(store: Memo, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
     """(module, distribution, version) of each top-level module that an installed package provides.
 
     Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
@@ -115,7 +113,7 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
     return None
 
 
-def _provided(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
+def _provided(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
     key = _signature(folders)
     kept = store.peek("installed", key) if key is not None else None
@@ -124,7 +122,7 @@ def _provided(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
             return {str(k): str(v) for k, v in json.loads(kept).items()}
     found = _scan(folders)
     if key is not None:
-        store.keep("installed", key, json.dumps(found, sort_keys=True).encode(), local=True)
+        store.put("installed", key, json.dumps(found, sort_keys=True).encode(), local=True)
     return found
 
 

@@ -175,7 +175,7 @@ class _Run:
             report = replace(report, digest=look.digest())
             # Somebody else may have changed the files while we waited.
             if report.digest == scene.digest:
-                self.options.store.keep(_KIND, key, msgspec.json.encode(report), local=True)
+                self.options.store.put(_KIND, key, msgspec.json.encode(report), local=True)
             self.progress.finished(scene.name, "looked at", time.monotonic() - began)
             return report
 
@@ -230,7 +230,7 @@ class _Run:
 
     def _kept(self, key: str, fix: bool) -> DietReport | None:
         """What was found before, if there is nothing in it to fix where that is wanted."""
-        data = self.options.store.load(_KIND, key)
+        data = self.options.store.get(_KIND, key)
         if data is None:
             return None
         try:

@@ -17,9 +17,9 @@ from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.faces import course_face
@@ -54,7 +54,7 @@ class Documents:
 
     def __init__(
         self,
-        store: Store,
+        store: Memo,
         jobs: int,
         stage: Stage = _silent,
         following: Sequence[str] = (),
@@ -99,13 +99,13 @@ class Documents:
         """What `check_course` finds; nothing where it found nothing in a course of this face."""
         key = hashlib.sha256(f"checked course\0{tool_digest()}".encode()).hexdigest()
         face = (self.face(course) or "").encode()
-        if face and not self._store.fresh and self._store.peek(_CHECKED, key) == face:
+        if face and self._store.get(_CHECKED, key, local=True) == face:
             return ()
         from coursebuild.checks.course import check_course
 
         found = check_course(course)
         if face and not found:
-            self._store.keep(_CHECKED, key, face, local=True)
+            self._store.put(_CHECKED, key, face, local=True)
         return found
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
@@ -123,7 +123,7 @@ class Documents:
 
     def _has(self, task: Task) -> bool:
         """Whether the outline of a text is in the store."""
-        data = None if self._store.fresh else self._store.peek(OUTLINES, task.key)
+        data = self._store.get(OUTLINES, task.key, local=True)
         outline = decode(data, Outline, task.source)
         if outline is not None:
             self._outlines[task.source.path] = outline
@@ -178,12 +178,12 @@ class Documents:
     ) -> Parsed[Value]:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
         key = key_of(tool_digest(), source.path, source.text)
-        data = None if self._store.fresh else self._store.peek(kind, key)
+        data = self._store.get(kind, key, local=True)
         found = decode(data, Parsed, source)
         if found is not None:
             return found
         parsed = parse(source)
-        self._store.keep(kind, key, encode(parsed), local=True)
+        self._store.put(kind, key, encode(parsed), local=True)
         return parsed
 
     def task(self, path: str) -> Task:

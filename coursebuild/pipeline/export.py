@@ -223,7 +223,7 @@ class _Items:
         """The items of documents, kept or made now, by the keys of these."""
         store, made, new = self._options.store, dict[str, bytes](), list[_Asked]()
         for one in asked:
-            data = None if store.fresh else store.peek(ITEMS, one.key)
+            data = store.get(ITEMS, one.key, local=True)
             if data is None or decode(data, tuple, one.source) is None:
                 new.append(one)
             else:

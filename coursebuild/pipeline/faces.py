@@ -57,8 +57,11 @@ def course_face(course: Course, documents: Iterable[tuple[Document, str]]) -> st
     known = {id(document): face for document, face in documents}
     if not all(known.get(id(document)) for document in course.documents):
         return None
-    shown = {Document: lambda document: (document.source.path, known[id(document)])}
-    return fingerprint((tool_digest(), course), {**_SHOWN, **shown})
+
+    def shown(document: Document) -> object:
+        return document.source.path, known[id(document)]
+
+    return fingerprint((tool_digest(), course), {**_SHOWN, Document: shown})
 
 
 def results_face(results: Results, reports: Reports) -> str:

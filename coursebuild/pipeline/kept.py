@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.prepared import prepared_cut, prepared_source
-from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 
 if TYPE_CHECKING:
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 _FONTS, _BINDINGS = "fonts", "bindings"
 
 
-def kept_font(store: Store, job: FontJob) -> bytes:
+def kept_font(store: Memo, job: FontJob) -> bytes:
     """A cut font: cut already, or cut now."""
     make = functools.partial(cut_font, job)
-    return prepared_cut(job.key) or store.kept(_FONTS, job.key, make)
+    return prepared_cut(job.key) or store.get_or_create(_FONTS, job.key, make)
 
 
 def cut_font(job: FontJob) -> bytes:
@@ -42,10 +42,10 @@ class KeptBindings:
     Those of the last run are kept, and no others.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
         self._key = hashlib.sha256(f"bindings\0{tool_digest()}".encode()).hexdigest()
-        data = None if store.fresh else store.peek(_BINDINGS, self._key)
+        data = store.get(_BINDINGS, self._key, local=True)
         self._before = frozenset(data.decode("ascii").split()) if data is not None else frozenset()
         self._now: set[str] = set()
 
@@ -70,4 +70,4 @@ class KeptBindings:
         """Keep what was found."""
         if self._now != self._before:
             data = " ".join(sorted(self._now)).encode("ascii")
-            self._store.keep(_BINDINGS, self._key, data, local=True)
+            self._store.put(_BINDINGS, self._key, data, local=True)

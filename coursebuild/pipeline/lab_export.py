@@ -14,8 +14,8 @@ from typing import Any
 
 from msgspec import Struct
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.native import NativeEngine, NativeError
-from coursebuild.effects.store import Store
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
@@ -37,7 +37,7 @@ class Offer(Struct, frozen=True):
 
 
 def exported(
-    store: Store,
+    store: Memo,
     root: Path,
     native: NativeEngine,
     course: Course,
@@ -83,7 +83,7 @@ def _seconds(lab: Lab, main: dict[str, Any]) -> float:
 
 
 def _checked(
-    store: Store,
+    store: Memo,
     root: Path,
     native: NativeEngine,
     lab: Lab,
@@ -108,7 +108,7 @@ def _checked(
     for part in ({**request, "path": export.name}, {**asked, "rtol": rtol}):
         digest.update(json.dumps(part).encode() + b"\0")
     key = digest.hexdigest()
-    found = store.load("exports", key)
+    found = store.get("exports", key)
     if found is not None:
         return found.decode()
     try:
@@ -117,7 +117,7 @@ def _checked(
         return f"the script {error}"
     reason = run["failure"] and f"the script fails: {run['failure']}"
     reason = reason or export_check.difference(main, run, exact=exact, rtol=rtol) or ""
-    store.keep("exports", key, reason.encode())
+    store.put("exports", key, reason.encode())
     return reason
 
 

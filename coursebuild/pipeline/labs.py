@@ -166,11 +166,11 @@ def _saved(memory: Memory, engines: Engines, source: _Source) -> bytes:
     states = [memory.states(need) for need in needed]
     parts = json.dumps([engine_version(), source.path, source.text, source.files, states])
     key = hashlib.sha256(parts.encode()).hexdigest()
-    made = memory.store.load("mjb", key)
+    made = memory.store.get("mjb", key)
     if made is None:
         made = engines.native.save(source.path, source.text)
         if states == [memory.states.now(need) for need in needed]:  # nobody saved one meanwhile
-            memory.store.keep("mjb", key, made)
+            memory.store.put("mjb", key, made)
     return made
 
 
@@ -268,7 +268,7 @@ class _Attempt(Struct, frozen=True):
         ]
 
     def _stored(self, key: str) -> dict[str, Any] | None:
-        found = self.memory.store.load("labs", key)
+        found = self.memory.store.get("labs", key)
         return None if found is None else json.loads(zlib.decompress(found))
 
     def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
@@ -287,7 +287,7 @@ class _Attempt(Struct, frozen=True):
         reply["seconds"] = round(time.monotonic() - began, 4)
         reply["made"] = int(time.time())
         if _is_kept(reply):
-            self.memory.store.keep("labs", key, zlib.compress(json.dumps(reply).encode()))
+            self.memory.store.put("labs", key, zlib.compress(json.dumps(reply).encode()))
         return reply
 
     def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
@@ -334,7 +334,9 @@ class _Attempt(Struct, frozen=True):
         def draw() -> bytes:
             return draw_picture(lab, main)
 
-        return static_form(lab, main, self.memory.store.kept("pictures", digest.hexdigest(), draw))
+        return static_form(
+            lab, main, self.memory.store.get_or_create("pictures", digest.hexdigest(), draw)
+        )
 
 
 def _lasted(reply: dict[str, Any]) -> tuple[float, int]:

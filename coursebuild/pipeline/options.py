@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from coursebuild.core.engine.memo import SIZE, Memo
 from coursebuild.diagnostics import did_you_mean, nearest
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.errors import UsageError as UsageError
 from coursebuild.effects.read import find_root
-from coursebuild.effects.store import SIZE, Store
 from coursebuild.model import Course, Lesson, Page, Status
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Options(Struct, frozen=True):
     jobs: int
     """Scripts at a time."""
     quiet: bool
-    cache: Store | None = None
+    cache: Memo | None = None
     """What was made before; what is kept in the course's folder where nothing is said."""
     executor: str | None = None
     """Where scripts run, `dask://HOST:PORT`; here, where nothing is said."""
@@ -41,9 +41,9 @@ class Options(Struct, frozen=True):
     own, where nothing is said."""
 
     @property
-    def store(self) -> Store:
+    def store(self) -> Memo:
         """Where results are kept."""
-        return Store(self.root) if self.cache is None else self.cache
+        return Memo(self.root) if self.cache is None else self.cache
 
 
 def find_course(directory: str | None) -> Path:
@@ -75,7 +75,7 @@ def open_store(
     environment: Mapping[str, str],
     *,
     fresh: bool = False,
-) -> Store:
+) -> Memo:
     """The results made before: here, and at a shared place.
 
     What the command line does not say (`None`), the environment may: `COURSEBUILD_CACHE` a place,
@@ -94,13 +94,13 @@ def open_store(
         raise UsageError("--cache names no place")
     shared = None
     if where is not None:
-        from coursebuild.effects.shared import shared_cache
+        from coursebuild.core.engine.shared import shared_cache
 
         try:
             shared = shared_cache(where)
         except EffectError as error:
             raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
-    return Store(root, shared=shared, size=limit, fresh=fresh)
+    return Memo(root, shared=shared, size=limit, fresh=fresh)
 
 
 def open_executor(where: str) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 
-from coursebuild.effects.store import Store
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.tool import tool_digest
 
 _KIND = "keys"
@@ -20,7 +20,7 @@ _KIND = "keys"
 class PageKeys:
     """See the module; those of the last build are kept, and no others."""
 
-    def __init__(self, store: Store, around: str | None) -> None:
+    def __init__(self, store: Memo, around: str | None) -> None:
         """`around`: a hash of all that sheets are made of besides documents, where it is known."""
         self._store = store
         self._around = around
@@ -49,10 +49,10 @@ class PageKeys:
         if self._around is not None and (self._changed or self._before):
             rows = (f"{key} {row}" for row, key in self._now.items())
             data = "\n".join((self._around, *rows)).encode()
-            self._store.keep(_KIND, self._name, data, local=True)
+            self._store.put(_KIND, self._name, data, local=True)
 
     def _load(self) -> dict[str, str]:
-        data = None if self._store.fresh else self._store.peek(_KIND, self._name)
+        data = self._store.get(_KIND, self._name, local=True)
         if data is None or self._around is None:
             return {}
         around, *rows = data.decode().split("\n")

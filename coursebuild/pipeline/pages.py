@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.values import decode, encode, fingerprint
-from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
@@ -76,7 +76,7 @@ class _Page(Struct, frozen=True):
 class Pages:
     """The pages of a course, drawn."""
 
-    def __init__(self, library: Library, documents: Documents, store: Store) -> None:
+    def __init__(self, library: Library, documents: Documents, store: Memo) -> None:
         self._library = library
         self._documents = documents
         self._store = store
@@ -259,7 +259,7 @@ class Pages:
 
     def _known(self, key: str) -> PageRecord | None:
         """The record of a page that was drawn before."""
-        kept = None if self._store.fresh else KeptPage.read(self._store.peek(PAGES, key))
+        kept = KeptPage.read(self._store.get(PAGES, key, local=True))
         return None if kept is None else kept.record
 
     def _framed(self, page: _Wanted, frames: Frames) -> bytes:

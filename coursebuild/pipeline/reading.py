@@ -24,11 +24,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
-from coursebuild.core.values import encode
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.resources import template_texts
-from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest, typesetter_digest
 from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
@@ -114,7 +114,7 @@ def prepare_to_read(sample: Task) -> None:
 class Reader:
     """Reads and draws; a context manager, since formulas are typeset by an engine."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
         self._engine: MathEngine | None = None
         self._waiting: dict[str, _Whole] = {}
@@ -176,7 +176,7 @@ class Reader:
         outline = self._outline(whole)
         data = encode(outline)
         if outline.lasting:  # that a formula took too long may not happen again
-            self._store.keep(OUTLINES, task.key, data, local=True)
+            self._store.put(OUTLINES, task.key, data, local=True)
         size = len(task.source.text)
         if size <= self._room:
             self._waiting[task.key] = whole
@@ -205,16 +205,14 @@ class Reader:
         if not formulas:
             return {}
         key = key_of(typesetter_digest(), path)
-        stored = None if self._store.fresh else self._store.peek(_MATHML, key)
-        entries = [] if stored is None else json.loads(stored)
-        known: dict[Formula, str] = {Formula(tex, display): made for tex, display, made in entries}
+        known: dict[Formula, str] = decode(self._store.get(_MATHML, key, local=True), dict) or {}
         new = [formula for formula in formulas if formula not in known]
         if not new:
             return {formula: known[formula] for formula in formulas}
         made = {**known, **dict(zip(new, self._started().typeset(new), strict=True))}
         found = {formula: made[formula] for formula in formulas}
-        entries = [(f.tex, f.display, m) for f, m in found.items() if isinstance(m, str)]
-        self._store.keep(_MATHML, key, json.dumps(entries).encode(), local=True)
+        lasting = {formula: one for formula, one in found.items() if isinstance(one, str)}
+        self._store.put(_MATHML, key, encode(lasting), local=True)
         return found
 
     def _started(self) -> MathEngine:
@@ -249,9 +247,9 @@ class Reader:
     def _draw(self, request: Draw) -> bytes:
         drawn = self.draw(request)
         page = KeptPage.of(drawn.record, drawn.body, drawn.searched)
-        self._store.keep(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
+        self._store.put(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
         # At last, since a page that is there is not drawn again.
-        self._store.keep(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
+        self._store.put(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
         return page.packed_record
 
     def _ask(self, request: Draw) -> bytes:
@@ -264,7 +262,7 @@ class Reader:
         language, base_url = request.language, request.base_url
         made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
         data = encode(made)
-        self._store.keep(ITEMS, request.key, data, local=True)
+        self._store.put(ITEMS, request.key, data, local=True)
         return data
 
     def _tools_for(self, language: str) -> Tools:
@@ -273,7 +271,7 @@ class Reader:
         return self._tools[language]
 
 
-def drawing_tools(store: Store, language: str) -> Tools:
+def drawing_tools(store: Memo, language: str) -> Tools:
     """Words, templates and the store's marked code."""
     texts = template_texts()
     templates = templates_of(texts, prepared_folder())
@@ -283,15 +281,15 @@ def drawing_tools(store: Store, language: str) -> Tools:
 class _Marks:
     """Code whose tokens are marked, from the store where it was marked before."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
         self._version = package_version("pygments")
 
     def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
         key = key_of(tool_digest(), self._version, language, code)
-        found = None if self._store.fresh else self._store.peek(_CODE, key)
+        found = self._store.get(_CODE, key, local=True)
         if found is not None:
             return tuple(map(Markup, json.loads(found)))
         lines = mark_now(language, code)
-        self._store.keep(_CODE, key, json.dumps(lines).encode(), local=True)
+        self._store.put(_CODE, key, json.dumps(lines).encode(), local=True)
         return lines

@@ -22,10 +22,10 @@ from typing import assert_never
 
 from msgspec import Struct
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.packages import Installed
-from coursebuild.effects.store import Store
 from coursebuild.effects.surroundings import Place
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.scripts.dependencies import (
@@ -68,7 +68,7 @@ class LabTrial(Struct, frozen=True):
 class States:
     """How things are now, each looked at when it is first asked for and not again."""
 
-    def __init__(self, root: Path, store: Store, place: Place | None = None) -> None:
+    def __init__(self, root: Path, store: Memo, place: Place | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, None if place is None else place.prefix)
@@ -123,7 +123,7 @@ class Memory:
     """
 
     def __init__(
-        self, root: Path, store: Store, *, fresh: bool = False, place: Place | None = None
+        self, root: Path, store: Memo, *, fresh: bool = False, place: Place | None = None
     ) -> None:
         self.elsewhere = place is not None
         self.store = store
@@ -231,7 +231,7 @@ class Memory:
             if self.fresh:
                 self._compare(record, run)
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
-            self.store.keep(_RESULTS, key, to_bytes(record, self.states.places))
+            self.store.put(_RESULTS, key, to_bytes(record, self.states.places))
         self._note(record, key)
 
     def close(self) -> None:
@@ -285,7 +285,7 @@ class Memory:
             group = group_key(inputs)
             here = set(self.store.group(_RESULTS, group))
             keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
-            return [(key, self.store.load(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
+            return [(key, self.store.get(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
 
         found: list[Record] = []
         from concurrent.futures import ThreadPoolExecutor
@@ -323,7 +323,7 @@ class Memory:
         )
         data = head + to_bytes(bare, ())
         if before != data:
-            self.store.keep(_LAST, key, data, local=True)
+            self.store.put(_LAST, key, data, local=True)
 
     def _compare(self, record: Record, run: ScriptRun) -> None:
         """Hold a run made afresh against what is remembered for the same dependencies."""

@@ -19,9 +19,9 @@ from pathlib import Path, PurePosixPath
 
 import msgspec
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects import mjcf, mjcf_worker, mujoco_files
 from coursebuild.effects.digests import Clock, changed_since
-from coursebuild.effects.store import Store
 from coursebuild.effects.versions import engine_version
 from coursebuild.model import MjcfModel
 from coursebuild.pipeline.remember import States
@@ -43,7 +43,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def compile_all(
     root: Path,
-    store: Store,
+    store: Memo,
     models: Sequence[MjcfModel],
     texts: Sequence[str],
     stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
@@ -89,7 +89,7 @@ def _whole(results: Iterable[CompileResult | None]) -> Iterator[CompileResult]:
 
 
 class _Models:
-    def __init__(self, root: Path, store: Store) -> None:
+    def __init__(self, root: Path, store: Memo) -> None:
         self.root = root
         self.store = store
         self.states = States(root, store)
@@ -125,11 +125,11 @@ class _Models:
             data = msgspec.json.encode(_Entry(files, result))
         except UnicodeEncodeError:  # a name of a file that is no text
             return
-        self.store.keep(_KIND, f"{_group(path, text)}/{key}", data)
+        self.store.put(_KIND, f"{_group(path, text)}/{key}", data)
 
     def _first(self, keys: Iterable[str]) -> CompileResult | None:
         for key in keys:
-            data = self.store.load(_KIND, key)
+            data = self.store.get(_KIND, key)
             try:
                 entry = None if data is None else msgspec.json.decode(data, type=_Entry)
             except (msgspec.MsgspecError, RecursionError):

@@ -149,7 +149,7 @@ class SceneRun:
     # --- what is kept
 
     def _kept(self, kind: str, parts: tuple[str, ...], what: type[_T]) -> _T | None:
-        data = None if self.again else self.options.store.load(kind, _key(parts))
+        data = None if self.again else self.options.store.get(kind, _key(parts))
         if data is None:
             return None
         try:
@@ -159,7 +159,7 @@ class SceneRun:
 
     def _keep(self, kind: str, parts: tuple[str, ...], value: object) -> None:
         if not self.again:
-            self.options.store.keep(kind, _key(parts), msgspec.json.encode(value), local=True)
+            self.options.store.put(kind, _key(parts), msgspec.json.encode(value), local=True)
 
 
 def _key(parts: tuple[str, ...]) -> str:

@@ -20,13 +20,13 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.prepared import prepared_copy, prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.effects.store import Store
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.numerics.reports import Reports
@@ -149,7 +149,7 @@ class _Site:
         return compressed_files(files, self._kept_copy)
 
     def _kept_copy(self, key: str, make: Callable[[], bytes], *, local: bool = False) -> bytes:
-        return prepared_copy(key) or self.store.kept("compressed", key, make, local=local)
+        return prepared_copy(key) or self.store.get_or_create("compressed", key, make, local=local)
 
     def _labs(self) -> list[SiteFile]:
         files = self.library.labs.files
@@ -238,7 +238,7 @@ class _Data:
     """Files that are made together, of which the names may be all that is needed."""
 
     def __init__(
-        self, store: Store, key: str, make: Callable[[], tuple[Names, dict[str, bytes]]]
+        self, store: Memo, key: str, make: Callable[[], tuple[Names, dict[str, bytes]]]
     ) -> None:
         self._store = store
         self.key = key
@@ -261,12 +261,12 @@ class _Data:
     def _made(self) -> tuple[Names, tuple[str, ...]]:
         names, self._files = self._make()
         listing = names, tuple(self._files)
-        self._store.keep(_SHARED_DATA, self.key, msgspec.msgpack.encode(self._files), local=True)
-        self._store.keep(_SHARED, self.key, msgspec.msgpack.encode(listing), local=True)
+        self._store.put(_SHARED_DATA, self.key, msgspec.msgpack.encode(self._files), local=True)
+        self._store.put(_SHARED, self.key, msgspec.msgpack.encode(listing), local=True)
         return listing
 
     def _load(self, kind: str, type: Any) -> Any:
-        data = None if self._store.fresh else self._store.peek(kind, self.key)
+        data = self._store.get(kind, self.key, local=True)
         try:
             return None if data is None else msgspec.msgpack.decode(data, type=type)
         except msgspec.MsgspecError:
@@ -276,22 +276,22 @@ class _Data:
 class _Cells:
     """Parts of the index of the search, in the store."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
 
     def get(self, key: str) -> bytes | None:
         """What an earlier build made."""
-        return None if self._store.fresh else self._store.peek(_CELLS, key)
+        return self._store.get(_CELLS, key, local=True)
 
     def put(self, key: str, data: bytes) -> None:
         """Keep it for the next build."""
-        self._store.keep(_CELLS, key, data, local=True)
+        self._store.put(_CELLS, key, data, local=True)
 
 
 class _Imports:
     """What Python texts import: those of lessons are known, others are kept."""
 
-    def __init__(self, store: Store, known: dict[bytes, frozenset[str]]) -> None:
+    def __init__(self, store: Memo, known: dict[bytes, frozenset[str]]) -> None:
         """`known` go by the hash of their text."""
         self._store = store
         self._known = known
@@ -305,7 +305,7 @@ class _Imports:
         """What a text imports."""
         digest = text_digest(text)
         if digest not in self._known:
-            data = self._store.kept(
+            data = self._store.get_or_create(
                 "imports",
                 key_of(sys.version, text),
                 lambda: json.dumps(sorted(zips.imports(text))).encode(),

@@ -60,7 +60,7 @@ def stability(
     with progress.stage("measuring", len(chosen)):
         for name in chosen:
             key = hashlib.sha256(f"{name}\0{state}".encode()).hexdigest()
-            kept = None if again else options.store.load(_KIND, key)
+            kept = None if again else options.store.get(_KIND, key)
             report = None if kept is None else _decoded(kept)
             if report is not None:
                 progress.known()
@@ -68,7 +68,7 @@ def stability(
                 progress.started(name)
                 began = time.monotonic()
                 report = measure_case(problem_named(name))
-                options.store.keep(_KIND, key, msgspec.json.encode(report))
+                options.store.put(_KIND, key, msgspec.json.encode(report))
                 progress.finished(name, "measured", time.monotonic() - began)
             reports.append(report)
     return tuple(reports)

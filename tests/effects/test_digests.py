@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects import digests as module
 from coursebuild.effects.digests import ABSENT, FILE, FOLDER, SPECIAL, Clock, Digests, changed_since
-from coursebuild.effects.store import Store
 
 
 def sha(data: bytes) -> str:
@@ -49,7 +49,7 @@ def later(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_states(tmp_path: Path, file: Path) -> None:
-    digests = Digests(Store(tmp_path))
+    digests = Digests(Memo(tmp_path))
     assert digests.file(str(file)) == sha(b"one")
     assert digests.file(str(tmp_path / "not there")) == ABSENT
     assert digests.file(str(file / "below a file")) == ABSENT
@@ -66,7 +66,7 @@ def test_links_count_by_what_they_lead_to(tmp_path: Path, file: Path) -> None:
     link.symlink_to(file)
     broken.symlink_to(tmp_path / "nothing")
     circle.symlink_to(circle)
-    digests = Digests(Store(tmp_path))
+    digests = Digests(Memo(tmp_path))
     assert digests.file(str(link)) == sha(b"one")
     assert digests.file(str(broken)) == ABSENT
     assert digests.file(str(circle)).startswith("unreadable: too many levels")
@@ -74,21 +74,21 @@ def test_links_count_by_what_they_lead_to(tmp_path: Path, file: Path) -> None:
     other.write_bytes(b"two")
     link.unlink()
     link.symlink_to(other)
-    assert Digests(Store(tmp_path)).file(str(link)) == sha(b"two")
+    assert Digests(Memo(tmp_path)).file(str(link)) == sha(b"two")
 
 
 def test_a_file_that_may_not_be_read(held_back: Path) -> None:
     file = held_back / "a file"
     file.write_bytes(b"one")
-    assert Digests(Store(held_back)).file(str(file)) == sha(b"one")
+    assert Digests(Memo(held_back)).file(str(file)) == sha(b"one")
     file.chmod(0)
-    assert Digests(Store(held_back)).file(str(file)) == "unreadable: permission denied"
+    assert Digests(Memo(held_back)).file(str(file)) == "unreadable: permission denied"
 
 
 def test_names_that_are_no_text(tmp_path: Path) -> None:
     path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe.bin")
     Path(path).write_bytes(b"x")
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     before = Digests(store).folder(str(tmp_path))
     digests = Digests(store)
     assert digests.file(path) == sha(b"x")
@@ -100,7 +100,7 @@ def test_names_that_are_no_text(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("later")
 def test_an_unchanged_file_is_read_once(tmp_path: Path, file: Path, reads: list[str]) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     for _ in range(3):
         digests = Digests(store)
         assert digests.file(str(file)) == sha(b"one")
@@ -117,7 +117,7 @@ def test_a_file_changed_a_moment_ago_is_read_again(
 ) -> None:
     now = file.stat().st_mtime_ns + module._TICK // 2
     monkeypatch.setattr(module.time, "time_ns", lambda: now)
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     for _ in range(3):
         digests = Digests(store)
         digests.file(str(file))
@@ -127,7 +127,7 @@ def test_a_file_changed_a_moment_ago_is_read_again(
 
 @pytest.mark.usefixtures("later")
 def test_an_edit_of_the_same_size_and_time(tmp_path: Path, file: Path) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     status = file.stat()
     first = Digests(store)
     first.file(str(file))
@@ -140,7 +140,7 @@ def test_an_edit_of_the_same_size_and_time(tmp_path: Path, file: Path) -> None:
 
 @pytest.mark.usefixtures("later")
 def test_a_file_put_in_the_place_of_another(tmp_path: Path, file: Path) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     first = Digests(store)
     first.file(str(file))
     first.save()
@@ -160,7 +160,7 @@ def test_a_clock_that_was_set_back(
 ) -> None:
     """The times of files lie in the future: nothing is trusted that they say."""
     monkeypatch.setattr(module.time, "time_ns", lambda: 1_000_000_000)
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     for _ in range(2):
         digests = Digests(store)
         assert digests.file(str(file)) == sha(b"one")
@@ -173,8 +173,8 @@ def test_a_clock_that_was_set_back(
     "data", [b"", b"[]", b"null", b'{"a": 3}', b'{"a": [1]}', b"\xff", b"[" * 99999]
 )
 def test_a_damaged_memory_of_digests(tmp_path: Path, file: Path, data: bytes) -> None:
-    store = Store(tmp_path)
-    store.keep(module._KIND, module._KEY, data, local=True)
+    store = Memo(tmp_path)
+    store.put(module._KIND, module._KEY, data, local=True)
     digests = Digests(store)
     assert digests.file(str(file)) == sha(b"one")
     digests.save()
@@ -187,7 +187,7 @@ def test_a_damaged_memory_of_digests(tmp_path: Path, file: Path, data: bytes) ->
 def test_a_listing_is_the_names_and_which_are_folders(tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
-    digests = Digests(Store(tmp_path))
+    digests = Digests(Memo(tmp_path))
     seen = [digests.folder(str(folder))]
     (folder / "a").write_text("x")
     seen.append(digests.folder(str(folder)))
@@ -208,14 +208,14 @@ def test_sockets_and_the_like_in_a_listing(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     with socket.socket(socket.AF_UNIX) as end:
         end.bind("socket")
-        assert len(Digests(Store(tmp_path)).folder(str(tmp_path))) == 64
+        assert len(Digests(Memo(tmp_path)).folder(str(tmp_path))) == 64
 
 
 # --- since when
 
 
 def test_changed_since(tmp_path: Path, file: Path) -> None:
-    clock = Clock(Store(tmp_path))
+    clock = Clock(Memo(tmp_path))
     clock.tick()
     start = clock.now()
     assert not changed_since(str(file), start)
@@ -228,7 +228,7 @@ def test_what_is_gone_shows_in_its_folder(tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "file").write_text("x")
-    clock = Clock(Store(tmp_path))
+    clock = Clock(Memo(tmp_path))
     clock.tick()
     start = clock.now()
     assert not changed_since(str(folder / "never there"), start)
@@ -240,14 +240,14 @@ def test_what_is_gone_shows_in_its_folder(tmp_path: Path) -> None:
 
 def test_a_time_of_content_in_the_future_is_no_change(tmp_path: Path, file: Path) -> None:
     os.utime(file, (4_000_000_000, 4_000_000_000))
-    clock = Clock(Store(tmp_path))
+    clock = Clock(Memo(tmp_path))
     clock.tick()
     assert not changed_since(str(file), clock.now())
 
 
 def test_where_the_clock_cannot_be_read(tmp_path: Path, file: Path) -> None:
     (tmp_path / ".coursebuild").write_text("in the way")
-    clock = Clock(Store(tmp_path))
+    clock = Clock(Memo(tmp_path))
     before = time.time_ns()
     assert before - module._LAG <= clock.now() <= time.time_ns()
     clock.tick()

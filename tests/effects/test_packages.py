@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import ABSENT, Installed, distributions
-from coursebuild.effects.store import Store
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def later(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ask(tmp_path: Path, site: Path) -> Installed:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     return Installed(store, Digests(store), [str(site)])
 
 
@@ -120,14 +120,14 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     user = tmp_path / "user/site-packages"
     user.mkdir(parents=True)
     install(user, "Some-Tool", "9", ["tool/__init__.py"])
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     found = Installed(store, Digests(store), [str(user), str(site), str(tmp_path / "none")])
     assert found.version("tool") == "Some-Tool 9"
 
 
 @pytest.mark.site
 def test_the_real_environment(tmp_path: Path) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     found = Installed(store, Digests(store))
     assert found.version("numpy").startswith("numpy ")
     assert found.version("mujoco").startswith("mujoco ")

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from coursebuild.effects.store import Store
+from coursebuild.core.engine.memo import Memo
 from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
 
@@ -170,16 +170,16 @@ def test_a_page_that_the_store_has_lost_is_drawn_for_its_frame(
     assert course.folder.main("build", "--quiet").status == 0
     before = course.folder.tree("public")
     shutil.rmtree(course.folder.root / "public")
-    peek = Store.peek
+    peek = Memo.peek
     lost: list[str] = []
 
-    def without_pages(self: Store, kind: str, key: str) -> bytes | None:
+    def without_pages(self: Memo, kind: str, key: str) -> bytes | None:
         if kind != "pages":
             return peek(self, kind, key)
         lost.append(key)
         return None
 
-    monkeypatch.setattr(Store, "peek", without_pages)
+    monkeypatch.setattr(Memo, "peek", without_pages)
     assert course.folder.main("build", "--quiet").status == 0
     assert course.folder.tree("public") == before
     assert lost

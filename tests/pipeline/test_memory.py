@@ -216,7 +216,7 @@ def test_shared_entry_that_holds_no_record_is_not_taken(desk: Desk, tmp_path: Pa
     desk.run(job=other)
     one, two = sorted(p for p in shared.rglob("*") if p.is_file())
     for data in (b"", b"{}", b"[1]", b"\x80\x04N."):
-        from coursebuild.effects.store import sealed
+        from coursebuild.core.engine.memo import sealed
 
         for path in (one, two):
             name = path.relative_to(shared / "coursebuild-1").as_posix()

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from coursebuild.checks.course import check_course
+from coursebuild.core.engine.memo import Memo
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.store import Store
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
@@ -16,7 +16,7 @@ from coursebuild.pipeline.page_keys import PageKeys
 
 
 def test_keys_are_remembered(tmp_path: Path) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     keys = PageKeys(store, "a" * 64)
     assert keys.get("index.html", "") is None
     keys.add("index.html", "", "k1")
@@ -30,7 +30,7 @@ def test_keys_are_remembered(tmp_path: Path) -> None:
 
 
 def test_only_those_of_the_last_build_are_kept(tmp_path: Path) -> None:
-    store = Store(tmp_path)
+    store = Memo(tmp_path)
     for number in range(3):
         keys = PageKeys(store, "a" * 64)
         keys.get("index.html", "")
@@ -42,13 +42,13 @@ def test_only_those_of_the_last_build_are_kept(tmp_path: Path) -> None:
 
 
 def test_where_something_around_changed_none_is_known(tmp_path: Path) -> None:
-    keys = PageKeys(Store(tmp_path), "a" * 64)
+    keys = PageKeys(Memo(tmp_path), "a" * 64)
     keys.add("index.html", "", "k1")
     keys.save()
-    assert PageKeys(Store(tmp_path), "b" * 64).get("index.html", "") is None
-    assert PageKeys(Store(tmp_path), None).get("index.html", "") is None
-    assert PageKeys(Store(tmp_path, fresh=True), "a" * 64).get("index.html", "") is None
-    assert PageKeys(Store(tmp_path), "a" * 64).get("index.html", "") == "k1"
+    assert PageKeys(Memo(tmp_path), "b" * 64).get("index.html", "") is None
+    assert PageKeys(Memo(tmp_path), None).get("index.html", "") is None
+    assert PageKeys(Memo(tmp_path, fresh=True), "a" * 64).get("index.html", "") is None
+    assert PageKeys(Memo(tmp_path), "a" * 64).get("index.html", "") == "k1"
 
 
 HEAD = '[course]\ntitle = "T"\n\n[[level]]\nid = "1"\ntitle = "One"\n'
@@ -69,7 +69,7 @@ def test_a_course_in_which_nothing_was_wrong_is_checked_again_when_it_looks_diff
         (tmp_path / path).write_text(text, encoding="utf-8")
 
     def found() -> list[str]:
-        with Documents(Store(tmp_path), 1) as documents:
+        with Documents(Memo(tmp_path), 1) as documents:
             given = documents.parse, documents.ahead, documents.course_map, documents.declarations
             loaded = load(tmp_path, *given, documents.check)
         return [diagnostic.rule for diagnostic in loaded.diagnostics]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects import mjcf
-from coursebuild.effects.store import Store
 from coursebuild.model import MjcfModel
 from coursebuild.pipeline.remember_models import compile_all
 from coursebuild.results import CompileResult
@@ -60,7 +60,7 @@ def run(
     root: Path, texts: tuple[str, ...] = (), *, fresh: bool = False
 ) -> dict[str, CompileResult]:
     read = models(root)
-    of_models, of_texts = compile_all(root, Store(root, fresh=fresh), read, texts)
+    of_models, of_texts = compile_all(root, Memo(root, fresh=fresh), read, texts)
     named = {model.name: result for model, result in zip(read, of_models, strict=True)}
     return named | dict(zip(texts, of_texts, strict=True))
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.effects.shared import shared_cache
-from coursebuild.effects.store import Store
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.shared import shared_cache
 from coursebuild.pipeline.remember import Memory
 from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
 
@@ -51,7 +51,7 @@ class Desk:
     def memory(self) -> Memory:
         """That of a new command."""
         shared = None if self.shared is None else shared_cache(self.shared)
-        store = Store(self.root, fresh=self.fresh, shared=shared)
+        store = Memo(self.root, fresh=self.fresh, shared=shared)
         store.listen(self.told.append)
         return Memory(self.root, store)
 

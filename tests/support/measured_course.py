@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.store import Store
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.measuring import Loaded
 from coursebuild.pipeline.options import Options
@@ -66,7 +66,7 @@ def write(path: Path, text: str) -> None:
 
 
 def options(root: Path, **other: Any) -> Options:
-    return Options(root, 1, True, Store(root, **other))
+    return Options(root, 1, True, Memo(root, **other))
 
 
 def asked(fake: Fake) -> list[str]:

@@ -26,11 +26,11 @@ from typing import Self
 
 from msgspec.structs import replace
 
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.shared import shared_cache
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.runner import ScriptServer
-from coursebuild.effects.shared import shared_cache
-from coursebuild.effects.store import Store
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.labs import try_labs
 from coursebuild.pipeline.load import load
@@ -189,7 +189,7 @@ class Workshop:
 
     def options(self, root: Path, *, fresh: bool = False) -> Options:
         """For a command on a course; `fresh`: all is to be made again."""
-        store = Store(root, shared=self._results, fresh=fresh)
+        store = Memo(root, shared=self._results, fresh=fresh)
         return Options(root, jobs=1, quiet=True, cache=store, run_all=self._scripts.run)
 
     def try_labs(self, root: Path, browser: LabEngine | None = None) -> tuple[Diagnostic, ...]:
@@ -200,7 +200,7 @@ class Workshop:
         models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
         engines = self._engines.but(browser=browser)
         # What labs did is not shared: it would not be tried by another engine.
-        own = replace(options, cache=Store(root))
+        own = replace(options, cache=Memo(root))
         _, found = try_labs(loaded.course, dict(models), own, engines, wrong=wrong)
         diagnostics = [*loaded.diagnostics, *wrong, *found]
         return judge(loaded.course, diagnostics, (), 0.0, lessons=2).diagnostics

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.cli import main
-from coursebuild.effects.prune import HASH
+from coursebuild.core.engine.memo import HASH
 from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]

@@ -5,8 +5,8 @@ Entry point: `Noted`.
 
 from __future__ import annotations
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.values import encode
-from coursebuild.effects.store import Store
 from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.pages import text_page_key
 from coursebuild.pipeline.records import KeptPage
@@ -19,7 +19,7 @@ from coursebuild.render.shared import PageFacts
 class Noted:
     """The records of pages that builds have left in a store."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Memo) -> None:
         self._store = store
 
     def __call__(self, page: PageEntry, library: Library, task: Task | None) -> PageFacts | None:
@@ -27,9 +27,7 @@ class Noted:
 
         `task`: the text of its document, if it has one.
         """
-        if self._store.fresh:
-            return None
         key = text_page_key(library.course, task, encode(page.sheet(library)))
-        kept = KeptPage.read(self._store.peek(PAGES, key))
+        kept = KeptPage.read(self._store.get(PAGES, key, local=True))
         record = None if kept is None else kept.record
         return None if record is None else record.facts

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.shared import FolderPlace, SharedCache, shared_cache
 from coursebuild.effects.errors import EffectError
-from coursebuild.effects.shared import FolderPlace, SharedCache, shared_cache
-from coursebuild.effects.store import Store
 
 KEY = hashlib.sha256(b"a key").hexdigest()
 GROUP = hashlib.sha256(b"a group").hexdigest()
 UPPER = "coursebuild-1"
 
 
-def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Store, list[str]]:
+def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Memo, list[str]]:
     (tmp_path / name).mkdir(exist_ok=True)
-    store = Store(tmp_path / name, shared=shared)
+    store = Memo(tmp_path / name, shared=shared)
     lines: list[str] = []
     store.listen(lines.append)
     return store, lines
@@ -46,19 +46,19 @@ def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
     one, told_one = machine(tmp_path, "one", shared_cache(where))
-    assert one.kept("labs", KEY, lambda: b"\0made\xff") == b"\0made\xff"
-    one.keep("scripts", f"{GROUP}/{KEY}", b"a result")
-    one.keep("digests", KEY, b"of this machine", local=True)
+    assert one.get_or_create("labs", KEY, lambda: b"\0made\xff") == b"\0made\xff"
+    one.put("scripts", f"{GROUP}/{KEY}", b"a result")
+    one.put("digests", KEY, b"of this machine", local=True)
     one.close()
     two, told_two = machine(tmp_path, "two", shared_cache(where))
-    assert two.kept("labs", KEY, never) == b"\0made\xff"
+    assert two.get_or_create("labs", KEY, never) == b"\0made\xff"
     assert two.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
-    assert two.load("scripts", f"{GROUP}/{KEY}") == b"a result"
-    assert two.load("digests", KEY) is None
+    assert two.get("scripts", f"{GROUP}/{KEY}") == b"a result"
+    assert two.get("digests", KEY) is None
     assert two.shared_group("scripts", KEY) == []
     # What was fetched is kept here too.
-    alone, _ = Store(tmp_path / "two"), None
-    assert alone.load("labs", KEY) == b"\0made\xff"
+    alone, _ = Memo(tmp_path / "two"), None
+    assert alone.get("labs", KEY) == b"\0made\xff"
     assert alone.group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
     assert told_one == told_two == []
 
@@ -66,14 +66,14 @@ def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
 def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> None:
     place = tmp_path / "shared"
     one, _ = machine(tmp_path, "one", shared_cache(str(place)))
-    one.keep("labs", KEY, b"made")
+    one.put("labs", KEY, b"made")
     one.close()
     path = place / UPPER / "labs" / KEY
     whole = path.read_bytes()
     for at in range(len(whole)):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
         two, told = machine(tmp_path, f"two{at}", shared_cache(str(place)))
-        assert two.kept("labs", KEY, lambda: b"made") == b"made"
+        assert two.get_or_create("labs", KEY, lambda: b"made") == b"made"
         two.close()
         said = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
         assert told == [said]
@@ -128,7 +128,7 @@ def test_a_place_that_fails_is_told_of_once_and_left_alone(
     place = Broken(failing(error))
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
     for number in range(20):
-        assert store.kept("labs", f"{number:064x}", lambda: b"made") == b"made"
+        assert store.get_or_create("labs", f"{number:064x}", lambda: b"made") == b"made"
     assert store.shared_group("scripts", GROUP) == []
     store.close()
     assert told == [f"the shared cache s3://there cannot be used: {words}"]
@@ -141,7 +141,7 @@ def test_a_place_that_hangs_costs_its_time_once(tmp_path: Path) -> None:
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place, timeout=0.2))
     began = time.monotonic()
     for number in range(20):
-        assert store.kept("labs", f"{number:064x}", lambda: b"made") == b"made"
+        assert store.get_or_create("labs", f"{number:064x}", lambda: b"made") == b"made"
     store.close()
     assert time.monotonic() - began < 300
     stop.set()
@@ -158,7 +158,7 @@ class Unwritable(Broken):
 def test_a_place_that_takes_nothing(tmp_path: Path) -> None:
     place = Unwritable(failing(PermissionError(13, "Permission denied")))
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
-    store.kept("labs", KEY, lambda: b"made")
+    store.get_or_create("labs", KEY, lambda: b"made")
     store.close()
     assert told == ["the shared cache s3://there cannot be used: permission denied"]
 
@@ -171,7 +171,7 @@ def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
             stop.wait(600)
 
     store, told = machine(tmp_path, "one", SharedCache("s3://there", Slow(lambda: None)))
-    store.keep("labs", KEY, b"made")
+    store.put("labs", KEY, b"made")
     assert store.shared is not None
     store.shared.flush(0.2)
     stop.set()
@@ -185,7 +185,7 @@ def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None
     place = tmp_path / "shared"
     store, told = machine(tmp_path, "one", shared_cache(str(place)))
     for number in range(300):
-        store.keep("labs", f"{number:064x}", b"x")
+        store.put("labs", f"{number:064x}", b"x")
     store.close()
     assert len(list((place / UPPER / "labs").iterdir())) == 300
     until = time.monotonic() + 120
@@ -199,7 +199,7 @@ def test_a_folder_whose_parent_is_not_there_is_not_made(tmp_path: Path) -> None:
     """A network's folder that is not mounted must not be filled where it would be."""
     place = tmp_path / "not mounted" / "cache"
     store, told = machine(tmp_path, "one", shared_cache(str(place)))
-    assert store.kept("labs", KEY, lambda: b"made") == b"made"
+    assert store.get_or_create("labs", KEY, lambda: b"made") == b"made"
     store.close()
     assert told == [f"the shared cache {place} cannot be used: no such file or directory"]
     assert not place.parent.exists()
@@ -209,7 +209,7 @@ def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
     place = tmp_path / "cache"
     place.write_text("in the way")
     store, told = machine(tmp_path, "one", shared_cache(str(place)))
-    assert store.kept("labs", KEY, lambda: b"made") == b"made"
+    assert store.get_or_create("labs", KEY, lambda: b"made") == b"made"
     store.close()
     assert told == [f"the shared cache {place} cannot be used: file exists"]
 
@@ -221,7 +221,7 @@ def test_names_that_are_no_keys_are_passed_over(tmp_path: Path) -> None:
     for name in ("notes.txt", ".new-1", KEY, KEY[:-1], KEY.upper(), f"{KEY}.bak"):
         (folder / name).write_text("x")
     assert store.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
-    assert store.load("scripts", f"{GROUP}/{KEY}") is None
+    assert store.get("scripts", f"{GROUP}/{KEY}") is None
     assert len(told) == 1
 
 
@@ -247,10 +247,10 @@ def test_without_fsspec(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
 
 def test_a_folder_needs_no_fsspec(tmp_path: Path) -> None:
     code = (
-        "import sys\nfrom coursebuild.effects.shared import shared_cache\n"
+        "import sys\nfrom coursebuild.core.engine.shared import shared_cache\n"
         "shared_cache('/tmp/x').read('a')\nprint('fsspec' in sys.modules)"
     )
-    root = str(Path(__file__).parents[2])
+    root = str(Path(__file__).parents[3])
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True
     )

@@ -1,0 +1,280 @@
+"""Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
+
+Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`.
+
+1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
+   together. It begins with the hash of its name and of what follows: one that was cut, flipped or
+   put under another name is told of, removed, and made again instead of served.
+2. It is written beside its place and renamed there, so that processes at work at the same time see
+   whole entries only.
+3. What is not there is looked for in the shared cache (`shared`), if there is one, and what is made
+   is sent there.
+4. When a command ends, now and then, what was not used for longest is removed until all takes less
+   than the limit.
+
+Nothing is lost when the folder is deleted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from coursebuild.effects.errors import reason
+from coursebuild.effects.locks import make_private_folder
+
+if TYPE_CHECKING:
+    from coursebuild.core.engine.shared import SharedCache
+
+FOLDER = ".coursebuild"
+SIZE = 1 << 30
+"""Bytes that all may take."""
+HASH = re.compile(r"[0-9a-f]{64}")
+"""What an entry, or a group of them, is called."""
+TEMPORARY = ".new-"
+"""Names of files that are being written begin so."""
+_DIGEST = hashlib.sha256().digest_size
+_USED = 3600.0
+"""Seconds after which the use of an entry is noted again, and what a killed writer left goes."""
+_OFTEN = 3600.0
+"""Seconds between two times that all is gone through."""
+_SHARE = 16
+"""Where this part of the limit was written at once all is gone through at once."""
+_ROOM = 0.9
+"""Part of the limit that is left full, so that not every command has to remove something."""
+
+
+def sealed(name: str, data: bytes) -> bytes:
+    """An entry: data behind the hash of itself and its name, such as `KIND/KEY`."""
+    return hashlib.sha256(b"%s\0%s" % (name.encode(), data)).digest() + data
+
+
+def unsealed(name: str, entry: bytes) -> bytes | None:
+    """The data of an entry; `None` where it is not what was put under this name."""
+    data = entry[_DIGEST:]
+    return data if entry == sealed(name, data) else None
+
+
+class Memo:
+    """The results kept for a course, here and perhaps in a shared cache.
+
+    Safe to use from several threads, and from several processes on the same folder.
+    """
+
+    def __init__(
+        self,
+        root: Path,
+        *,
+        shared: SharedCache | None = None,
+        size: int = SIZE,
+        fresh: bool = False,
+    ) -> None:
+        self.folder = root / FOLDER
+        self.shared = shared
+        self.size = size
+        self.fresh = fresh
+        """Whether everything is to be made again: nothing is found, and what is made is kept."""
+        self._lock = threading.Lock()
+        self._told: set[str] = set()
+        self._waiting: list[str] = []
+        self._tell: Callable[[str], None] = self._waiting.append
+        self._written = 0
+
+    def listen(self, tell: Callable[[str], None]) -> None:
+        """Be told what is wrong with entries, a line each; also what was found before."""
+        with self._lock:
+            self._tell = tell
+            waiting, self._waiting = self._waiting, []
+        for line in waiting:
+            tell(line)
+        if self.shared is not None:
+            self.shared.listen(self._say)
+
+    def get_or_create(
+        self, kind: str, key: str, make: Callable[[], bytes], *, local: bool = False
+    ) -> bytes:
+        """The result of this kind and key: one that is kept, or made now and kept."""
+        found = self.get(kind, key, local=local)
+        if found is not None:
+            return found
+        made = make()
+        if self.fresh:
+            before = self.peek(kind, key)
+            if before is not None and before != made:
+                self._say(f"{_short(f'{kind}/{key}')} was made again and is not what was kept")
+        self.put(kind, key, made, local=local)
+        return made
+
+    def get(self, kind: str, key: str, *, local: bool = False) -> bytes | None:
+        """The result of this kind and key, if it is kept and whole.
+
+        A `local` one is not looked for in the shared cache.
+        """
+        if self.fresh:
+            return None
+        found = self.peek(kind, key)
+        if found is None and self.shared is not None and not local:
+            found = self._fetch(self.shared, f"{kind}/{key}")
+        return found
+
+    def peek(self, kind: str, key: str) -> bytes | None:
+        """What this machine keeps under a key, though everything is to be made again."""
+        name = f"{kind}/{key}"
+        path = f"{self.folder}/{name}"
+        try:
+            with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - there are many
+                changed = os.fstat(file.fileno()).st_mtime
+                entry = file.read()
+        except OSError:
+            return None
+        data = unsealed(name, entry)
+        with contextlib.suppress(OSError):
+            if data is None:
+                os.unlink(path)  # noqa: PTH108
+                self._say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
+            elif time.time() - changed > _USED:
+                os.utime(path)  # what was used lately stays
+        return data
+
+    def put(self, kind: str, key: str, data: bytes, *, local: bool = False) -> None:
+        """Keep a result; one that cannot be written only costs time.
+
+        A `local` one says something of this machine, or is made faster than fetched: it is not
+        shared.
+        """
+        name = f"{kind}/{key}"
+        entry = sealed(name, data)
+        self._write(name, entry)
+        if self.shared is not None and not local:
+            self.shared.write(name, entry)
+
+    def group(self, kind: str, key: str, *, newest: int = 8) -> list[str]:
+        """The keys, `GROUP/KEY`, that are kept in a group, newest first; the others go."""
+        folder = self.folder / kind / key
+        found: list[tuple[float, str]] = []
+        with contextlib.suppress(OSError), os.scandir(folder) as entries:
+            found = [(e.stat().st_mtime, e.name) for e in entries if not e.name.startswith(".")]
+        found.sort(reverse=True)
+        for _, name in found[newest:]:
+            (folder / name).unlink(missing_ok=True)
+        return [f"{key}/{name}" for _, name in found[:newest]]
+
+    def shared_group(self, kind: str, key: str) -> list[str]:
+        """The keys of a group that the shared cache has."""
+        if self.shared is None or self.fresh:
+            return []
+        names = self.shared.names(f"{kind}/{key}")
+        return [f"{key}/{name}" for name in names if HASH.fullmatch(name)]
+
+    def close(self) -> None:
+        """Wait until the shared cache has what was made, and keep all within the limit."""
+        if self.shared is not None:
+            self.shared.flush()
+        if self._written:
+            with contextlib.suppress(OSError):
+                self._prune_if_due()
+            self._written = 0
+
+    def _prune_if_due(self) -> None:
+        """Go through all if that was not done lately, or much was written since."""
+        noted = self.folder / "pruned"
+        with contextlib.suppress(FileNotFoundError):
+            age = time.time() - noted.stat().st_mtime
+            if 0.0 <= age < _OFTEN and self._written * _SHARE < self.size:
+                return
+        noted.touch()
+        prune(self.folder, self.size)
+
+    def _say(self, line: str) -> None:
+        """Tell of something once."""
+        with self._lock:
+            if line in self._told:
+                return
+            self._told.add(line)
+            tell = self._tell
+        tell(line)
+
+    def _fetch(self, shared: SharedCache, name: str) -> bytes | None:
+        entry = shared.read(name)
+        data = None if entry is None else unsealed(name, entry)
+        if entry is not None and data is None:
+            self._say(f"{_short(name)} in the shared cache is damaged: it is made again")
+        elif entry is not None:
+            self._write(name, entry)
+        return data
+
+    def _write(self, name: str, entry: bytes) -> None:
+        path = self.folder / name
+        new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
+        try:
+            try:
+                new.write_bytes(entry)
+            except FileNotFoundError:
+                make_private_folder(self.folder)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                new.write_bytes(entry)
+            new.replace(path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                new.unlink(missing_ok=True)
+            self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
+            return
+        with self._lock:
+            self._written += len(entry)
+
+
+def _short(name: str) -> str:
+    """An entry as people are told of it."""
+    kind, _, key = name.partition("/")
+    return f"the entry {kind}/{key[:12]}…" if len(key) > 12 else f"the entry {name}"
+
+
+# --- the limit
+
+
+class _File(NamedTuple):
+    used: float
+    path: str
+    size: int
+
+
+def prune(folder: Path, limit: int) -> None:
+    """Remove entries until the rest takes at most `limit` bytes: those first that were used first.
+
+    Only files named by a hash are entries. Other processes may write, read and prune meanwhile:
+    whoever misses an entry that was removed makes it again.
+    """
+    with os.scandir(folder) as found:
+        kinds = [kind.path for kind in found if kind.is_dir(follow_symlinks=False)]
+    files = sorted(file for kind in kinds for file in _entries(kind, time.time() - _USED))
+    total = sum(file.size for file in files)
+    enough = limit if total <= limit else limit * _ROOM
+    for file in files:
+        if total <= enough:
+            break
+        total -= file.size
+        with contextlib.suppress(OSError):
+            os.unlink(file.path)  # noqa: PTH108 - ten thousand of them
+
+
+def _entries(folder: str, long_ago: float) -> Iterator[_File]:
+    """The entries in a folder; what a writer that was killed `long_ago` left there goes."""
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        for entry in found:
+            if entry.is_dir(follow_symlinks=False) and HASH.fullmatch(entry.name):
+                yield from _entries(entry.path, long_ago)
+                with contextlib.suppress(OSError):  # it is not empty
+                    os.rmdir(entry.path)  # noqa: PTH106
+            elif entry.is_file(follow_symlinks=False):
+                status = entry.stat(follow_symlinks=False)
+                if HASH.fullmatch(entry.name):
+                    yield _File(status.st_mtime, entry.path, status.st_size)
+                elif entry.name.startswith(TEMPORARY) and status.st_mtime < long_ago:
+                    os.unlink(entry.path)  # noqa: PTH108
