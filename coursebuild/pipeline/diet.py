@@ -19,7 +19,6 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -175,7 +174,7 @@ class _Run:
             report = replace(report, digest=look.digest())
             # Somebody else may have changed the files while we waited.
             if report.digest == scene.digest:
-                self.options.store.put(_KIND, key, msgspec.json.encode(report), local=True)
+                self.options.store.put_value(_KIND, key, report, local=True)
             self.progress.finished(scene.name, "looked at", time.monotonic() - began)
             return report
 
@@ -230,11 +229,7 @@ class _Run:
 
     def _kept(self, key: str, fix: bool) -> DietReport | None:
         """What was found before, if there is nothing in it to fix where that is wanted."""
-        data = self.options.store.get(_KIND, key)
-        if data is None:
+        kept = self.options.store.get_value(_KIND, key, DietReport)
+        if kept is not None and fix and any(one.fixable for one in kept.findings):
             return None
-        try:
-            kept = msgspec.json.decode(data, type=DietReport)
-        except msgspec.DecodeError:  # by another version of this code
-            return None
-        return None if fix and any(one.fixable for one in kept.findings) else kept
+        return kept

@@ -269,7 +269,10 @@ class _Attempt(Struct, frozen=True):
 
     def _stored(self, key: str) -> dict[str, Any] | None:
         found = self.memory.store.get("labs", key)
-        return None if found is None else json.loads(zlib.decompress(found))
+        try:
+            return None if found is None else json.loads(zlib.decompress(found))
+        except (zlib.error, ValueError, RecursionError):
+            return None
 
     def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
         """The reply of the trial, with the comparison in place of what it was made from."""

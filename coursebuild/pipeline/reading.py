@@ -287,9 +287,9 @@ class _Marks:
 
     def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
         key = key_of(tool_digest(), self._version, language, code)
-        found = self._store.get(_CODE, key, local=True)
+        found = self._store.get_value(_CODE, key, list[str], local=True)
         if found is not None:
-            return tuple(map(Markup, json.loads(found)))
+            return tuple(map(Markup, found))
         lines = mark_now(language, code)
-        self._store.put(_CODE, key, json.dumps(lines).encode(), local=True)
+        self._store.put_value(_CODE, key, list(map(str, lines)), local=True)
         return lines

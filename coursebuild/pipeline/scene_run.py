@@ -11,8 +11,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-import msgspec
-
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.code import code_digest
 from coursebuild.effects.locks import project_lock
@@ -149,17 +147,11 @@ class SceneRun:
     # --- what is kept
 
     def _kept(self, kind: str, parts: tuple[str, ...], what: type[_T]) -> _T | None:
-        data = None if self.again else self.options.store.get(kind, _key(parts))
-        if data is None:
-            return None
-        try:
-            return msgspec.json.decode(data, type=what)
-        except msgspec.DecodeError:  # by another version of this code
-            return None
+        return None if self.again else self.options.store.get_value(kind, _key(parts), what)
 
     def _keep(self, kind: str, parts: tuple[str, ...], value: object) -> None:
         if not self.again:
-            self.options.store.put(kind, _key(parts), msgspec.json.encode(value), local=True)
+            self.options.store.put_value(kind, _key(parts), value, local=True)
 
 
 def _key(parts: tuple[str, ...]) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -305,12 +304,12 @@ class _Imports:
         """What a text imports."""
         digest = text_digest(text)
         if digest not in self._known:
-            data = self._store.get_or_create(
-                "imports",
-                key_of(sys.version, text),
-                lambda: json.dumps(sorted(zips.imports(text))).encode(),
-            )
-            self._known[digest] = frozenset(json.loads(data))
+            key = key_of(sys.version, text)
+            found = self._store.get_value("imports", key, list[str])
+            if found is None:
+                found = sorted(zips.imports(text))
+                self._store.put_value("imports", key, found)
+            self._known[digest] = frozenset(found)
         return self._known[digest]
 
 

@@ -15,7 +15,6 @@ import hashlib
 import platform
 import time
 
-import msgspec
 from msgspec import Struct
 
 from coursebuild.diagnostics import nearest
@@ -60,15 +59,14 @@ def stability(
     with progress.stage("measuring", len(chosen)):
         for name in chosen:
             key = hashlib.sha256(f"{name}\0{state}".encode()).hexdigest()
-            kept = None if again else options.store.get(_KIND, key)
-            report = None if kept is None else _decoded(kept)
+            report = None if again else options.store.get_value(_KIND, key, CaseReport)
             if report is not None:
                 progress.known()
             else:
                 progress.started(name)
                 began = time.monotonic()
                 report = measure_case(problem_named(name))
-                options.store.put(_KIND, key, msgspec.json.encode(report))
+                options.store.put_value(_KIND, key, report)
                 progress.finished(name, "measured", time.monotonic() - began)
             reports.append(report)
     return tuple(reports)
@@ -78,13 +76,6 @@ def _state() -> str:
     """All that a figure depends on beside the problem's name."""
     versions = (engine_version(), package_version("numpy"), python_version())
     return "\0".join((*versions, platform.system(), platform.machine(), code_digest(*_CODE)))
-
-
-def _decoded(data: bytes) -> CaseReport | None:
-    try:
-        return msgspec.json.decode(data, type=CaseReport)
-    except msgspec.DecodeError:  # by another version of this code
-        return None
 
 
 def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:

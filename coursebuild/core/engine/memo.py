@@ -1,6 +1,7 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`.
+Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`; `get_value` and `put_value`
+of what is checked to be of a type.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
    together. It begins with the hash of its name and of what follows: one that was cut, flipped or
@@ -25,13 +26,17 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import msgspec
 
 from coursebuild.effects.errors import reason
 from coursebuild.effects.locks import make_private_folder
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.shared import SharedCache
+
+Value = TypeVar("Value")
 
 FOLDER = ".coursebuild"
 SIZE = 1 << 30
@@ -154,6 +159,20 @@ class Memo:
         self._write(name, entry)
         if self.shared is not None and not local:
             self.shared.write(name, entry)
+
+    def get_value(
+        self, kind: str, key: str, type: type[Value], *, local: bool = False
+    ) -> Value | None:
+        """The same of a value that was kept as JSON, if it is one of this type."""
+        data = self.get(kind, key, local=local)
+        try:
+            return None if data is None else msgspec.json.decode(data, type=type)
+        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
+            return None
+
+    def put_value(self, kind: str, key: str, value: object, *, local: bool = False) -> None:
+        """Keep a value as JSON; see `put`."""
+        self.put(kind, key, msgspec.json.encode(value), local=local)
 
     def group(self, kind: str, key: str, *, newest: int = 8) -> list[str]:
         """The keys, `GROUP/KEY`, that are kept in a group, newest first; the others go."""
