@@ -28,7 +28,7 @@ from coursebuild.core.values import encode
 from coursebuild.effects.resources import bundled_files, template_texts
 from coursebuild.effects.v8 import MathEngine
 from coursebuild.model import Course
-from coursebuild.model.skeleton import skeleton
+from coursebuild.model.summary import without_prose
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -162,7 +162,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     documents = [document for _, document in drawn]
     steps: dict[str, Callable[[], object]] = {
         "parse": parses,
-        "its outline": lambda: [encode(skeleton(d)) for d in documents],
+        "its summary": lambda: [encode(without_prose(d)) for d in documents],
         "modules that scripts import": modules,
         "draw": draws,
         "settle, facts and links": lambda: [record(d, course.base_url) for d in drafts],

@@ -280,7 +280,7 @@ class OutputFile(Struct, frozen=True):
     data: bytes
 
 
-class KeptFile(Struct, frozen=True):
+class CachedFile(Struct, frozen=True):
     """A file of the site that need not be made where it was published under the same key before."""
 
     path: str
@@ -291,7 +291,7 @@ class KeptFile(Struct, frozen=True):
     """Gives its bytes; called at most once, and not at all where the published file is whole."""
 
 
-SiteFile: TypeAlias = OutputFile | KeptFile
+SiteFile: TypeAlias = OutputFile | CachedFile
 
 
 class FileFacts(Struct, frozen=True):

@@ -320,4 +320,4 @@ class Document(Struct, frozen=True, dict=True):
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
     lexicon: Lexicon | None = None
-    """Only of a skeleton, which does not have what it was taken from."""
+    """Only of a summary, which does not have what it was taken from."""

@@ -1,7 +1,7 @@
 """What a document adds to the glossary and to the index of symbols, and its formulas by their ids.
 
 Entry point: `Lexicon`. It is made where the formulas of a document are typeset, and goes with the
-document's skeleton.
+document's summary.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ course's root and options, tells a `Progress` what it does, and gives what it fo
 a `Report`.
 
 1. `options`, `progress`: what every command needs
-2. `load`: disk → course, by `documents` (with `reading`, `requests`, `outlines`, `together`), which
+2. `load`: disk → course, by `documents` (with `reading`, `tasks`), which
    parses only what nobody has parsed
 3. `verify`: course → results, by `remember` and `remember_models`, which give what is known;
    `shards` leaves out the parts of other machines. `labs` (with `beside`, `lab_inputs`,

@@ -1,9 +1,9 @@
 """The documents of a course from what is kept, and by work spread over the cores where it is not.
 
-Entry point: `Documents`, a context manager, which gives outlines (`parse`) and draws pages
+Entry point: `Documents`, a context manager, which gives summaries (`parse`) and draws pages
 (`draw`).
 
-1. `ahead` is told which texts there are. The outlines of texts that were read before come from the
+1. `ahead` is told which texts there are. The summaries of texts that were read before come from the
    store; the others are read, in copies of this process where there are many.
 2. `draw` draws pages: each in the copy that has read its document, which has it still.
 """
@@ -22,9 +22,18 @@ from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
-from coursebuild.pipeline.faces import course_face
-from coursebuild.pipeline.outlines import Outline, Task
-from coursebuild.pipeline.requests import OUTLINES, Answer, Draw, Drawn, Later, Read, Request
+from coursebuild.pipeline.fingerprints import course_fingerprint
+from coursebuild.pipeline.tasks import (
+    SUMMARIES,
+    Answer,
+    DocumentSummary,
+    Draw,
+    Drawn,
+    Later,
+    Read,
+    Request,
+    Task,
+)
 from coursebuild.source import Source, key_of
 
 if TYPE_CHECKING:
@@ -46,7 +55,7 @@ _CHECKED = "checked"
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
 _AT_ONCE = 256
-"""Texts whose outlines are waited for before more are read."""
+"""Texts whose summaries are waited for before more are read."""
 
 
 class Documents:
@@ -68,8 +77,8 @@ class Documents:
         self._jobs = jobs
         self._following = following
         self._tasks: dict[str, Task] = {}
-        self._outlines: dict[str, Outline] = {}
-        self._face: tuple[Course, str | None] | None = None
+        self._summaries: dict[str, DocumentSummary] = {}
+        self._fingerprint: tuple[Course, str | None] | None = None
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
         self._reader: Reader | None = None
@@ -84,32 +93,32 @@ class Documents:
             self._reader.__exit__(*error)
 
     @property
-    def outlines(self) -> tuple[Outline, ...]:
+    def summaries(self) -> tuple[DocumentSummary, ...]:
         """All that are known."""
-        return tuple(self._outlines.values())
+        return tuple(self._summaries.values())
 
-    def face(self, course: Course) -> str | None:
-        """The face of a course whose documents these are (`faces`); `None` for any other."""
-        if self._face is None or self._face[0] is not course:
-            faces = ((outline.skeleton, outline.face) for outline in self._outlines.values())
-            self._face = course, course_face(course, faces)
-        return self._face[1]
+    def fingerprint(self, course: Course) -> str | None:
+        """That of a course whose documents these are; `None` for any other."""
+        if self._fingerprint is None or self._fingerprint[0] is not course:
+            known = ((summary.document, summary.fingerprint) for summary in self.summaries)
+            self._fingerprint = course, course_fingerprint(course, known)
+        return self._fingerprint[1]
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
-        """What `check_course` finds; nothing where it found nothing in a course of this face."""
+        """What `check_course` finds; nothing where it found nothing in one of this fingerprint."""
         key = hashlib.sha256(f"checked course\0{tool_digest()}".encode()).hexdigest()
-        face = (self.face(course) or "").encode()
-        if face and self._store.get(_CHECKED, key, local=True) == face:
+        state = (self.fingerprint(course) or "").encode()
+        if state and self._store.get(_CHECKED, key, local=True) == state:
             return ()
         from coursebuild.checks.course import check_course
 
         found = check_course(course)
-        if face and not found:
-            self._store.put(_CHECKED, key, face, local=True)
+        if state and not found:
+            self._store.put(_CHECKED, key, state, local=True)
         return found
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
-        """Have the outlines of sources, of which it is said which are lessons."""
+        """Have the summaries of sources, of which it is said which are lessons."""
         tasks = [Task.of(source, callouts, lesson) for source, lesson in sources]
         self._tasks.update((task.source.path, task) for task in tasks)
         missing = [task for task in tasks if not self._has(task)]
@@ -122,19 +131,19 @@ class Documents:
             self._read(at_once)
 
     def _has(self, task: Task) -> bool:
-        """Whether the outline of a text is in the store."""
-        data = self._store.get(OUTLINES, task.key, local=True)
-        outline = decode(data, Outline, task.source)
-        if outline is not None:
-            self._outlines[task.source.path] = outline
-        return outline is not None
+        """Whether the summary of a text is in the store."""
+        data = self._store.get(SUMMARIES, task.key, local=True)
+        summary = decode(data, DocumentSummary, task.source)
+        if summary is not None:
+            self._summaries[task.source.path] = summary
+        return summary is not None
 
     def _read(self, tasks: Sequence[Task]) -> None:
         answers, readers = self._work("reading lessons and pages", self._requests(tasks))
         for task, data, reader in zip(tasks, answers, readers, strict=True):
-            outline = decode(data, Outline, task.source)
-            assert outline is not None
-            self._outlines[task.source.path] = outline
+            summary = decode(data, DocumentSummary, task.source)
+            assert summary is not None
+            self._summaries[task.source.path] = summary
             if reader is not None:
                 self._readers[task.source.path] = reader
 
@@ -146,12 +155,12 @@ class Documents:
             self._following = ()
 
     def parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
-        """The skeleton of a document, and what is wrong in it."""
+        """A document without its prose, and what is wrong in it."""
         known = self._tasks.get(source.path)
         if known is None or not known.is_of(source, callouts, lesson):
             self.ahead([(source, lesson)], callouts)
-        outline = self._outlines[source.path]
-        return Parsed(outline.skeleton, outline.diagnostics)
+        summary = self._summaries[source.path]
+        return Parsed(summary.document, summary.diagnostics)
 
     def course_map(self, source: Source) -> Parsed[Course | None]:
         """The course that a map describes, and what is wrong in it."""

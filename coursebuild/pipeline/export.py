@@ -41,8 +41,8 @@ from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import page_key
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.requests import ITEMS, Ask, Draw, Later
 from coursebuild.pipeline.site import Site, site_files
+from coursebuild.pipeline.tasks import ITEMS, Ask, Draw, Later
 from coursebuild.render import urls
 from coursebuild.render.assets import Assets
 from coursebuild.render.exports import book, epub
@@ -52,7 +52,7 @@ from coursebuild.render.packages import qti, scorm
 from coursebuild.render.packages.items import Loss, MadeQuiz
 from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.report import Report
-from coursebuild.results import KeptFile, OutputFile, Results, SiteFile
+from coursebuild.results import CachedFile, OutputFile, Results, SiteFile
 from coursebuild.source import Source
 
 Kind: TypeAlias = Literal["epub", "page", "qti", "scorm"]
@@ -146,7 +146,7 @@ def _scorm(library: Library, assets: Assets, site: Site) -> Iterator[SiteFile]:
     yield from shared
     for entry in scorm.written(course):
         make = functools.partial(scorm.launch_page, course, entry, library.tools)
-        yield KeptFile(scorm.launch_path(entry), "", make)
+        yield CachedFile(scorm.launch_path(entry), "", make)
     yield scorm.manifest(course, sorted(file.path for file in (*packed, *shared)))
 
 
@@ -190,8 +190,8 @@ class _Items:
             yield qti.style_file()
             yield qti.manifest(self._library.course, listed)
 
-    def _later(self, asked: _Asked, kept: bytes, path: str) -> KeptFile:
-        return KeptFile(path, asked.key, functools.partial(self._file, asked.source, kept, path))
+    def _later(self, asked: _Asked, kept: bytes, path: str) -> CachedFile:
+        return CachedFile(path, asked.key, functools.partial(self._file, asked.source, kept, path))
 
     def _file(self, source: Source, kept: bytes, path: str) -> bytes:
         if self._last is None or self._last[0] is not kept:

@@ -4,10 +4,10 @@ Entry point: `Pages`.
 
 1. Every page has a sheet, all that it shows of the course, and a key: a hash of its sheet, of its
    document's text, and of the tool.
-   Where nothing has changed of what sheets are made of, the key is known without (`page_keys`).
+   Where nothing has changed of what sheets are made of, the key is known without (`page_index`).
 2. The records of pages come from the store; a page that has none is drawn.
 3. From records alone it is known whether all links lead somewhere, and which characters and
-   styles the pages use (`page_facts`).
+   styles the pages use (`page_index`).
 4. A body is fetched, and framed, when its file is written.
 
 Of a page no more is held than its key and how its sheet is made: a course may have any number.
@@ -29,12 +29,9 @@ from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.faces import results_face
-from coursebuild.pipeline.outlines import Task
-from coursebuild.pipeline.page_facts import Facts
-from coursebuild.pipeline.page_keys import PageKeys
-from coursebuild.pipeline.records import KeptPage
-from coursebuild.pipeline.requests import BYPRODUCTS, PAGES, Draw, Later
+from coursebuild.pipeline.fingerprints import results_fingerprint
+from coursebuild.pipeline.page_index import Facts, PageKeys
+from coursebuild.pipeline.tasks import BYPRODUCTS, PAGES, Draw, KeptPage, Later, Task
 from coursebuild.render.frame import Frames, Names
 from coursebuild.render.library import Library
 from coursebuild.render.links import has
@@ -43,7 +40,7 @@ from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.files import Entry
 from coursebuild.render.shared import PageFacts
-from coursebuild.results import KeptFile
+from coursebuild.results import CachedFile
 from coursebuild.source import key_of
 
 if TYPE_CHECKING:
@@ -130,14 +127,14 @@ class Pages:
                     return False
         return True
 
-    def files(self, names: Names) -> Iterator[KeptFile]:
+    def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
         frame = hashlib.sha256(self._frame(names).encode()).hexdigest()
         frames = Frames(self._library, names)
         for page in self._pages:
             key = hashlib.sha256(f"{page.wanted.key}{frame}".encode()).hexdigest()
             make = functools.partial(self._framed, page.wanted, frames)
-            yield KeptFile(page.wanted.path, key, make)
+            yield CachedFile(page.wanted.path, key, make)
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -170,10 +167,10 @@ class Pages:
 
     def _around(self) -> str | None:
         """A hash of all that sheets are made of, but for documents; `None` where it has none."""
-        course = self._documents.face(self._library.course)
+        course = self._documents.fingerprint(self._library.course)
         if course is None:
             return None
-        results = results_face(self._library.results, self._library.reports)
+        results = results_fingerprint(self._library.results, self._library.reports)
         return hashlib.sha256(f"{course}{results}".encode()).hexdigest()
 
     def _wanted(self, page: PageEntry, keys: PageKeys) -> _Wanted:
@@ -223,7 +220,7 @@ class Pages:
     def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> list[_Page]:
         """The pages with what their records say; they are drawn where they have none."""
         pages: list[_Wanted] = []
-        records: dict[str, PageRecord] = {}
+        tasks: dict[str, PageRecord] = {}
         new: list[_Wanted] = []
 
         def missing() -> Iterator[Later]:  # sheets are made while pages are drawn
@@ -236,15 +233,15 @@ class Pages:
                     yield self._later(page)
                 else:
                     self._sheets.pop(page.path, None)
-                    records[page.path] = record
+                    tasks[page.path] = record
 
         for page, data in zip(new, self._documents.draw(missing()), strict=True):
             record = decode(data, PageRecord)
             assert record is not None
-            records[page.path] = record
+            tasks[page.path] = record
         self.drawn = tuple(page.path for page in new)
         """Site paths of the pages that were drawn just now."""
-        return [self._noted(page, records[page.path]) for page in pages]
+        return [self._noted(page, tasks[page.path]) for page in pages]
 
     def _later(self, page: _Wanted) -> Later:
         return Later(page.document, functools.partial(self._request, page))

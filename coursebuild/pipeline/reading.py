@@ -2,7 +2,7 @@
 
 Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
 
-1. `Read`: the text is parsed and its formulas are typeset; the outline is kept in the store.
+1. `Read`: the text is parsed and its formulas are typeset; the summary is kept in the store.
 2. `Draw`: a page is drawn from its sheet and its document; body and record are kept in the store.
 3. The document and its formulas stay for the drawing. Those that an earlier build has read, or
    another process, are parsed again, and their MathML comes from the store.
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import gc
 import importlib
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self, assert_never
 
@@ -32,22 +31,23 @@ from coursebuild.effects.resources import template_texts
 from coursebuild.effects.tool import tool_digest, typesetter_digest
 from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
-from coursebuild.model.skeleton import skeleton
-from coursebuild.pipeline.faces import outline_face
-from coursebuild.pipeline.outlines import Outline, Task
-from coursebuild.pipeline.records import KeptPage
-from coursebuild.pipeline.requests import (
+from coursebuild.model.summary import without_prose
+from coursebuild.pipeline.fingerprints import document_fingerprint
+from coursebuild.pipeline.tasks import (
     BYPRODUCTS,
     ITEMS,
-    OUTLINES,
     PAGES,
+    SUMMARIES,
     Answer,
     Ask,
+    DocumentSummary,
     Draw,
     Drawn,
+    KeptPage,
     Later,
     Read,
     Request,
+    Task,
 )
 from coursebuild.render.assets import strings_for
 from coursebuild.render.lookup.lexicon import lexicon, misdeclared
@@ -153,30 +153,30 @@ class Reader:
 
     # --- reading
 
-    def outline(self, task: Task) -> Outline:
-        """The outline of a text, read now."""
-        return self._outline(self._whole(task))
+    def summary(self, task: Task) -> DocumentSummary:
+        """The summary of a text, read now."""
+        return self._summary(self._whole(task))
 
-    def _outline(self, whole: _Whole) -> Outline:
+    def _summary(self, whole: _Whole) -> DocumentSummary:
         found = formula_findings(whole.document, whole.formulas)
         told = misdeclared(whole.document, whole.formulas)
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
-        bones = skeleton(whole.document)
-        bones = replace(bones, lexicon=lexicon(whole.document, whole.formulas))
-        return Outline(
-            skeleton=bones,
+        bare = without_prose(whole.document)
+        bare = replace(bare, lexicon=lexicon(whole.document, whole.formulas))
+        return DocumentSummary(
+            document=bare,
             diagnostics=(*whole.diagnostics, *found, *told),
             imports=tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts),
             lasting=not found,
-            face=outline_face(bones),
+            fingerprint=document_fingerprint(bare),
         )
 
     def _read(self, task: Task) -> bytes:
         whole = self._whole(task)
-        outline = self._outline(whole)
-        data = encode(outline)
-        if outline.lasting:  # that a formula took too long may not happen again
-            self._store.put(OUTLINES, task.key, data, local=True)
+        summary = self._summary(whole)
+        data = encode(summary)
+        if summary.lasting:  # that a formula took too long may not happen again
+            self._store.put(SUMMARIES, task.key, data, local=True)
         size = len(task.source.text)
         if size <= self._room:
             self._waiting[task.key] = whole

@@ -32,8 +32,8 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.kept import kept_font
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.outlines import all_imports
 from coursebuild.pipeline.pages import Pages
+from coursebuild.pipeline.tasks import all_imports
 from coursebuild.render import meta, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.compressed import COPIES, compressed_files, kept_copy
@@ -43,7 +43,7 @@ from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.sheet import search_words
 from coursebuild.render.shared import PageFacts, common_characters
-from coursebuild.results import FileList, KeptFile, OutputFile, Results, SiteFile
+from coursebuild.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
@@ -68,7 +68,7 @@ class Site(Struct, frozen=True):
 def site_files(
     course: Course, results: Results, documents: Documents, options: Options, reports: Reports
 ) -> Site:
-    """The site of a course whose documents are skeletons; `reports` are those that it shows."""
+    """The site of a course whose documents are summaries; `reports` are those that it shows."""
     return _Site(course, results, documents, options, reports).made()
 
 
@@ -123,13 +123,13 @@ class _Site:
         key = key_of(tool_digest(), *("\0".join(sorted(part)) for part in parts))
         data = _Data(self.store, key, functools.partial(self._make_shared, facts))
         names, paths = data.listing()
-        files = [KeptFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
+        files = [CachedFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
         # Those of the style sheet, which is another in every course, are made where files are made
         # at the same time. They are smaller in any case: most of it is the same everywhere.
         for suffix in COPIES:
             path = f"{names.style}.{suffix}"
             make = functools.partial(self._copy, data, names.style, suffix)
-            files.append(KeptFile(path, key_of(data.key, path), make))
+            files.append(CachedFile(path, key_of(data.key, path), make))
         return names, [*files]
 
     def _make_shared(self, facts: PageFacts) -> tuple[Names, dict[str, bytes]]:
@@ -169,7 +169,7 @@ class _Site:
     def _downloads(self) -> Iterator[SiteFile]:
         """Scripts, models, archives, and files of the course."""
         for path, (script, _) in self.library.scripts.items():
-            yield KeptFile(path, script.code.digest.hex(), functools.partial(self._script, path))
+            yield CachedFile(path, script.code.digest.hex(), functools.partial(self._script, path))
         for model in self.course.models:
             path = urls.model_file_path(model.name)
             yield OutputFile(path, model.source.text.encode())
@@ -188,7 +188,7 @@ class _Site:
             if archive is not None:
                 key = key_of(tool_digest(), archive.key)
                 self._packed[archive.path] = key, make
-                yield KeptFile(archive.path, key, functools.partial(_packed, make))
+                yield CachedFile(archive.path, key, functools.partial(_packed, make))
 
     def _course_files(self) -> Iterator[SiteFile]:
         digests = Digests(self.store)
@@ -198,14 +198,14 @@ class _Site:
             if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
                 digest = hashlib.sha256(read()).hexdigest()
             self._files[urls.file_path(path)] = digest, read
-            yield KeptFile(urls.file_path(path), digest, read)
+            yield CachedFile(urls.file_path(path), digest, read)
         digests.save()
 
     def _around(self) -> zips.Surroundings:
         """What scripts need around them."""
         if not self.library.scripts:
             return zips.Surroundings()
-        known = all_imports(self.documents.outlines)
+        known = all_imports(self.documents.summaries)
         by_text = {
             script.code.digest: known[path]
             for path, (script, _) in self.library.scripts.items()

@@ -8,7 +8,7 @@ Entry point: `verify(course, options, progress, lessons)`.
 4. Models and MJCF blocks are compiled in a child process, which is not started for a course that
    has none.
 
-Documents may be skeletons. Formulas are no part of this: see `pipeline.documents`.
+Documents may be summaries. Formulas are no part of this: see `pipeline.documents`.
 """
 
 from __future__ import annotations

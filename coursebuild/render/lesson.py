@@ -69,7 +69,7 @@ def lesson_link(
 
 
 def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
-    """What the page of a written lesson shows; its document's skeleton is enough."""
+    """What the page of a written lesson shows; its document's summary is enough."""
     place = urls.Place(urls.lesson_path(lesson))
     scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
     values = {

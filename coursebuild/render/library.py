@@ -170,7 +170,7 @@ class Library(Struct, frozen=True):
         )
 
     def lexicon(self, document: Document) -> Lexicon:
-        """What a document, or its skeleton, adds to the glossary and the like."""
+        """What a document, or its summary, adds to the glossary and the like."""
         return lexicon_of(document, self._formulas)
 
     @property
@@ -209,7 +209,7 @@ def owners(course: Course) -> tuple[Owner, ...]:
 
 
 def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) -> Lexicon:
-    """That of a skeleton, or made from a whole document and its formulas."""
+    """That of a summary, or made from a whole document and its formulas."""
     if document.lexicon is not None:
         return document.lexicon
     from coursebuild.render.lookup.lexicon import lexicon  # with all that it takes to draw

@@ -31,7 +31,7 @@ class PageEntry(Struct, frozen=True):
     kind: PageKind
 
     def sheet(self, library: Library) -> Sheet:
-        """What it shows; skeletons of documents are enough."""
+        """What it shows; summaries of documents are enough."""
         return self.kind.sheet(library, self.id)
 
     def document(self, library: Library) -> Document | None:

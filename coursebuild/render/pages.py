@@ -171,7 +171,7 @@ def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
 
 
 def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
-    """What a page that is no lesson shows; its document's skeleton is enough."""
+    """What a page that is no lesson shows; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
     return Sheet(
         place.path,

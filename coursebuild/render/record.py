@@ -13,7 +13,7 @@ from coursebuild.render import fonts
 from coursebuild.render.draft import Draft
 from coursebuild.render.frame import parts_of
 from coursebuild.render.links import Reference, references, without_lines
-from coursebuild.render.settling import settle
+from coursebuild.render.postprocess import postprocess_html
 from coursebuild.render.shared import PageFacts
 
 
@@ -46,7 +46,7 @@ class PageRecord(Struct, frozen=True):
 
 def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
     """The record of a page that was just drawn, and its body as it will be published."""
-    made = settle(str(draft.body))
+    made = postprocess_html(str(draft.body))
     found = PageRecord(
         draft=replace(draft, body=Markup()),
         parts=parts_of(made.html),

@@ -53,7 +53,7 @@ from coursebuild.results import Outcome, ScriptRun
 def shown(library: Library, place: urls.Place, document: Document) -> Shown:
     """All that the document's page shows besides what stands in the document.
 
-    The skeleton of a document does as well as the document.
+    The summary of a document does as well as the document.
     """
     page = _Page(library, place, document)
     for block in document_blocks(document):

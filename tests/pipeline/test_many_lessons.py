@@ -10,7 +10,7 @@ import pytest
 
 from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.progress import Progress
-from coursebuild.results import KeptFile, OutputFile
+from coursebuild.results import CachedFile, OutputFile
 from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.site
@@ -49,7 +49,7 @@ def peak(folder: Folder) -> int:
             assert prepared.report.ok, prepared.report.diagnostics
             for file in prepared.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
-                    assert isinstance(file, KeptFile)
+                    assert isinstance(file, CachedFile)
                     for _ in file.pieces() if file.pieces is not None else (file.make(),):
                         pass  # as it is written
         return tracemalloc.get_traced_memory()[1]

@@ -12,7 +12,7 @@ from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.page_keys import PageKeys
+from coursebuild.pipeline.page_index import PageKeys
 
 
 def test_keys_are_remembered(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from coursebuild.features.quiz.keys import text_key
 from coursebuild.model import Document
-from coursebuild.model.skeleton import skeleton
+from coursebuild.model.summary import without_prose
 from coursebuild.render.asked import asked, count
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
@@ -34,7 +34,7 @@ NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
 def test_the_questions_of_a_document() -> None:
     document = parsed("> [!note]\n> Text.\n\n" + TWO)
     assert asked(document) == NAMES
-    assert asked(skeleton(document)) == NAMES, "its skeleton is enough"
+    assert asked(without_prose(document)) == NAMES, "its skeleton is enough"
     assert asked(parsed("Text.")) == ""
 
 

@@ -12,7 +12,7 @@ from coursebuild.render.search import index
 from coursebuild.render.search.files import Entry, SearchFiles
 from coursebuild.render.search.index import Plan
 from coursebuild.render.search.words import is_fuzzy
-from coursebuild.results import KeptFile
+from coursebuild.results import CachedFile
 
 DIGITS = {digit: value for value, digit in enumerate(index._DIGIT)}
 
@@ -42,7 +42,7 @@ def course(pages: int, words: int = 40) -> dict[str, dict[str, int]]:
     }
 
 
-def made(terms: dict[str, dict[str, int]], shelf: Shelf) -> dict[str, KeptFile]:
+def made(terms: dict[str, dict[str, int]], shelf: Shelf) -> dict[str, CachedFile]:
     data = {
         path: "\n".join(f"{weight:x}{term}" for term, weight in sorted(found.items())).encode()
         for path, found in terms.items()
@@ -79,7 +79,7 @@ def decoded(data: bytes) -> dict[str, list[tuple[int, int]]]:
     return found
 
 
-def shards(files: dict[str, KeptFile]) -> dict[int, dict[str, list[tuple[int, int]]]]:
+def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, int]]]]:
     return {
         int(path.split("/")[-1].split(".")[0], 16): decoded(file.make())
         for path, file in files.items()

@@ -26,7 +26,7 @@ from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.effects.examples import write_examples
 from coursebuild.effects.locks import project_lock
 from coursebuild.effects.write import write_atomic
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import CachedFile, OutputFile, SiteFile
 
 CALLS = ("fsync", "rename", "replace", "link", "symlink", "unlink", "rmdir", "mkdir")
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
@@ -135,11 +135,11 @@ class PublishByRenames(Publish):
 class PublishAgain(Publish):
     """Publish a site that has most files of the old one, and of the one before it."""
 
-    same = tuple(KeptFile(f"a/{k}.html", "same", lambda: b"same") for k in range(5))
+    same = tuple(CachedFile(f"a/{k}.html", "same", lambda: b"same") for k in range(5))
 
     def site(self, text: str) -> list[SiteFile]:
         changed = text.encode() * 50
-        own = [KeptFile(n, text, lambda: changed) for n in ("b.html", "c/d.html")]
+        own = [CachedFile(n, text, lambda: changed) for n in ("b.html", "c/d.html")]
         return [*self.same, *own]
 
     def prepare(self, root: Path) -> None:
@@ -154,7 +154,7 @@ class PublishAgain(Publish):
             publish(root, root / "public", self.site("new"))
 
     def as_tree(self, text: str) -> dict[str, bytes]:
-        return {f.path: f.make() for f in self.site(text) if isinstance(f, KeptFile)}
+        return {f.path: f.make() for f in self.site(text) if isinstance(f, CachedFile)}
 
     def whole(self, root: Path) -> None:
         assert tree(root / "public") in (self.as_tree("old"), self.as_tree("new"))

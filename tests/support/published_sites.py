@@ -9,7 +9,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.results import KeptFile, SiteFile
+from coursebuild.results import CachedFile, SiteFile
 
 SPARE = ".coursebuild/published/spare"
 
@@ -24,12 +24,12 @@ class Pages:
         """Files `a/b/c.html` are called `a__b__c`."""
         return [self.one(name.replace("__", "/") + ".html", key) for name, key in keys.items()]
 
-    def one(self, path: str, key: str) -> KeptFile:
+    def one(self, path: str, key: str) -> CachedFile:
         def make() -> bytes:
             self.made.append(path)
             return f"{path} {key}".encode()
 
-        return KeptFile(path, key, make)
+        return CachedFile(path, key, make)
 
 
 def texts(folder: Path) -> dict[str, str]:

@@ -30,7 +30,6 @@ from coursebuild.model import Course, Document, Lesson
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import Loaded, load
-from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.preview.differences import (
     changed_questions,
     changed_references,
@@ -48,6 +47,7 @@ from coursebuild.pipeline.preview.pages import Drawn, Pages, site_paths
 from coursebuild.pipeline.preview.parts import Parts, Ran
 from coursebuild.pipeline.preview.plan import Plan
 from coursebuild.pipeline.shown_reports import shown_reports
+from coursebuild.pipeline.tasks import Task
 from coursebuild.render import fonts, urls, zips
 from coursebuild.render.assets import Assets
 from coursebuild.render.library import Library, Owner, owners

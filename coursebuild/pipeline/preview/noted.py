@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.values import encode
-from coursebuild.pipeline.outlines import Task
 from coursebuild.pipeline.pages import text_page_key
-from coursebuild.pipeline.records import KeptPage
-from coursebuild.pipeline.requests import PAGES
+from coursebuild.pipeline.tasks import PAGES, KeptPage, Task
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import PageEntry
 from coursebuild.render.shared import PageFacts

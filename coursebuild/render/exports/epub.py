@@ -31,7 +31,7 @@ from coursebuild.render.direction import direction
 from coursebuild.render.exports.rewrite import Rules
 from coursebuild.render.exports.whole_course import WholeCourse
 from coursebuild.render.html_tree import to_xml
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import CachedFile, OutputFile, SiteFile
 
 PACKAGE = "EPUB/package.opf"
 _MODIFIED = "2000-01-01T00:00:00Z"
@@ -107,7 +107,7 @@ class _Epub:
                 yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
         for path, name in self._pictures.items():
             items.append(EpubItem(f"i-{xml_id(name)}", name, _TYPES[_ending(path)]))
-            yield KeptFile(f"EPUB/{name}", "", self._course.files[path])
+            yield CachedFile(f"EPUB/{name}", "", self._course.files[path])
         yield OutputFile(PACKAGE, self._package(items))
 
     # --- pages

@@ -27,7 +27,7 @@ from coursebuild.render.exports.notebook_file import finished
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
 from coursebuild.render.sheet import Sheet
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import CachedFile, OutputFile, SiteFile
 from coursebuild.source import key_of
 
 Archives: TypeAlias = Mapping[str, tuple[str, Callable[[], zips.Archive | None]]]
@@ -108,7 +108,7 @@ class Exports:
         for page in self._source.paths:
             path = urls.markdown_path(page)
             if path is not None and path not in self._context.taken:
-                yield KeptFile(path, self._source.key(page), partial(self._markdown, page))
+                yield CachedFile(path, self._source.key(page), partial(self._markdown, page))
         yield OutputFile(LLMS, llms(self._library))
         for lesson in self._library.order:
             if lesson.document is not None:
@@ -117,10 +117,10 @@ class Exports:
     def _markdown(self, page: str) -> bytes:
         return visible(self._source.byproducts(page).markdown).encode()
 
-    def _notebook(self, lesson: Lesson) -> KeptFile:
+    def _notebook(self, lesson: Lesson) -> CachedFile:
         key, _ = self._context.archives.get(urls.lesson_zip_path(lesson), ("", None))
         key = key_of("notebook", self._source.key(urls.lesson_path(lesson)), key)
-        return KeptFile(urls.notebook_path(lesson), key, partial(self._notebook_file, lesson))
+        return CachedFile(urls.notebook_path(lesson), key, partial(self._notebook_file, lesson))
 
     def _notebook_file(self, lesson: Lesson) -> bytes:
         made = self._source.byproducts(urls.lesson_path(lesson)).notebook

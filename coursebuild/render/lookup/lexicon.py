@@ -206,7 +206,7 @@ def _formulas_in(block: Block) -> Iterator[Math | MathBlock]:
 def misdeclared(document: Document, formulas: Formulas) -> tuple[Diagnostic, ...]:
     """Declarations of what is no symbol, and those of one symbol with two meanings."""
     if document.lexicon is not None or "${" not in document.source.text:
-        return ()  # of a skeleton it was told where the whole was
+        return ()  # of a summary it was told where the whole was
     found: list[Diagnostic] = []
     first: dict[str, Math] = {}
     for block in document_blocks(document):

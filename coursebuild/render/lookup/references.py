@@ -153,7 +153,7 @@ def _note_symbols(rows: dict[str, _Row], owner: Owner, lexicon: Lexicon) -> None
 
 
 def mentions(document: Document, course: Course, lexicon: Lexicon) -> Mentions:
-    """What a document says; its skeleton does as well."""
+    """What a document says; its summary does as well."""
     lessons: set[str] = set()
     terms: set[str] = set()
     path = document.source.path

@@ -22,7 +22,7 @@ from coursebuild.render.compressed import COPIES, copy_of
 from coursebuild.render.search import index
 from coursebuild.render.search.index import DIGEST, Cells, Numbers, Plan
 from coursebuild.render.search.page import call
-from coursebuild.results import KeptFile
+from coursebuild.results import CachedFile
 
 FOLDER = "assets/search"
 _QUALITY = 5
@@ -93,7 +93,7 @@ class SearchFiles:
         order = hashlib.sha256("\n".join(entry.path for entry in entries).encode()).hexdigest()
         self._names = tuple(index.names(self._plan, digests, order))
 
-    def files(self) -> Iterator[KeptFile]:
+    def files(self) -> Iterator[CachedFile]:
         """All of them, with smaller copies of the index but not of the pages' texts."""
         listing = self._listing()
         key = hashlib.sha256(listing).hexdigest()
@@ -104,7 +104,7 @@ class SearchFiles:
             path = f"{FOLDER}/{number:04x}.{name}.js"
             yield from _copied(path, key, make)
         for entry in self._entries:
-            yield KeptFile(
+            yield CachedFile(
                 f"{FOLDER}/{entry.file}.js",
                 f"search-{index.FORMAT}-{entry.digest}",
                 functools.partial(self._text, entry.path),
@@ -182,12 +182,12 @@ class SearchFiles:
         return hashlib.sha256("\n".join(said).encode()).hexdigest()
 
 
-def _copied(path: str, key: str, make: Callable[[], bytes]) -> Iterator[KeptFile]:
+def _copied(path: str, key: str, make: Callable[[], bytes]) -> Iterator[CachedFile]:
     """A file and its copies, which are there whether or not they are smaller: nobody knows yet."""
-    yield KeptFile(path, key, make)
+    yield CachedFile(path, key, make)
     for suffix in COPIES:
         copy = functools.partial(_copy, make, suffix)
-        yield KeptFile(f"{path}.{suffix}", f"{key}-{suffix}", copy)
+        yield CachedFile(f"{path}.{suffix}", f"{key}-{suffix}", copy)
 
 
 def _copy(make: Callable[[], bytes], suffix: str) -> bytes:

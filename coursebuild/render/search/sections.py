@@ -69,7 +69,7 @@ def document_sections(
     """The sections of a document.
 
     Args:
-        document: with its prose, not its skeleton.
+        document: with its prose, not its summary.
         lead: paragraphs that stand above the document on its page.
         labels: of the kinds of callouts, by name.
         measured: what the reports that it shows are about, by their offset.

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import root as root
 from support.published_sites import texts
 
@@ -24,7 +24,8 @@ class Pages:
 
     def __call__(self, **keys: str) -> list[SiteFile]:
         return [
-            KeptFile(f"{path}/index.html", key, self._make(path, key)) for path, key in keys.items()
+            CachedFile(f"{path}/index.html", key, self._make(path, key))
+            for path, key in keys.items()
         ]
 
     def _make(self, path: str, key: str) -> Callable[[], bytes]:
@@ -229,7 +230,7 @@ def test_a_failure_while_a_page_is_made_leaves_the_old_site(root: Path, pages: P
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        publish(root, root / "public", [*pages(a="1"), KeptFile("b/index.html", "2", broken)])
+        publish(root, root / "public", [*pages(a="1"), CachedFile("b/index.html", "2", broken)])
     assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 1"}
     assert publish(root, root / "public", pages(a="1", b="1")) == ()
 

@@ -15,7 +15,7 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from coursebuild.effects import locks
 from coursebuild.effects.errors import EffectError
-from coursebuild.results import KeptFile, OutputFile, SiteFile
+from coursebuild.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
 from support.published_sites import links as links
 from support.published_sites import pages as pages
@@ -105,7 +105,7 @@ def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "2", broken)])
+        publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", broken)])
     assert texts(spared / "public") == TEXTS
     assert beside(spared) == ["public"]
     assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
@@ -123,10 +123,10 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
 
     pages = Pages()
     with pytest.raises(EffectError, match="somebody else changes what is being written"):
-        publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "1", make)])
+        publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "1", make)])
     assert texts(spared / "public") == TEXTS
     assert beside(spared) == ["public"]
-    publish(spared, spared / "public", [*pages(**MANY), KeptFile("x.html", "2", lambda: b"new")])
+    publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", lambda: b"new")])
     assert texts(spared / "public") == TEXTS | {"x.html": "new"}
 
 
@@ -157,8 +157,8 @@ def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others
 
     def files(last: bytes) -> list[SiteFile]:
         found: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
-        found += [KeptFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]  # type: ignore[misc]
-        found += [KeptFile(f"died {n}", "k", die) for n in range(2)]
+        found += [CachedFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]  # type: ignore[misc]
+        found += [CachedFile(f"died {n}", "k", die) for n in range(2)]
         return [*found, OutputFile("last", last)]
 
     for jobs in (1, 3):
@@ -170,7 +170,7 @@ def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others
     def full() -> bytes:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    more: list[SiteFile] = [KeptFile(f"c/{n}", "k", full) for n in range(150)]
+    more: list[SiteFile] = [CachedFile(f"c/{n}", "k", full) for n in range(150)]
     with pytest.raises(EffectError, match="no space left"):
         publish(tmp_path / "3", tmp_path / "3/public", [*files(b"z"), *more], jobs=3)
     assert (tmp_path / "3/public/last").read_bytes() == b"y"

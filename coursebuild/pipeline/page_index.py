@@ -1,6 +1,6 @@
-"""Keys of pages without their sheets, where nothing that a sheet is made of has changed.
+"""What a build knows of all pages together: the keys of the build before, and what pages say.
 
-Entry point: `PageKeys`.
+Entry points: `PageKeys`, of pages without their sheets; `Facts`.
 
 A sheet is made of the course as it looks to others, of what running it found, and of the page's
 own document. So a page has the key of before where all three are those of before, and no sheet is
@@ -10,15 +10,19 @@ needed to know it.
 from __future__ import annotations
 
 import hashlib
+import sys
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.tool import tool_digest
+from coursebuild.render.links import has
+from coursebuild.render.record import PageRecord
+from coursebuild.render.shared import PageFacts
 
 _KIND = "keys"
 
 
 class PageKeys:
-    """See the module; those of the last build are kept, and no others."""
+    """Those of the last build are kept, and no others."""
 
     def __init__(self, store: Memo, around: str | None) -> None:
         """`around`: a hash of all that sheets are made of besides documents, where it is known."""
@@ -65,3 +69,41 @@ def _row(path: str, document: str) -> str:
     """A name for a page and its document that takes little memory: there is one for each page."""
     text = f"{document} {path}".encode("utf-8", "surrogatepass")
     return hashlib.blake2b(text, digest_size=16).hexdigest()
+
+
+class Facts:
+    """What is known of pages together."""
+
+    def __init__(self) -> None:
+        self._text: set[str] = set()
+        self._mathematics: set[str] = set()
+        self._declarations: set[str] = set()
+        self.sound = True
+        """Whether every page has the anchors that it leads to itself."""
+        self.leads: dict[str, str] = {}
+        """Site paths that pages lead to, each by itself, so that none is held twice."""
+        self.anchors: set[tuple[str, str]] = set()
+        """Anchors that pages lead to on others, each after the site path of its page."""
+
+    def add(self, record: PageRecord) -> None:
+        """Note what a page shows and where it leads."""
+        self._text.update(record.text)
+        self._mathematics.update(record.mathematics)
+        self._declarations.update(record.declarations)
+        own = {"", "top", *record.ids}
+        for path, anchor in record.references:
+            if path == record.draft.path:
+                self.sound = self.sound and has(own, anchor)
+            else:
+                self._lead(path, anchor)
+
+    def _lead(self, path: str, anchor: str) -> None:
+        path = self.leads.setdefault(path, path)
+        if anchor not in ("", "top"):
+            self.anchors.add((path, sys.intern(anchor)))
+
+    def together(self) -> PageFacts:
+        """What the shared files must know."""
+        return PageFacts(
+            frozenset(self._text), frozenset(self._mathematics), frozenset(self._declarations)
+        )

@@ -1,6 +1,6 @@
 """What of a document, a course or its results can be seen from elsewhere, without its places.
 
-Entry points: `outline_face`, of one document; `course_face`; `results_face`. Each is a hash.
+Entry points: `document_fingerprint`, `course_fingerprint`, `results_fingerprint`; each is a hash.
 
 A sentence that is added moves all that follows it, and nothing else in the course: no page but the
 document's own shows where in its file something stands. So a value is hashed with its spans left
@@ -36,15 +36,15 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
 """What can be seen of places from elsewhere."""
 
 
-def outline_face(skeleton: Document) -> str:
-    """The face of a document, by its skeleton."""
-    raw = tuple(_raw(skeleton))
-    return fingerprint((skeleton.blocks, skeleton.footnotes, skeleton.lexicon, raw), _SHOWN)
+def document_fingerprint(document: Document) -> str:
+    """That of a document, by its summary."""
+    raw = tuple(_raw(document))
+    return fingerprint((document.blocks, document.footnotes, document.lexicon, raw), _SHOWN)
 
 
-def _raw(skeleton: Document) -> Iterator[str]:
+def _raw(document: Document) -> Iterator[str]:
     """HTML as its author wrote it, in which links are looked for: its span is where the text is."""
-    for block in document_blocks(skeleton):
+    for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
             yield block.span.text
         for inline in walk_inlines(block_inlines(block)):
@@ -52,9 +52,9 @@ def _raw(skeleton: Document) -> Iterator[str]:
                 yield inline.span.text
 
 
-def course_face(course: Course, documents: Iterable[tuple[Document, str]]) -> str | None:
-    """The face of a course, given those of its documents; `None` where one of them is missing."""
-    known = {id(document): face for document, face in documents}
+def course_fingerprint(course: Course, documents: Iterable[tuple[Document, str]]) -> str | None:
+    """That of a course, given those of its documents; `None` where one of them is missing."""
+    known = {id(document): found for document, found in documents}
     if not all(known.get(id(document)) for document in course.documents):
         return None
 
@@ -64,8 +64,8 @@ def course_face(course: Course, documents: Iterable[tuple[Document, str]]) -> st
     return fingerprint((tool_digest(), course), {**_SHOWN, Document: shown})
 
 
-def results_face(results: Results, reports: Reports) -> str:
-    """The face of what was found, without how long it took and what nothing is made from."""
+def results_fingerprint(results: Results, reports: Reports) -> str:
+    """That of what was found, without how long it took and what nothing is made from."""
     runs = tuple((r.path, r.outcome, r.status, r.stdout, r.missing) for r in results.runs)
     verdicts = tuple(
         (v.recording.span.path, v.recording.script, v.status, v.comparison)

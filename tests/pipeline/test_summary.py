@@ -13,7 +13,7 @@ from coursebuild.checks.compiled import mjcf_texts
 from coursebuild.checks.course import check_course
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.quiz.checks import check_output_lines
-from coursebuild.features.quiz.model import OutputQuestion, Quiz
+from coursebuild.features.quiz.model import Quiz
 from coursebuild.model import (
     Course,
     Document,
@@ -25,8 +25,8 @@ from coursebuild.model import (
     document_blocks,
     document_has,
 )
-from coursebuild.model.skeleton import skeleton
-from coursebuild.pipeline.outlines import Outline
+from coursebuild.model.summary import without_prose
+from coursebuild.pipeline.tasks import DocumentSummary
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.lexicon import lexicon
 from coursebuild.render.shown import shown
@@ -38,7 +38,7 @@ from coursebuild.scripts.findings import script_findings
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
 from support.scratch_course import ROOT
-from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
+from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
 
 pytestmark = pytest.mark.site
 
@@ -48,7 +48,7 @@ FIXTURES = sorted((ROOT / "tests" / "fixtures").rglob("*.md")) + sorted(
 
 
 def courses(*texts: str) -> tuple[Course, Course]:
-    """A course of these lessons and the last as a page: whole, and of skeletons."""
+    """A course of these lessons and the last as a page: whole, and of summarys."""
     parsed = parse_course_map(Source("content/course.toml", MAP))
     assert parsed.value is not None
     whole = [document(f"content/{i}.md", text) for i, text in enumerate(texts)]
@@ -56,11 +56,11 @@ def courses(*texts: str) -> tuple[Course, Course]:
 
 
 def again(document: Document) -> Document:
-    """The skeleton as it comes from the store."""
-    bare = replace(skeleton(document), lexicon=lexicon(document, {}))
-    found = decode(encode(Outline(bare, (), (), True)), Outline, document.source)
+    """The summary as it comes from the store."""
+    bare = replace(without_prose(document), lexicon=lexicon(document, {}))
+    found = decode(encode(DocumentSummary(bare, (), (), True)), DocumentSummary, document.source)
     assert found is not None
-    return found.skeleton
+    return found.document
 
 
 def told(course: Course) -> list[object]:
@@ -80,7 +80,7 @@ def told(course: Course) -> list[object]:
         [(e.path, e.text, e.owner, e.script) for e in extracted.value],
         [(v.recording.span, v.recording.body, v.status, v.changes, v.diff) for v in verdicts],
         script_findings(course, extracted.value, runs, verdicts),
-        check_output_lines(course, runs),
+        list(check_output_lines(course, runs)),
         [(n, [(u.owner.id, u.by_lab, u.by_script) for u in us]) for n, us in library.uses.items()],
         said(library),
         [shown_or_not(library, here, document) for document in course.documents],
@@ -105,7 +105,7 @@ def shown_or_not(library: Library, here: Place, document: Document) -> object:
 
 @given(st.lists(st.lists(st.sampled_from(PARTS), max_size=6), min_size=1, max_size=2))
 @settings(max_examples=60)
-def test_a_skeleton_tells_what_the_document_tells(lessons: list[list[str]]) -> None:
+def test_a_summary_tells_what_the_document_tells(lessons: list[list[str]]) -> None:
     whole, bare = courses(*("".join(parts) for parts in lessons))
     assert told(whole) == told(bare)
 
@@ -121,19 +121,16 @@ def test_which_blocks_a_document_has(path: Path) -> None:
     for course in courses(path.read_text(encoding="utf-8"), "".join(PARTS)):
         for one in course.documents:
             blocks = tuple(document_blocks(one))
-            questions = [q for block in blocks if isinstance(block, Quiz) for q in block.questions]
             for kind in (Script, Lab, Mjcf, Quiz, Recording):
                 there = any(isinstance(block, kind) for block in blocks)
-                assert document_has(one, kind) == document_has(one, kind) == there
-            asks = any(isinstance(question, OutputQuestion) for question in questions)
-            assert document_has(one, OutputQuestion) == asks
+                assert document_has(one, kind) == there
 
 
-def test_prose_is_not_in_a_skeleton() -> None:
+def test_prose_is_not_in_a_summary() -> None:
     whole = document("content/a.md", "Only *prose*, `code` and $x$ here.\n\n- and\n- there\n")
-    assert list(document_blocks(skeleton(whole))) == [ThematicBreak(whole.blocks[0].span)]
+    assert list(document_blocks(without_prose(whole))) == [ThematicBreak(whole.blocks[0].span)]
 
 
-def test_of_nothing_to_read_there_is_no_skeleton() -> None:
+def test_of_nothing_to_read_there_is_no_summary() -> None:
     for text in ("", "\ufeff\n", "[a]: b\n"):
-        assert list(document_blocks(skeleton(document("content/a.md", text)))) == []
+        assert list(document_blocks(without_prose(document("content/a.md", text)))) == []

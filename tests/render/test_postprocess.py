@@ -10,9 +10,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
-from coursebuild.render import characters, formulas, settling
+from coursebuild.render import characters, formulas, postprocess
 from coursebuild.render.mathml import is_ours
-from coursebuild.render.settling import settle, settle_with
+from coursebuild.render.postprocess import postprocess_html, postprocess_parts
 
 FORMULAS = (
     *("<math><mi>x</mi></math>", '<math display="block"><mi>α</mi></math>'),
@@ -46,17 +46,17 @@ PAGES = st.lists(st.sampled_from((*FORMULAS, *BROKEN, *TEXTS, *TAGS)), max_size=
 @example("</ <math></math>b title='<'>")
 @example('</ style="no"')
 def test_a_page_is_settled_as_by_looking_closely(html: str) -> None:
-    assert settle(html) == settling._closely(html)
+    assert postprocess_html(html) == postprocess._closely(html)
 
 
 @given(PAGES)
 @example("a <math><mi>x</mi></math>, b")
 def test_html_of_templates_is_settled_as_any_text(html: str) -> None:
     """What is put into `Markup` would be escaped."""
-    made = settle(Markup(html))
-    assert made == settle(html)
+    made = postprocess_html(Markup(html))
+    assert made == postprocess_html(html)
     assert type(made.html) is str
-    assert settle_with(Markup(html), Markup(html)) == settle_with(html, html)
+    assert postprocess_parts(Markup(html), Markup(html)) == postprocess_parts(html, html)
 
 
 @given(PAGES, PAGES, PAGES)
@@ -64,15 +64,15 @@ def test_html_of_templates_is_settled_as_any_text(html: str) -> None:
 @example("<math><mi>x</mi></math>", "<p>", ",<math><mi>x</mi></math>")
 def test_a_part_is_settled_with_its_page(before: str, part: str, after: str) -> None:
     html = before + part + after
-    made, woven = settle_with(html, part)
-    assert (made, woven.html) == (settle(html), settle(part).html)
+    made, woven = postprocess_parts(html, part)
+    assert (made, woven.html) == (postprocess_html(html), postprocess_html(part).html)
     assert len(woven.texts) == len(woven.formulas) + 1
     assert all(map(is_ours, woven.formulas))
 
 
 @given(st.text() | st.text(alphabet="<>/=\"' bidstyle-!&;#\n\u00a0m", max_size=60))
 def test_any_text_is_settled(html: str) -> None:
-    assert settle(html) == settling._closely(html)
+    assert postprocess_html(html) == postprocess._closely(html)
 
 
 @given(st.lists(st.sampled_from((*FORMULAS, *TEXTS)), max_size=14).map("".join))
@@ -92,14 +92,14 @@ def test_formulas_are_glued_piece_by_piece_as_in_the_whole(html: str) -> None:
 
 @pytest.mark.parametrize("html", [*FORMULAS, *TAGS[:5], *TAGS[7:8], *TAGS[12:15], "é &lt;"])
 def test_such_pages_are_looked_at_once(html: str) -> None:
-    assert settling._quickly(f"<p>{html}</p>") is not None
+    assert postprocess._quickly(f"<p>{html}</p>") is not None
 
 
 def test_a_long_page_is_looked_through_once() -> None:
     """With something left to look at after the last thing that counts, at each place."""
     html = '<b title="x">a &gt; b</b> &amp; λ' * 40_000
-    assert settling._quickly(html) is not None
-    assert settling._quickly(html + "<") is None
+    assert postprocess._quickly(html) is not None
+    assert postprocess._quickly(html + "<") is None
 
 
 def test_classes_that_say_what_is_forbidden_say_what_is_allowed() -> None:
@@ -110,8 +110,8 @@ def test_classes_that_say_what_is_forbidden_say_what_is_allowed() -> None:
         return "".join(found)
 
     allowed = re.findall(f"[{wide}]", every)
-    assert of(settling._ALLOWED.findall(every)) == of(allowed)
+    assert of(postprocess._ALLOWED.findall(every)) == of(allowed)
     allowed = re.findall(f"[\t\n -~{wide}]", every)
     assert of(characters._ALLOWED.findall(every)) == of(allowed)
     allowed = re.findall(f"[\t\n -!#-;=?-~{wide}]", every)
-    assert of(re.findall(settling._TEXT, every)) == of(allowed)
+    assert of(re.findall(postprocess._TEXT, every)) == of(allowed)

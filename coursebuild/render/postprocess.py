@@ -1,6 +1,7 @@
 """The text of a page as it will be published, and what the rest of the site must know of it.
 
-Entry points: `settle(html)`; `settle_with(html, part)`, a page and its document's part of it.
+Entry points: `postprocess_html(html)`; `postprocess_parts(html, part)`, the same of a page and of
+its document's part of it.
 
 1. Formulas are set to what stands beside them (`formulas.glue`), styles in single elements become
    classes (`styles.hoist`), and forbidden characters are made visible (`characters.visible`).
@@ -32,7 +33,7 @@ _REMEMBERED = 256
 """Formulas: a page says the same ones again and again, the next one others."""
 
 
-class Settled(Struct, frozen=True):
+class ProcessedHtml(Struct, frozen=True):
     """See the module."""
 
     html: str
@@ -47,15 +48,15 @@ class Settled(Struct, frozen=True):
     """As they are written, but for character references."""
 
 
-def settle(html: str) -> Settled:
+def postprocess_html(html: str) -> ProcessedHtml:
     """A page that was just drawn, or a part of one that is whole elements."""
     html = str(html)  # `Markup` would escape what is put into it
     made = _quickly(html)
     return _closely(html) if made is None else made[0]
 
 
-def settle_with(html: str, part: str) -> tuple[Settled, Woven]:
-    """A page, and a part of it settled by itself; the page is not looked at again for that.
+def postprocess_parts(html: str, part: str) -> tuple[ProcessedHtml, Woven]:
+    """A page, and a part of it by itself; the page is not looked at again for that.
 
     Of the part it is known where those of its formulas stand that are `mathml.is_ours`.
     """
@@ -67,7 +68,7 @@ def settle_with(html: str, part: str) -> tuple[Settled, Woven]:
         if len(found) == 3:
             return _together([made for made, _ in found]), found[1][1]
     made = _quickly(part)
-    return settle(html), Woven((_closely(part).html,)) if made is None else made[1]
+    return postprocess_html(html), Woven((_closely(part).html,)) if made is None else made[1]
 
 
 def _stands_alone(part: str, after: str) -> bool:
@@ -77,11 +78,11 @@ def _stands_alone(part: str, after: str) -> bool:
     return begins and ends and not formulas
 
 
-def _together(parts: Sequence[Settled]) -> Settled:
-    def all_of(field: Callable[[Settled], frozenset[str]]) -> frozenset[str]:
+def _together(parts: Sequence[ProcessedHtml]) -> ProcessedHtml:
+    def all_of(field: Callable[[ProcessedHtml], frozenset[str]]) -> frozenset[str]:
         return frozenset[str]().union(*map(field, parts))
 
-    return Settled(
+    return ProcessedHtml(
         "".join(part.html for part in parts),
         all_of(lambda part: part.text),
         all_of(lambda part: part.mathematics),
@@ -91,13 +92,13 @@ def _together(parts: Sequence[Settled]) -> Settled:
     )
 
 
-def _closely(html: str) -> Settled:
+def _closely(html: str) -> ProcessedHtml:
     """Any text, each thing by itself."""
     html, declarations = styles.hoist(formulas.glue(html))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses = links.ids_and_addresses(html)
-    return Settled(html, text, mathematics, declarations, ids, addresses)
+    return ProcessedHtml(html, text, mathematics, declarations, ids, addresses)
 
 
 # --- a page as nearly all are
@@ -182,7 +183,7 @@ def _noted(attributes: str) -> tuple[tuple[str, str], ...]:
 
 
 class _Formula(Struct, frozen=True):
-    """What is between the ends of a `math` element, settled."""
+    """What is between the ends of a `math` element, processed."""
 
     inside: str
     ours: bool
@@ -193,7 +194,7 @@ class _Formula(Struct, frozen=True):
     addresses: frozenset[str]
 
 
-def _quickly(html: str) -> tuple[Settled, Woven] | None:
+def _quickly(html: str) -> tuple[ProcessedHtml, Woven] | None:
     """The same for a page that is written as nearly all are; `None` for others."""
     cut = formulas.cut(html)
     if cut is None:
@@ -215,7 +216,7 @@ def _quickly(html: str) -> tuple[Settled, Woven] | None:
         texts = [text for text, _ in hoisted]
         declarations.update(*(more for _, more in hoisted))
     woven = _woven(texts, found)
-    made = Settled(
+    made = ProcessedHtml(
         woven.html,
         frozenset(notes.characters),
         frozenset(mathematics),

@@ -14,9 +14,13 @@ from msgspec.structs import replace
 from coursebuild.checks.course import check_course
 from coursebuild.core.values import fingerprint
 from coursebuild.model import Course, Document
-from coursebuild.model.skeleton import skeleton
+from coursebuild.model.summary import without_prose
 from coursebuild.numerics.reports import Reports
-from coursebuild.pipeline.faces import course_face, outline_face, results_face
+from coursebuild.pipeline.fingerprints import (
+    course_fingerprint,
+    document_fingerprint,
+    results_fingerprint,
+)
 from coursebuild.render.lookup.lexicon import lexicon
 from coursebuild.render.page_list import page_list
 from coursebuild.results import Outcome, Results, ScriptRun
@@ -34,14 +38,14 @@ SECOND = "".join(PARTS[:9])
 
 def bare(text: str) -> Document:
     whole = document("content/0.md", text)
-    return replace(skeleton(whole), lexicon=lexicon(whole, {}))
+    return replace(without_prose(whole), lexicon=lexicon(whole, {}))
 
 
 def course_of(first: Document) -> Course:
     parsed = parse_course_map(Source("content/course.toml", MAP))
     assert parsed.value is not None
     second = document("content/1.md", SECOND)
-    second = replace(skeleton(second), lexicon=lexicon(second, {}))
+    second = replace(without_prose(second), lexicon=lexicon(second, {}))
     return with_documents(parsed.value, [first, second])
 
 
@@ -70,14 +74,18 @@ def test_what_has_one_face_is_seen_alike(parts: list[str], data: st.DataObject) 
     for part in data.draw(st.one_of(st.just(parts), st.permutations(parts))):
         other += [*data.draw(st.lists(st.sampled_from(PROSE), max_size=2)), part]
     one, two = bare("".join(parts)), bare("".join(other))
-    if outline_face(one) == outline_face(two):
+    if document_fingerprint(one) == document_fingerprint(two):
         assert seen_elsewhere(course_of(one)) == seen_elsewhere(course_of(two))
 
 
 def test_prose_moves_things_and_changes_no_face() -> None:
     text = "".join(PARTS)
-    moved = outline_face(bare("Plain words.\n\n" + text))
-    assert moved == outline_face(bare(text)) == outline_face(bare(text + "Plain words.\n"))
+    moved = document_fingerprint(bare("Plain words.\n\n" + text))
+    assert (
+        moved
+        == document_fingerprint(bare(text))
+        == document_fingerprint(bare(text + "Plain words.\n"))
+    )
 
 
 @pytest.mark.parametrize(
@@ -102,53 +110,53 @@ def test_prose_moves_things_and_changes_no_face() -> None:
 def test_what_others_see_changes_the_face(old: str, new: str) -> None:
     text = "".join(PARTS)
     assert old in text
-    assert outline_face(bare(text)) != outline_face(bare(text.replace(old, new, 1)))
+    assert document_fingerprint(bare(text)) != document_fingerprint(bare(text.replace(old, new, 1)))
 
 
 def test_the_face_of_a_course() -> None:
     first = bare(PARTS[0])
     course = course_of(first)
-    faces = [(document, outline_face(document)) for document in course.documents]
-    face = course_face(course, faces)
+    fingerprints = [(document, document_fingerprint(document)) for document in course.documents]
+    face = course_fingerprint(course, fingerprints)
     assert face is not None
     moved = course_of(bare(PROSE[0] + PARTS[0]))
-    again = [(document, outline_face(document)) for document in moved.documents]
-    assert course_face(moved, again) == face
-    assert course_face(replace(course, title="Other"), faces) != face
-    assert course_face(replace(course, files=("content/a.png",)), faces) != face
-    assert course_face(course, faces[1:]) is None  # one that is not known has none
-    assert course_face(course, [(document, "") for document, _ in faces]) is None
+    again = [(document, document_fingerprint(document)) for document in moved.documents]
+    assert course_fingerprint(moved, again) == face
+    assert course_fingerprint(replace(course, title="Other"), fingerprints) != face
+    assert course_fingerprint(replace(course, files=("content/a.png",)), fingerprints) != face
+    assert course_fingerprint(course, fingerprints[1:]) is None  # one that is not known has none
+    assert course_fingerprint(course, [(document, "") for document, _ in fingerprints]) is None
 
 
 def test_the_face_of_results() -> None:
     course = course_of(bare("".join(PARTS)))
     results = results_of(course)
-    face = results_face(results, Reports())
+    face = results_fingerprint(results, Reports())
     slower = tuple(replace(run, seconds=9.0) for run in results.runs)
-    assert results_face(replace(results, runs=slower), Reports()) == face
+    assert results_fingerprint(replace(results, runs=slower), Reports()) == face
     other = (replace(results.runs[0], stdout="two\n"), *results.runs[1:])
-    assert results_face(replace(results, runs=other), Reports()) != face
-    assert results_face(replace(results, engine="4"), Reports()) != face
+    assert results_fingerprint(replace(results, runs=other), Reports()) != face
+    assert results_fingerprint(replace(results, engine="4"), Reports()) != face
     verdicts = tuple(replace(v, status="drift") for v in results.verdicts)
-    assert results_face(replace(results, verdicts=verdicts), Reports()) != face
+    assert results_fingerprint(replace(results, verdicts=verdicts), Reports()) != face
     models = (("box", None),)
-    assert results_face(replace(results, models=models), Reports()) != face  # type: ignore[arg-type]
+    assert results_fingerprint(replace(results, models=models), Reports()) != face  # type: ignore[arg-type]
 
 
 _PRINTED = """
 import sys
 {first}
-from coursebuild.pipeline.faces import results_face
+from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.numerics.reports import Reports
 from coursebuild.results import Outcome, Results, ScriptRun
 run = ScriptRun("a.py", Outcome.OK, 0, "one", "", 0.0)
-print(results_face(Results((run,), (), (), (), "3", "3"), Reports()))
+print(results_fingerprint(Results((run,), (), (), (), "3", "3"), Reports()))
 """
 
 
 def test_a_face_does_not_depend_on_what_else_is_imported() -> None:
     """It is compared with that of an earlier process."""
-    faces = set()
+    fingerprints = set()
     for seed, first in enumerate(("", "import coursebuild.pipeline.build", "import decimal")):
         done = subprocess.run(
             [sys.executable, "-c", _PRINTED.format(first=first)],
@@ -157,5 +165,5 @@ def test_a_face_does_not_depend_on_what_else_is_imported() -> None:
             check=True,
             text=True,
         )
-        faces.add(done.stdout)
-    assert len(faces) == 1
+        fingerprints.add(done.stdout)
+    assert len(fingerprints) == 1

@@ -1,6 +1,6 @@
 """What the rest of a course must know of a document, without its prose.
 
-Entry point: `skeleton(document)`, a document of the same type whose walk (`document_blocks`,
+Entry point: `without_prose(document)`, a document of the same type whose walk (`document_blocks`,
 `document_inlines`) meets, in the same order, everything that somebody other than the document's own
 page looks at, or for which that page looks up something elsewhere: headings with their anchors,
 scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, shown reports, callouts, links,
@@ -10,7 +10,7 @@ terms, pictures, raw HTML.
 2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
 3. Formulas are left out, but for those of recorded tables: that they parse is found out where the
    whole document is.
-4. Only where the document shows nothing does its skeleton: else a break stands for all the prose.
+4. Only where the document shows nothing does its summary: else a break stands for all the prose.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from coursebuild.source import Span
 _KEPT = frozenset((Link, Image, NumberBinding, RawInline, Term))
 
 
-def skeleton(document: Document) -> Document:
+def without_prose(document: Document) -> Document:
     """The document without what only its own page shows."""
     recorded: set[int] = set()
     kept: list[Block] = []
@@ -57,13 +57,13 @@ def skeleton(document: Document) -> Document:
         if isinstance(block, Recording):
             recorded.add(id(block.body))
         if id(block) not in recorded:  # a recorded table stays in its recording
-            kept += _bones(block)
+            kept += _kept_of(block)
     if is_blank(kept) and not is_blank(document_blocks(document)):
         kept.append(ThematicBreak(document.blocks[0].span))
     return Document(document.source, tuple(kept), ())
 
 
-def _bones(block: Block) -> Iterator[Block]:
+def _kept_of(block: Block) -> Iterator[Block]:
     """What stays of a block, without the blocks in it, which come by themselves."""
     match block:
         case Paragraph() | HtmlFlow() | Table():

@@ -1,0 +1,184 @@
+"""What is asked of a `Reader`, and what it answers and keeps.
+
+Entry points: `Task`, a text to parse, and its `DocumentSummary`; `Read`, `Draw` and `Ask`, tasks;
+`Later`, a page that is put together when it is sent; `Drawn`, and `KeptPage`, the same in the memo.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, TypeAlias
+
+import msgspec
+from msgspec import Struct
+
+from coursebuild.core.values import decode, encode
+from coursebuild.diagnostics import Diagnostic
+from coursebuild.effects.tool import tool_digest
+from coursebuild.model import Document
+from coursebuild.render.record import PageRecord
+from coursebuild.render.search.values import Searched
+from coursebuild.render.sheet import Sheet
+from coursebuild.source import Source
+
+if TYPE_CHECKING:
+    from coursebuild.render.exports.files import PageByproducts
+
+SUMMARIES, PAGES, BYPRODUCTS, ITEMS = "summaries", "pages", "byproducts", "items"
+"""Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
+
+
+# --- reading
+
+
+class Task(Struct, frozen=True):
+    """A text to parse."""
+
+    source: Source
+    callouts: frozenset[str]
+    lesson: bool
+    key: str
+    """A hash of all that its summary depends on."""
+
+    @classmethod
+    def of(cls, source: Source, callouts: frozenset[str], lesson: bool) -> Task:
+        """With its key."""
+        parts = (
+            tool_digest(),
+            typesetter_digest(),
+            str(lesson),
+            *sorted(callouts),
+            "",
+            source.path,
+        )
+        digest = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass"))
+        digest.update(b"\0" + source.digest)
+        return cls(source, callouts, lesson, digest.hexdigest())
+
+    def is_of(self, source: Source, callouts: frozenset[str], lesson: bool) -> bool:
+        """Whether it is the task of these."""
+        same = self.callouts == callouts and self.lesson == lesson
+        return same and (self.source is source or self.source == source)
+
+
+class DocumentSummary(Struct, frozen=True):
+    """A parsed text: what others than its own page look at, and what is wrong in it."""
+
+    document: Document
+    """Without its prose; see `model.summary`."""
+    diagnostics: tuple[Diagnostic, ...]
+    """Those of formulas among them."""
+    imports: tuple[tuple[str, tuple[str, ...]], ...]
+    """Paths of scripts, each with the modules that it imports."""
+    lasting: bool
+    """Whether the same text gives the same again."""
+    fingerprint: str = ""
+    """Of what others than its own page can see of it; see `pipeline.fingerprints`."""
+
+
+def all_imports(summaries: Iterable[DocumentSummary]) -> dict[str, frozenset[str]]:
+    """Modules by the path of the script that imports them."""
+    return {path: frozenset(modules) for summary in summaries for path, modules in summary.imports}
+
+
+# --- drawing
+
+
+class Read(Struct, frozen=True):
+    """Read a text."""
+
+    task: Task
+
+
+class Draw(Struct, frozen=True):
+    """Draw a page."""
+
+    packed: bytes
+    """Its sheet, as its key is made from it."""
+    task: Task | None
+    """The text of its document, if it has one."""
+    language: str
+    """Of the interface."""
+    base_url: str
+    key: str
+    """Under which it is kept."""
+
+    @property
+    def sheet(self) -> Sheet:
+        """The sheet, read anew."""
+        found = decode(self.packed, Sheet)
+        assert found is not None
+        return found
+
+
+class Ask(Struct, frozen=True):
+    """Make the items of a page's quizzes; they are kept under the page's key."""
+
+    page: Draw
+
+
+class Later:
+    """A page of which only little is held until it is sent; it arrives as what is made of it."""
+
+    __slots__ = ("make", "path")
+
+    def __init__(self, path: str | None, make: Callable[[], Draw | Ask]) -> None:
+        """`path` is that of its document, if it has one."""
+        self.path = path
+        self.make = make
+
+    def __reduce__(self) -> tuple[Callable[[Draw | Ask], Draw | Ask], tuple[Draw | Ask]]:
+        """The page itself."""
+        return _same, (self.make(),)
+
+
+def _same(request: Draw | Ask) -> Draw | Ask:
+    return request
+
+
+class Drawn(Struct, frozen=True):
+    """A page that was drawn."""
+
+    record: PageRecord
+    body: str
+    searched: Searched | None
+    """What it is found by; `None` where it is not searched."""
+    byproducts: PageByproducts
+    """What it gives to the files beside it."""
+
+
+Request: TypeAlias = Read | Draw | Ask | Later
+Answer: TypeAlias = bytes
+"""The summary of what was read; the packed record of the page that was drawn; the packed
+items of its quizzes."""
+
+
+class KeptPage(Struct, frozen=True, array_like=True):
+    """A page in the store."""
+
+    packed_record: bytes
+    text: bytes
+    """See `Searched`; empty where the page is not searched. So is the next."""
+    terms: bytes
+    body: bytes
+    """UTF-8."""
+
+    @classmethod
+    def of(cls, record: PageRecord, body: str, searched: Searched | None) -> KeptPage:
+        """A page that was drawn just now."""
+        text, terms = (b"", b"") if searched is None else (searched.text, searched.terms)
+        return cls(encode(record), text, terms, body.encode())
+
+    @classmethod
+    def read(cls, data: bytes | None) -> KeptPage | None:
+        """The page; `None` where the bytes are none."""
+        try:
+            return None if data is None else msgspec.msgpack.decode(data, type=cls)
+        except msgspec.MsgspecError:
+            return None
+
+    @property
+    def record(self) -> PageRecord | None:
+        """What the site must know of it; `None` where the bytes are none."""
+        return decode(self.packed_record, PageRecord)
