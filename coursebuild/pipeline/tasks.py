@@ -46,7 +46,6 @@ class Task(Struct, frozen=True):
         """With its key."""
         parts = (
             tool_digest(),
-            typesetter_digest(),
             str(lesson),
             *sorted(callouts),
             "",
