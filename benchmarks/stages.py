@@ -140,15 +140,15 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     """What each step costs a lesson: time of one core, nothing remembered from lesson to lesson."""
     library = Library.of(course, results, Assets(template_texts(), bundled_files()))
     texts = {document.source.path: document for document in course.documents}
-    sheets = (page.sheet(library) for page in page_list(library))
-    drawn = [(sheet, texts[sheet.document]) for sheet in sheets if sheet.document]
+    sheets = (page.inputs(library) for page in page_list(library))
+    drawn = [(inputs, texts[inputs.document]) for inputs in sheets if inputs.document]
     kinds = frozenset(kind.name for kind in course.callouts)
     scripts = [script.code.text for script, _ in library.scripts.values()]
     tools = library.tools
 
     def draws() -> list[Draft]:
         fold.cache_clear()
-        return [draw(sheet, document, tools) for sheet, document in drawn]
+        return [draw(inputs, document, tools) for inputs, document in drawn]
 
     def modules() -> list[frozenset[str]]:
         imported.cache_clear()

@@ -114,9 +114,9 @@ def _exported(
             files = tuple(_scorm(library, assets, site))
         case "epub":
             style = assets.template("exports/epub.css")
-            files = epub.epub_files(_whole(library, site), style, _style_sheet(site))
+            files = epub.epub_files(_whole(library, site), style, _style_inputs(site))
         case "page":
-            page = book.book(_whole(library, site), _style_sheet(site))
+            page = book.book(_whole(library, site), _style_inputs(site))
             files = (OutputFile(NAMES[kind], page),)
         case _:
             assert_never(kind)
@@ -131,7 +131,7 @@ def _data(file: SiteFile) -> bytes:
     return file.data if isinstance(file, OutputFile) else file.make()
 
 
-def _style_sheet(site: Site) -> str:
+def _style_inputs(site: Site) -> str:
     """The site path of the style sheet of all pages."""
     return next(
         f.path for f in site.files if f.path.startswith("assets/site.") and f.path.endswith(".css")
@@ -215,8 +215,8 @@ class _Items:
         for page in page_list(library):
             document = page.document(library)
             if document is not None and any(map(_is_quiz, document_blocks(document))):
-                sheet = encode(page.sheet(library))
-                key = page_key(library.course, self._documents, document.source.path, sheet)
+                inputs = encode(page.inputs(library))
+                key = page_key(library.course, self._documents, document.source.path, inputs)
                 yield _Asked(document.source, key, page)
 
     def _made(self, asked: list[_Asked]) -> dict[str, bytes]:
@@ -238,8 +238,8 @@ class _Items:
     def _request(self, asked: _Asked) -> Ask:
         course = self._library.course
         task = self._documents.task(asked.source.path)
-        sheet = encode(asked.page.sheet(self._library))
-        return Ask(Draw(sheet, task, course.language, course.base_url, asked.key))
+        inputs = encode(asked.page.inputs(self._library))
+        return Ask(Draw(inputs, task, course.language, course.base_url, asked.key))
 
 
 def _is_quiz(block: Block) -> bool:

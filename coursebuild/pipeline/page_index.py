@@ -1,9 +1,9 @@
 """What a build knows of all pages together: the keys of the build before, and what pages say.
 
-Entry points: `PageKeys`, of pages without their sheets; `Facts`.
+Entry points: `PageKeys`, of pages without their inputs; `Facts`.
 
-A sheet is made of the course as it looks to others, of what running it found, and of the page's
-own document. So a page has the key of before where all three are those of before, and no sheet is
+Inputs are made of the course as it looks to others, of what running it found, and of the page's
+own document. So a page has the key of before where all three are those of before, and no inputs are
 needed to know it.
 """
 
@@ -25,7 +25,7 @@ class PageKeys:
     """Those of the last build are kept, and no others."""
 
     def __init__(self, store: Memo, around: str | None) -> None:
-        """`around`: a hash of all that sheets are made of besides documents, where it is known."""
+        """`around`: a hash of all that inputs are made of besides documents, where it is known."""
         self._store = store
         self._around = around
         self._name = hashlib.sha256(f"keys of pages\0{tool_digest()}".encode()).hexdigest()
@@ -43,7 +43,7 @@ class PageKeys:
         return self._now.get(row)
 
     def add(self, path: str, document: str, key: str) -> None:
-        """The same of a page whose sheet was made."""
+        """The same of a page whose inputs were made."""
         row = _row(path, document)
         self._changed = self._changed or self._now.get(row) != key
         self._now[row] = key

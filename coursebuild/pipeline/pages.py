@@ -2,15 +2,15 @@
 
 Entry point: `Pages`.
 
-1. Every page has a sheet, all that it shows of the course, and a key: a hash of its sheet, of its
+1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
    document's text, and of the tool.
-   Where nothing has changed of what sheets are made of, the key is known without (`page_index`).
+   Where nothing has changed of what inputs are made of, the key is known without (`page_index`).
 2. The records of pages come from the store; a page that has none is drawn.
 3. From records alone it is known whether all links lead somewhere, and which characters and
    styles the pages use (`page_index`).
 4. A body is fetched, and framed, when its file is written.
 
-Of a page no more is held than its key and how its sheet is made: a course may have any number.
+Of a page no more is held than its key and how its inputs are made: a course may have any number.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ class Pages:
         self._by_path: dict[str, _Wanted] = {}
         self._byproducts: tuple[str, PageByproducts] | None = None
         """What the page that was asked for last gives: two files are made of it."""
-        self._sheets: dict[str, bytes] = {}
+        self._inputs: dict[str, bytes] = {}
         """Of the pages without a known key, by site path, until these are drawn."""
         keys = PageKeys(store, self._around())
         self._pages = self._made(page_list(library), keys)
-        self._sheets.clear()
+        self._inputs.clear()
         keys.save()
 
     @property
@@ -166,7 +166,7 @@ class Pages:
     # --- keys
 
     def _around(self) -> str | None:
-        """A hash of all that sheets are made of, but for documents; `None` where it has none."""
+        """A hash of all that inputs are made of, but for documents; `None` where it has none."""
         course = self._documents.fingerprint(self._library.course)
         if course is None:
             return None
@@ -179,22 +179,22 @@ class Pages:
         task = "" if path is None else self._documents.task(path).key
         key = keys.get(page.path, task)
         if key is None:
-            sheet = page.sheet(self._library)
-            assert sheet.document == path
-            data = encode(sheet)
+            inputs = page.inputs(self._library)
+            assert inputs.document == path
+            data = encode(inputs)
             key = page_key(self._library.course, self._documents, path, data)
             keys.add(page.path, task, key)
-            self._sheets[page.path] = data
+            self._inputs[page.path] = data
         return _Wanted(page, key, path)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
         path = wanted.document
         task = self._documents.task(path) if path is not None else None
-        sheet = self._sheets.pop(wanted.path, None)
-        if sheet is None:
-            sheet = encode(wanted.page.sheet(self._library))
-        return Draw(sheet, task, course.language, course.base_url, wanted.key)
+        inputs = self._inputs.pop(wanted.path, None)
+        if inputs is None:
+            inputs = encode(wanted.page.inputs(self._library))
+        return Draw(inputs, task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
         """All that a frame shows besides its page."""
@@ -223,7 +223,7 @@ class Pages:
         tasks: dict[str, PageRecord] = {}
         new: list[_Wanted] = []
 
-        def missing() -> Iterator[Later]:  # sheets are made while pages are drawn
+        def missing() -> Iterator[Later]:  # inputs are made while pages are drawn
             for entry in entries:
                 page = self._wanted(entry, keys)
                 pages.append(page)
@@ -232,7 +232,7 @@ class Pages:
                     new.append(page)
                     yield self._later(page)
                 else:
-                    self._sheets.pop(page.path, None)
+                    self._inputs.pop(page.path, None)
                     tasks[page.path] = record
 
         for page, data in zip(new, self._documents.draw(missing()), strict=True):
@@ -271,13 +271,13 @@ class Pages:
         return before.encode() + body + after.encode()
 
 
-def page_key(course: Course, documents: Documents, document: str | None, sheet: bytes) -> str:
-    """A hash of all that a page depends on: its document's path and its sheet's bytes."""
-    return text_page_key(course, documents.task(document) if document is not None else None, sheet)
+def page_key(course: Course, documents: Documents, document: str | None, inputs: bytes) -> str:
+    """A hash of all that a page depends on: its document's path and its inputs' bytes."""
+    return text_page_key(course, documents.task(document) if document is not None else None, inputs)
 
 
-def text_page_key(course: Course, text: Task | None, sheet: bytes) -> str:
+def text_page_key(course: Course, text: Task | None, inputs: bytes) -> str:
     """The same, by the text of its document."""
-    shown = hashlib.sha256(sheet).hexdigest()
+    shown = hashlib.sha256(inputs).hexdigest()
     key = text.key if text is not None else ""
     return key_of(tool_digest(), course.language, course.base_url, shown, key)

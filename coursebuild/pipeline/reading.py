@@ -3,7 +3,7 @@
 Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
 
 1. `Read`: the text is parsed and its formulas are typeset; the summary is kept in the store.
-2. `Draw`: a page is drawn from its sheet and its document; body and record are kept in the store.
+2. `Draw`: a page is drawn from its inputs and its document; body and record are kept in the store.
 3. The document and its formulas stay for the drawing. Those that an earlier build has read, or
    another process, are parsed again, and their MathML comes from the store.
 
@@ -235,13 +235,13 @@ class Reader:
         document = None
         if whole is not None:
             tools, document = replace(tools, formulas=whole.formulas), whole.document
-        sheet = request.sheet
-        draft, page = draw_whole(sheet, document, tools)
+        inputs = request.inputs
+        draft, page = draw_whole(inputs, document, tools)
         found, body = record(draft, request.base_url)
-        by = searched(sheet, document, str(draft.body))
+        by = searched(inputs, document, str(draft.body))
         if by is not None:
             found = replace(found, search=(by.name, by.digest))
-        made = page_byproducts(sheet, page, request.base_url, body)
+        made = page_byproducts(inputs, page, request.base_url, body)
         return Drawn(found, body, by, made)
 
     def _draw(self, request: Draw) -> bytes:
@@ -260,7 +260,7 @@ class Reader:
         whole = self._whole(request.task)
         tools = replace(self._tools_for(request.language), formulas=whole.formulas)
         language, base_url = request.language, request.base_url
-        made = page_quizzes(request.sheet, whole.document, tools, base_url, language)
+        made = page_quizzes(request.inputs, whole.document, tools, base_url, language)
         data = encode(made)
         self._store.put(ITEMS, request.key, data, local=True)
         return data

@@ -41,7 +41,7 @@ from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
 from coursebuild.render.offline import file_list, offline_files
 from coursebuild.render.search.files import SearchFiles
-from coursebuild.render.search.sheet import search_words
+from coursebuild.render.search.page_inputs import search_words
 from coursebuild.render.shared import PageFacts, common_characters
 from coursebuild.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest

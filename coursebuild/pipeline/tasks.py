@@ -17,9 +17,9 @@ from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Document
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.record import PageRecord
 from coursebuild.render.search.values import Searched
-from coursebuild.render.sheet import Sheet
 from coursebuild.source import Source
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class Draw(Struct, frozen=True):
     """Draw a page."""
 
     packed: bytes
-    """Its sheet, as its key is made from it."""
+    """Its inputs, as its key is made from it."""
     task: Task | None
     """The text of its document, if it has one."""
     language: str
@@ -104,9 +104,9 @@ class Draw(Struct, frozen=True):
     """Under which it is kept."""
 
     @property
-    def sheet(self) -> Sheet:
-        """The sheet, read anew."""
-        found = decode(self.packed, Sheet)
+    def inputs(self) -> PageInputs:
+        """The inputs, read anew."""
+        found = decode(self.packed, PageInputs)
         assert found is not None
         return found
 

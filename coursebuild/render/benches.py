@@ -16,8 +16,8 @@ from msgspec.structs import replace
 
 from coursebuild.model import Bench, document_blocks
 from coursebuild.render.figures import Grid, again, where
+from coursebuild.render.page_inputs import ShownBench
 from coursebuild.render.scenarios import scenario_view
-from coursebuild.render.sheet import ShownBench
 
 if TYPE_CHECKING:
     from coursebuild.numerics.reports.bench import ScenarioReport

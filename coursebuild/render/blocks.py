@@ -30,7 +30,7 @@ from coursebuild.model import (
 from coursebuild.render.characters import visible
 from coursebuild.render.folding import Part, fold
 from coursebuild.render.listings import numbered
-from coursebuild.render.sheet import ShownRun, ShownVerdict
+from coursebuild.render.page_inputs import ShownRun, ShownVerdict
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
 from coursebuild.results import Outcome

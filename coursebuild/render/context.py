@@ -40,7 +40,7 @@ from coursebuild.render.direction import direction
 from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
 from coursebuild.render.look import Look, OwnBlock, Words
-from coursebuild.render.sheet import Shown
+from coursebuild.render.page_inputs import Shown
 from coursebuild.render.shown import file_address, shown
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools

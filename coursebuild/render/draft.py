@@ -16,7 +16,7 @@ class Draft(Struct, frozen=True):
     """Its site path."""
     kind: str
     """`home`, `lesson`, `stub`, `level`, `model`, `page`, `notfound`: also a class of the style
-    sheet."""
+    inputs."""
     title: str
     description: str
     body: Markup

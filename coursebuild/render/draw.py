@@ -1,6 +1,6 @@
-"""Drawing a page: its sheet and its document through the templates.
+"""Drawing a page: its inputs and its document through the templates.
 
-Entry points: `draw(sheet, document, tools)`; `draw_whole`, with the document's context as well.
+Entry points: `draw(inputs, document, tools)`; `draw_whole`, with the document's context as well.
 """
 
 from __future__ import annotations
@@ -16,40 +16,40 @@ from coursebuild.render.context import PageContext
 from coursebuild.render.draft import Draft as Draft
 from coursebuild.render.graph import drawings
 from coursebuild.render.listings import numbered
-from coursebuild.render.sheet import Graphed, Highlighted, Plotted, Sheet
+from coursebuild.render.page_inputs import Graphed, Highlighted, PageInputs, Plotted
 from coursebuild.render.tools import Tools
 
 if TYPE_CHECKING:
     from coursebuild.numerics.reports.bench import ScenarioReport
 
 
-def draw(sheet: Sheet, document: Document | None, tools: Tools) -> Draft:
+def draw(inputs: PageInputs, document: Document | None, tools: Tools) -> Draft:
     """The page without its frame; the same values give the same page."""
-    return draw_whole(sheet, document, tools)[0]
+    return draw_whole(inputs, document, tools)[0]
 
 
 def draw_whole(
-    sheet: Sheet, document: Document | None, tools: Tools
+    inputs: PageInputs, document: Document | None, tools: Tools
 ) -> tuple[Draft, PageContext | None]:
     """The page without its frame, and the context of its document."""
     page: PageContext | None = None
-    values = {name: _drawn(value, tools) for name, value in sheet.values.items()}
-    description = sheet.description
-    if document is not None and sheet.shown is not None:
-        page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
+    values = {name: _drawn(value, tools) for name, value in inputs.values.items()}
+    description = inputs.description
+    if document is not None and inputs.shown is not None:
+        page = PageContext.made(tools, inputs.shown, urls.Place(inputs.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
-        if sheet.kind == "page":
+        if inputs.kind == "page":
             description = _first_sentences(document)
     draft = Draft(
-        sheet.path,
-        sheet.kind,
-        sheet.title,
+        inputs.path,
+        inputs.kind,
+        inputs.title,
         description,
-        tools.render(sheet.template, **values),
-        json_ld=sheet.json_ld,
-        og_type=sheet.og_type,
-        indexed=sheet.indexed,
+        tools.render(inputs.template, **values),
+        json_ld=inputs.json_ld,
+        og_type=inputs.og_type,
+        indexed=inputs.indexed,
     )
     return draft, page
 

@@ -23,7 +23,7 @@ from coursebuild.drawing.marks import markup_text, shortened, text_width
 from coursebuild.model import Lesson, Level
 from coursebuild.render import urls
 from coursebuild.render.library import Library
-from coursebuild.render.sheet import Graphed, GraphNode
+from coursebuild.render.page_inputs import Graphed, GraphNode
 from coursebuild.render.strings import Strings
 
 _BESIDE = 5

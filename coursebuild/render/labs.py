@@ -18,7 +18,7 @@ from coursebuild.render.strings import Strings
 
 if TYPE_CHECKING:
     from coursebuild.render.context import PageContext
-    from coursebuild.render.sheet import ShownRecord
+    from coursebuild.render.page_inputs import ShownRecord
 
 
 class ControlView(Struct, frozen=True):

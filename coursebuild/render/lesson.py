@@ -1,6 +1,6 @@
 """The page of a lesson: where it stands, what it needs and gives, its text, and the way on.
 
-Entry points: `lesson_sheet`, and for a planned lesson `stub_sheet`.
+Entry points: `lesson_inputs`, and for a planned lesson `stub_inputs`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from coursebuild.render import meta, urls
 from coursebuild.render.graph import around
 from coursebuild.render.library import Library, document_scripts
 from coursebuild.render.owners import owner_links
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.shown import shown
 
 
@@ -68,7 +68,7 @@ def lesson_link(
     )
 
 
-def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
+def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageInputs:
     """What the page of a written lesson shows; its document's summary is enough."""
     place = urls.Place(urls.lesson_path(lesson))
     scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
@@ -80,7 +80,7 @@ def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
         "markdown": place.href(urls.markdown_path(place.path) or place.path),
         "edit": edit_address(library, lesson.path),
     }
-    return Sheet(
+    return PageInputs(
         place.path,
         "lesson",
         lesson.title,
@@ -94,13 +94,13 @@ def lesson_sheet(library: Library, lesson: Lesson, document: Document) -> Sheet:
     )
 
 
-def stub_sheet(library: Library, lesson: Lesson) -> Sheet:
+def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
     """What the page of a planned lesson shows: that it is planned, and what can be read now."""
     place = urls.Place(urls.lesson_path(lesson))
     written = [need for need in _ancestors(library, lesson) if need.document is not None]
     readable = tuple(lesson_link(library, place, need) for need in written)
     values = {**_common(library, place, lesson), "readable": readable}
-    return Sheet(
+    return PageInputs(
         place.path, "stub", lesson.title, lesson.summary, "stub.html", values, indexed=False
     )
 

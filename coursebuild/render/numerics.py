@@ -26,8 +26,8 @@ from coursebuild.render.figures import (
     sentence,
 )
 from coursebuild.render.library import Library
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.scenarios import ORDERS, largest
-from coursebuild.render.sheet import Sheet
 from coursebuild.render.strings import Strings
 
 _QUANTITIES = (
@@ -70,7 +70,7 @@ class CaseGroup(Struct, frozen=True):
     cases: tuple[CaseView, ...]
 
 
-def numerics_sheet(library: Library) -> Sheet:
+def numerics_inputs(library: Library) -> PageInputs:
     """What the page of the hard cases shows."""
     words, place = library.words, urls.Place(urls.NUMERICS)
     cases = library.reports.cases
@@ -84,7 +84,7 @@ def numerics_sheet(library: Library) -> Sheet:
         "command": again("stability", "--record"),
     }
     title = words("numerics.title")
-    return Sheet(
+    return PageInputs(
         place.path, "numerics", title, words("numerics.description"), "numerics.html", values
     )
 

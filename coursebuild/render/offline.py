@@ -1,7 +1,7 @@
 """What makes the site an application that works without a network.
 
 Entry points: `offline_files(course, assets)`: the manifest, its icons and the service worker;
-`file_list(names)`: the list of all files by which the worker knows what there is; `offline_sheet`,
+`file_list(names)`: the list of all files by which the worker knows what there is; `offline_inputs`,
 the page that says what is kept, which is also shown where a page is not.
 
 1. The worker is the same text in every build of the same tool: what changes with a course stands in
@@ -26,7 +26,7 @@ from coursebuild.render.assets import Assets, hashed_name, page_script
 from coursebuild.render.direction import direction
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.results import FileFacts, FileList, OutputFile
 
 PAPER = "#fcfbf8"
@@ -159,13 +159,15 @@ def _is_lasting(file: FileFacts) -> bool:
 # ---------------------------------------------------------------------------------- the page
 
 
-def offline_sheet(library: Library) -> Sheet:
+def offline_inputs(library: Library) -> PageInputs:
     """What that page shows; it is complete without a script."""
     place = urls.Place(urls.OFFLINE)
     words = library.words
     values = {"home": place.href(urls.HOME)}
     title, description = words("offline.title"), words("offline.description")
-    return Sheet(place.path, "offline", title, description, "offline.html", values, indexed=False)
+    return PageInputs(
+        place.path, "offline", title, description, "offline.html", values, indexed=False
+    )
 
 
 def facts_of(files: Iterable[OutputFile]) -> Iterator[FileFacts]:

@@ -16,7 +16,7 @@ from coursebuild.model import Document
 from coursebuild.render import urls
 from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.tools import Tools
 
 
@@ -30,9 +30,9 @@ class PageEntry(Struct, frozen=True):
     kind."""
     kind: PageKind
 
-    def sheet(self, library: Library) -> Sheet:
+    def inputs(self, library: Library) -> PageInputs:
         """What it shows; summaries of documents are enough."""
-        return self.kind.sheet(library, self.id)
+        return self.kind.inputs(library, self.id)
 
     def document(self, library: Library) -> Document | None:
         """The document that it shows, if any."""
@@ -49,116 +49,116 @@ class PageEntry(Struct, frozen=True):
 
         document = self.document(library)
         shown = None if document is None else whole(document)
-        return draw(self.sheet(library), shown, tools or library.tools)
+        return draw(self.inputs(library), shown, tools or library.tools)
 
 
 class PageKind(Struct, frozen=True):
     """How the pages of a kind are made, each from the id of what it shows."""
 
-    sheet: Callable[[Library, str], Sheet]
+    inputs: Callable[[Library, str], PageInputs]
     document: Callable[[Library, str], Document | None] = lambda library, id: None
 
 
-# What makes a sheet is imported when there is one to make: after an edit few are made.
+# What makes inputs is imported when there are some to make: after an edit these are few.
 
 
-def _lesson_sheet(library: Library, id: str) -> Sheet:
+def _lesson_inputs(library: Library, id: str) -> PageInputs:
     from coursebuild.render import lesson
 
     entry = library.lessons[id]
     if entry.document is None:
-        return lesson.stub_sheet(library, entry)
-    return lesson.lesson_sheet(library, entry, entry.document)
+        return lesson.stub_inputs(library, entry)
+    return lesson.lesson_inputs(library, entry, entry.document)
 
 
-def _page_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.pages import page_sheet
+def _page_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.pages import page_inputs
 
     page = library.pages[id]
     assert page.document is not None, "a page without a document is not in the list"
-    return page_sheet(library, page, page.document)
+    return page_inputs(library, page, page.document)
 
 
-def _model_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.pages import model_sheet
+def _model_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.pages import model_inputs
 
     model = next(model for model in library.course.models if model.name == id)
-    return model_sheet(library, model)
+    return model_inputs(library, model)
 
 
-def _level_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.pages import level_sheet
+def _level_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.pages import level_inputs
 
-    return level_sheet(library, library.levels[id])
-
-
-def _home_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.pages import home_sheet
-
-    return home_sheet(library)
+    return level_inputs(library, library.levels[id])
 
 
-def _glossary_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.lookup.glossary import glossary_sheet
+def _home_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.pages import home_inputs
 
-    return glossary_sheet(library)
-
-
-def _symbols_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.lookup.symbol_index import symbols_sheet
-
-    return symbols_sheet(library)
+    return home_inputs(library)
 
 
-def _numerics_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.numerics import numerics_sheet
+def _glossary_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.lookup.glossary import glossary_inputs
 
-    return numerics_sheet(library)
-
-
-def _progress_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.reader import progress_sheet
-
-    return progress_sheet(library)
+    return glossary_inputs(library)
 
 
-def _review_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.reader import review_sheet
+def _symbols_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.lookup.symbol_index import symbols_inputs
 
-    return review_sheet(library)
-
-
-def _offline_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.offline import offline_sheet
-
-    return offline_sheet(library)
+    return symbols_inputs(library)
 
 
-def _search_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.search.sheet import search_sheet
+def _numerics_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.numerics import numerics_inputs
 
-    return search_sheet(library)
-
-
-def _not_found_sheet(library: Library, id: str) -> Sheet:
-    from coursebuild.render.pages import not_found_sheet
-
-    return not_found_sheet(library)
+    return numerics_inputs(library)
 
 
-_HOME = PageKind(_home_sheet)
-_LEVEL = PageKind(_level_sheet)
-_LESSON = PageKind(_lesson_sheet, lambda library, id: library.lessons[id].document)
-_MODEL = PageKind(_model_sheet)
-_GLOSSARY = PageKind(_glossary_sheet)
-_SYMBOLS = PageKind(_symbols_sheet)
-_NUMERICS = PageKind(_numerics_sheet)
-_PAGE = PageKind(_page_sheet, lambda library, id: library.pages[id].document)
-_PROGRESS = PageKind(_progress_sheet)
-_REVIEW = PageKind(_review_sheet)
-_OFFLINE = PageKind(_offline_sheet)
-_SEARCH = PageKind(_search_sheet)
-_NOT_FOUND = PageKind(_not_found_sheet)
+def _progress_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.reader import progress_inputs
+
+    return progress_inputs(library)
+
+
+def _review_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.reader import review_inputs
+
+    return review_inputs(library)
+
+
+def _offline_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.offline import offline_inputs
+
+    return offline_inputs(library)
+
+
+def _search_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.search.page_inputs import search_inputs
+
+    return search_inputs(library)
+
+
+def _not_found_inputs(library: Library, id: str) -> PageInputs:
+    from coursebuild.render.pages import not_found_inputs
+
+    return not_found_inputs(library)
+
+
+_HOME = PageKind(_home_inputs)
+_LEVEL = PageKind(_level_inputs)
+_LESSON = PageKind(_lesson_inputs, lambda library, id: library.lessons[id].document)
+_MODEL = PageKind(_model_inputs)
+_GLOSSARY = PageKind(_glossary_inputs)
+_SYMBOLS = PageKind(_symbols_inputs)
+_NUMERICS = PageKind(_numerics_inputs)
+_PAGE = PageKind(_page_inputs, lambda library, id: library.pages[id].document)
+_PROGRESS = PageKind(_progress_inputs)
+_REVIEW = PageKind(_review_inputs)
+_OFFLINE = PageKind(_offline_inputs)
+_SEARCH = PageKind(_search_inputs)
+_NOT_FOUND = PageKind(_not_found_inputs)
 
 
 def page_list(library: Library) -> Iterator[PageEntry]:

@@ -1,7 +1,7 @@
 """The pages around the lessons: home, levels, models, other pages, and that of missing addresses.
 
-Entry points: `home_sheet`, `level_sheet`, `model_sheet`, `page_sheet`, `not_found_sheet`, what each
-shows.
+Entry points: `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`, `not_found_inputs`, what
+each shows.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from coursebuild.render.labs import number
 from coursebuild.render.lesson import LessonHead, LessonLink, edit_address, lesson_link
 from coursebuild.render.library import Library, ModelUse
 from coursebuild.render.measured import measured_view
-from coursebuild.render.sheet import Highlighted, Plotted, Sheet
+from coursebuild.render.page_inputs import Highlighted, PageInputs, Plotted
 from coursebuild.render.shown import shown
 from coursebuild.results import ModelFacts
 
@@ -48,7 +48,7 @@ class Named(Struct, frozen=True):
     remark: str = ""
 
 
-def home_sheet(library: Library) -> Sheet:
+def home_inputs(library: Library) -> PageInputs:
     """What the home page shows: the course map."""
     course = library.course
     place = urls.Place(urls.HOME)
@@ -67,10 +67,12 @@ def home_sheet(library: Library) -> Sheet:
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
     data = meta.course_data(library)
-    return Sheet(urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data)
+    return PageInputs(
+        urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data
+    )
 
 
-def level_sheet(library: Library, level: Level) -> Sheet:
+def level_inputs(library: Library, level: Level) -> PageInputs:
     """What the page of a level shows."""
     place = urls.Place(urls.level_path(level))
     levels = library.course.levels
@@ -86,7 +88,7 @@ def level_sheet(library: Library, level: Level) -> Sheet:
         "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
     }
     title = f"{library.words('level.label', id=level.id)}: {level.title}"
-    return Sheet(place.path, "level", title, level.summary, "level.html", values)
+    return PageInputs(place.path, "level", title, level.summary, "level.html", values)
 
 
 def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
@@ -112,7 +114,7 @@ def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
     )
 
 
-def model_sheet(library: Library, model: MjcfModel) -> Sheet:
+def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     """What the page of a model shows: what it holds, its text, where it is used."""
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
@@ -132,7 +134,7 @@ def model_sheet(library: Library, model: MjcfModel) -> Sheet:
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
-    return Sheet(place.path, "model", title, "", "model.html", values)
+    return PageInputs(place.path, "model", title, "", "model.html", values)
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
@@ -170,10 +172,10 @@ def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
     return Named(place.href(urls.page_path(use.owner)), use.owner.title, remark)
 
 
-def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
+def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
     """What a page that is no lesson shows; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
-    return Sheet(
+    return PageInputs(
         place.path,
         "page",
         page.title,
@@ -185,9 +187,9 @@ def page_sheet(library: Library, page: Page, document: Document) -> Sheet:
     )
 
 
-def not_found_sheet(library: Library) -> Sheet:
+def not_found_inputs(library: Library) -> PageInputs:
     """What the page for missing addresses shows."""
     place = place_of(library, urls.NOT_FOUND)
     values = {"home": place.href(urls.HOME)}
     title = library.words("notfound.title")
-    return Sheet(urls.NOT_FOUND, "notfound", title, "", "notfound.html", values, indexed=False)
+    return PageInputs(urls.NOT_FOUND, "notfound", title, "", "notfound.html", values, indexed=False)

@@ -1,6 +1,6 @@
 """The pages that are about the reader: what is read and answered, and what to go over again.
 
-Entry points: `progress_sheet`, `review_sheet`, what each shows.
+Entry points: `progress_inputs`, `review_inputs`, what each shows.
 
 Nothing of a reader is known here. The pages list the lessons with their questions, say what is kept
 and where, and hold places that the page's script fills from the reader's own browser.
@@ -15,8 +15,8 @@ from coursebuild.render import urls
 from coursebuild.render.asked import count
 from coursebuild.render.library import Library, owners
 from coursebuild.render.owners import owner_path
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.pages import level_view
-from coursebuild.render.sheet import Sheet
 
 KEPT_AS = "coursebuild.progress."
 """What the name under which a browser keeps progress begins with; the course's key follows. As in
@@ -35,7 +35,7 @@ class Asking(Struct, frozen=True):
     questions: int
 
 
-def progress_sheet(library: Library) -> Sheet:
+def progress_inputs(library: Library) -> PageInputs:
     """What the page of the reader's progress shows: all lessons, by level."""
     place, words = urls.Place(urls.PROGRESS), library.words
     values = {
@@ -46,10 +46,12 @@ def progress_sheet(library: Library) -> Sheet:
         "name": KEPT_AS + library.course.key,
     }
     title, description = words("progress.title"), words("progress.description")
-    return Sheet(place.path, "progress", title, description, "progress.html", values, indexed=False)
+    return PageInputs(
+        place.path, "progress", title, description, "progress.html", values, indexed=False
+    )
 
 
-def review_sheet(library: Library) -> Sheet:
+def review_inputs(library: Library) -> PageInputs:
     """What the page of the review shows: where questions are, and when missed ones come back."""
     place, words = urls.Place(urls.REVIEW), library.words
     values = {
@@ -58,7 +60,9 @@ def review_sheet(library: Library) -> Sheet:
         "progress": place.href(urls.PROGRESS),
     }
     title, description = words("review.title"), words("review.description")
-    return Sheet(place.path, "review", title, description, "review.html", values, indexed=False)
+    return PageInputs(
+        place.path, "review", title, description, "review.html", values, indexed=False
+    )
 
 
 def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:

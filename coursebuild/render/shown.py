@@ -38,7 +38,7 @@ from coursebuild.render.characters import visible
 from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import owner_path
-from coursebuild.render.sheet import (
+from coursebuild.render.page_inputs import (
     Shown,
     ShownBench,
     ShownCallout,

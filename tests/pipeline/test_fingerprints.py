@@ -61,7 +61,7 @@ def seen_elsewhere(course: Course) -> list[object]:
     for page in page_list(library):
         if page.id != "1.1":
             try:
-                found.append((page.path, fingerprint(page.sheet(library))))
+                found.append((page.path, fingerprint(page.inputs(library))))
             except (KeyError, StopIteration) as error:  # a link or model that is nowhere
                 found.append((page.path, repr(error)))
     return found

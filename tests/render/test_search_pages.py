@@ -7,14 +7,14 @@ import json
 import pytest
 
 from coursebuild.model import Document
-from coursebuild.render.lesson import lesson_sheet, stub_sheet
+from coursebuild.render.lesson import lesson_inputs, stub_inputs
 from coursebuild.render.library import Library
-from coursebuild.render.offline import offline_sheet
-from coursebuild.render.pages import home_sheet, level_sheet, model_sheet, not_found_sheet
-from coursebuild.render.reader import progress_sheet
+from coursebuild.render.offline import offline_inputs
+from coursebuild.render.pages import home_inputs, level_inputs, model_inputs, not_found_inputs
+from coursebuild.render.reader import progress_inputs
 from coursebuild.render.search.page import page_text, searched, terms
+from coursebuild.render.search.page_inputs import search_inputs
 from coursebuild.render.search.sections import drawn_sections
-from coursebuild.render.search.sheet import search_sheet
 from coursebuild.render.search.values import PageText, Piece, Section
 from support.rendered_course import Make
 
@@ -63,7 +63,7 @@ def text_of(make: Make, text: str) -> PageText:
     library = Library.of(made.course, made.results, made.assets)
     lesson = library.lessons["0.1"]
     document: Document = lesson.document
-    found = page_text(lesson_sheet(library, lesson, document), document, "")
+    found = page_text(lesson_inputs(library, lesson, document), document, "")
     assert found is not None
     return found
 
@@ -115,14 +115,14 @@ def test_a_quiz_gives_no_answer_away(make: Make) -> None:
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     made = make("Text.")
     library = Library.of(made.course, made.results, made.assets)
-    left_out = (home_sheet, not_found_sheet, search_sheet, offline_sheet, progress_sheet)
-    for sheet in left_out:
-        assert page_text(sheet(library), None, "<p>Text</p>") is None, sheet
-    stub = page_text(stub_sheet(library, library.lessons["1.2"]), None, "<p>Other</p>")
+    left_out = (home_inputs, not_found_inputs, search_inputs, offline_inputs, progress_inputs)
+    for inputs in left_out:
+        assert page_text(inputs(library), None, "<p>Text</p>") is None, inputs
+    stub = page_text(stub_inputs(library, library.lessons["1.2"]), None, "<p>Other</p>")
     assert stub == PageText("Later", "1.2", (Section("", "", 0, (Piece("text", "Comes later."),)),))
-    level = page_text(level_sheet(library, made.course.levels[0]), None, "<p>Lessons</p>")
+    level = page_text(level_inputs(library, made.course.levels[0]), None, "<p>Lessons</p>")
     assert level is not None and "Lessons" not in str(level)
-    model = page_text(model_sheet(library, made.course.models[0]), None, "<h2 id='x'>Facts</h2>")
+    model = page_text(model_inputs(library, made.course.models[0]), None, "<h2 id='x'>Facts</h2>")
     assert model is not None
     assert model.sections[0].pieces[-1].text.startswith('<mujoco model="box">')
     assert model.sections[1] == Section("x", "Facts", 2, ())
@@ -154,7 +154,7 @@ def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make)
     made = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
     library = Library.of(made.course, made.results, made.assets)
     lesson = library.lessons["0.1"]
-    found = searched(lesson_sheet(library, lesson, lesson.document), lesson.document, "")
+    found = searched(lesson_inputs(library, lesson, lesson.document), lesson.document, "")
     assert found is not None and found.name == "0.1"
     text = found.text.decode()
     assert text.startswith('coursebuildSearch.take("page","",') and text.endswith(")\n")

@@ -25,7 +25,7 @@ class Noted:
 
         `task`: the text of its document, if it has one.
         """
-        key = text_page_key(library.course, task, encode(page.sheet(library)))
+        key = text_page_key(library.course, task, encode(page.inputs(library)))
         kept = KeptPage.read(self._store.get(PAGES, key, local=True))
         record = None if kept is None else kept.record
         return None if record is None else record.facts

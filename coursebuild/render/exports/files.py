@@ -25,8 +25,8 @@ from coursebuild.render.exports.markdown_copy import html_copy, markdown_copy
 from coursebuild.render.exports.notebook import Notebook, notebook
 from coursebuild.render.exports.notebook_file import finished
 from coursebuild.render.library import Library
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.page_list import page_list
-from coursebuild.render.sheet import Sheet
 from coursebuild.results import CachedFile, OutputFile, SiteFile
 from coursebuild.source import key_of
 
@@ -44,7 +44,7 @@ class PageByproducts(Struct, frozen=True):
 
 
 def page_byproducts(
-    sheet: Sheet, page: PageContext | None, base_url: str, body: str
+    inputs: PageInputs, page: PageContext | None, base_url: str, body: str
 ) -> PageByproducts:
     """All of it; `page` is the context of the page's document, if it has one.
 
@@ -52,11 +52,13 @@ def page_byproducts(
     """
     same: Same = {}
     text = (
-        markdown_copy(sheet, page, body, same) if urls.markdown_path(sheet.path) is not None else ""
+        markdown_copy(inputs, page, body, same)
+        if urls.markdown_path(inputs.path) is not None
+        else ""
     )
-    if sheet.kind != "lesson" or page is None:
+    if inputs.kind != "lesson" or page is None:
         return PageByproducts(text, None)
-    return PageByproducts(text, notebook(sheet, page, base_url, same))
+    return PageByproducts(text, notebook(inputs, page, base_url, same))
 
 
 class PageSource(Protocol):
@@ -157,6 +159,6 @@ class OnDemand:
         document = entry.document(self._library)
         if document is None:
             return PageByproducts(html_copy(path, self._body(path)), None)
-        sheet = entry.sheet(self._library)
-        _, page = draw_whole(sheet, self._whole(document), self._library.tools)
-        return page_byproducts(sheet, page, self._library.course.base_url, self._body(path))
+        inputs = entry.inputs(self._library)
+        _, page = draw_whole(inputs, self._whole(document), self._library.tools)
+        return page_byproducts(inputs, page, self._library.course.base_url, self._body(path))

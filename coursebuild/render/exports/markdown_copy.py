@@ -1,6 +1,6 @@
 """A page as plain Markdown: for people, feeds and language models.
 
-Entry points: `markdown_copy(sheet, page, …)`, the text; `html_copy`, that of a page without a
+Entry points: `markdown_copy(inputs, page, …)`, the text; `html_copy`, that of a page without a
 document; `markdown_href`, an address in it.
 
 A lesson or page of the course is written from its document. Every other page (the map, levels,
@@ -20,7 +20,7 @@ from coursebuild.render.exports.markdown import Same, write_blocks, write_footno
 from coursebuild.render.exports.marks import code_span, escaped, guarded, link
 from coursebuild.render.exports.plain import Plain
 from coursebuild.render.lesson import LessonHead, LessonLink, LevelName
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.strings import Strings
 
 Locate: TypeAlias = Callable[[str], str]
@@ -41,18 +41,18 @@ def markdown_href(place: urls.Place, href: str) -> str:
     return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
 
 
-def markdown_copy(sheet: Sheet, page: PageContext | None, body: str, same: Same) -> str:
+def markdown_copy(inputs: PageInputs, page: PageContext | None, body: str, same: Same) -> str:
     """The text of a page; `body` is its HTML, as published, `same` what its notebook shares."""
     if page is None:
-        return html_copy(sheet.path, body)
+        return html_copy(inputs.path, body)
     place, words, document = page.place, page.tools.words, page.document
     here = place.href(place.path)
     context = Plain(page, lambda href: markdown_href(place, href), here, same=same)
     parts = (
-        *head(sheet, words, context.locate),
+        *head(inputs, words, context.locate),
         write_blocks(document.blocks, context, same),
         write_footnotes(document.footnotes, context, same),
-        *_foot(sheet, words, context.locate),
+        *_foot(inputs, words, context.locate),
     )
     return "\n\n".join(filter(None, parts)) + "\n"
 
@@ -66,39 +66,39 @@ def html_copy(path: str, body: str) -> str:
     return f"{markdown_of(body, lambda href: markdown_href(urls.Place(path), href))}\n"
 
 
-def head(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
+def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Title, summary, facts and objectives; of a page that is no lesson, its title."""
-    lesson = sheet.values.get("lesson")
+    lesson = inputs.values.get("lesson")
     if not isinstance(lesson, LessonHead):
-        return [f"# {_line(sheet.title)}"]
+        return [f"# {_line(inputs.title)}"]
     parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
         parts.append(guarded(_line(lesson.summary)))
-    parts.append(" · ".join(_facts(sheet, lesson, words, locate)))
+    parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
     if lesson.objectives:
         items = "\n".join(f"- {guarded(_line(one))}" for one in lesson.objectives)
         parts.append(f"{_line(words('lesson.objectives'))}\n\n{items}")
     return parts
 
 
-def _facts(sheet: Sheet, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
+def _facts(inputs: PageInputs, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
     facts = []
-    level, href = sheet.values.get("level"), sheet.values.get("level_href")
+    level, href = inputs.values.get("level"), inputs.values.get("level_href")
     if isinstance(level, LevelName) and isinstance(href, str):
         name = f"{words('level.label', id=level.id)}: {level.title}"
         facts.append(link(_line(name), locate(href)))
-    facts.append(_line(words(f"status.{sheet.values['status']}")))
+    facts.append(_line(words(f"status.{inputs.values['status']}")))
     if lesson.minutes:
         facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
-    needs = lesson_links(sheet, "needs", locate)
+    needs = lesson_links(inputs, "needs", locate)
     if needs:
         facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")
     return facts
 
 
-def lesson_links(sheet: Sheet, name: str, locate: Locate) -> list[str]:
-    """Links to the lessons that a value of a sheet names."""
-    found = sheet.values.get(name)
+def lesson_links(inputs: PageInputs, name: str, locate: Locate) -> list[str]:
+    """Links to the lessons that a value of inputs names."""
+    found = inputs.values.get(name)
     lessons = found if isinstance(found, tuple) else (found,)
     return [
         link(_line(f"{one.id} {one.title}"), locate(one.href))
@@ -107,10 +107,10 @@ def lesson_links(sheet: Sheet, name: str, locate: Locate) -> list[str]:
     ]
 
 
-def _foot(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
+def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Where to go from here."""
     rows = []
-    scripts = sheet.values.get("scripts")
+    scripts = inputs.values.get("scripts")
     if isinstance(scripts, tuple) and scripts:
         named = (link(code_span(path), href) for path, href in scripts)
         rows.append(f"{_line(words('lesson.scripts'))}: {', '.join(named)}")
@@ -119,7 +119,7 @@ def _foot(sheet: Sheet, words: Strings, locate: Locate) -> list[str]:
         ("previous", "lesson.previous"),
         ("following", "lesson.next"),
     ):
-        links = lesson_links(sheet, name, locate)
+        links = lesson_links(inputs, name, locate)
         if links:
             rows.append(f"{_line(words(key))}: {', '.join(links)}")
     return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []

@@ -1,6 +1,6 @@
 """A lesson as a Jupyter notebook that runs.
 
-Entry points: `notebook(sheet, page, …)`, all that the lesson itself gives, and
+Entry points: `notebook(inputs, page, …)`, all that the lesson itself gives, and
 `finished(notebook, …)`, the file, with what its scripts need around them.
 
 1. Markdown cells are cut at headings and at scripts. Links are made whole with the course's
@@ -37,7 +37,7 @@ from coursebuild.render.exports.markdown import Same, write_blocks
 from coursebuild.render.exports.markdown_copy import head
 from coursebuild.render.exports.marks import escaped, hang, link
 from coursebuild.render.exports.plain import Plain
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.results import Outcome
 
 MAGIC = "%%example"
@@ -70,13 +70,13 @@ class Notebook(Struct, frozen=True):
     """Texts of the first cells, by key, as Markdown."""
 
 
-def notebook(sheet: Sheet, page: PageContext, base_url: str, same: Same) -> Notebook:
+def notebook(inputs: PageInputs, page: PageContext, base_url: str, same: Same) -> Notebook:
     """The cells of a lesson; `same` is what its Markdown copy has written."""
     document, words = page.document, page.tools.words
-    here = _whole(base_url, sheet.path, page.place.href(sheet.path))
-    locate = functools.partial(_whole, base_url, sheet.path)
+    here = _whole(base_url, inputs.path, page.place.href(inputs.path))
+    locate = functools.partial(_whole, base_url, inputs.path)
     context = Plain(page, locate, here, notebook=True, same=same)
-    parts = head(sheet, words, locate)
+    parts = head(inputs, words, locate)
     if base_url:
         parts.append(link(context.words("exports.on_site"), here))
     cells = list(_cells(context, document.blocks))

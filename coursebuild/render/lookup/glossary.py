@@ -1,6 +1,6 @@
 """The glossary: every term of the course, the sentence that defines it, and where it is used.
 
-Entry point: `glossary_sheet`.
+Entry point: `glossary_inputs`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from coursebuild.render import urls
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import GlossaryTerm
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 
 
 class PieceView(Struct, frozen=True):
@@ -42,7 +42,7 @@ class LetterView(Struct, frozen=True):
     terms: tuple[TermView, ...]
 
 
-def glossary_sheet(library: Library) -> Sheet:
+def glossary_inputs(library: Library) -> PageInputs:
     """What the glossary shows."""
     place = urls.Place(urls.GLOSSARY)
     terms = sorted(library.references.terms.values(), key=lambda t: sort_key(t.term.name))
@@ -57,7 +57,7 @@ def glossary_sheet(library: Library) -> Sheet:
         "symbols": place.href(urls.SYMBOLS) if library.references.has_symbols else "",
     }
     title, description = library.words("glossary.title"), library.words("glossary.description")
-    return Sheet(place.path, "glossary", title, description, "glossary.html", values)
+    return PageInputs(place.path, "glossary", title, description, "glossary.html", values)
 
 
 def _view(library: Library, place: urls.Place, found: GlossaryTerm) -> TermView:

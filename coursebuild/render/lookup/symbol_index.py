@@ -1,6 +1,6 @@
 """The index of symbols: what the letters in the formulas of the course stand for, and where.
 
-Entry point: `symbols_sheet`.
+Entry point: `symbols_inputs`.
 
 Symbols whose meaning a lesson declares come first; the others are listed with their places.
 """
@@ -15,7 +15,7 @@ from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import CourseSymbol
 from coursebuild.render.lookup.symbols import sort_key
 from coursebuild.render.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 
 
 class MeaningView(Struct, frozen=True):
@@ -37,7 +37,7 @@ class SymbolView(Struct, frozen=True):
     others: OwnerLinks
 
 
-def symbols_sheet(library: Library) -> Sheet:
+def symbols_inputs(library: Library) -> PageInputs:
     """What the index shows."""
     place = urls.Place(urls.SYMBOLS)
     rows = [
@@ -51,7 +51,7 @@ def symbols_sheet(library: Library) -> Sheet:
         "glossary": place.href(urls.GLOSSARY) if library.references.terms else "",
     }
     title, description = library.words("symbols.title"), library.words("symbols.description")
-    return Sheet(place.path, "symbols", title, description, "symbols.html", values)
+    return PageInputs(place.path, "symbols", title, description, "symbols.html", values)
 
 
 def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:

@@ -49,7 +49,7 @@ from coursebuild.render.packages.processing import (
     response,
 )
 from coursebuild.render.packages.xml import XSI, Element, add, document, element, identifier
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.tools import Tools
 from coursebuild.source import Span
 
@@ -316,10 +316,10 @@ def _is_file(path: str) -> bool:
 
 
 def page_quizzes(
-    sheet: Sheet, document: Document, tools: Tools, base_url: str, language: str
+    inputs: PageInputs, document: Document, tools: Tools, base_url: str, language: str
 ) -> tuple[MadeQuiz, ...]:
     """The quizzes of a document, in its order."""
-    assert sheet.shown is not None
-    page = PageContext.made(tools, sheet.shown, urls.Place(sheet.path), document)
+    assert inputs.shown is not None
+    page = PageContext.made(tools, inputs.shown, urls.Place(inputs.path), document)
     quizzes = (block for block in document_blocks(document) if isinstance(block, Quiz))
     return tuple(made_items(page, quiz, base_url, language or "en") for quiz in quizzes)

@@ -1,6 +1,6 @@
 """A page as it is searched: its text for the reader's browser, and its terms for the index.
 
-Entry points: `searched(sheet, document, body)`; its steps `page_text`, `packed` and `terms`;
+Entry points: `searched(inputs, document, body)`; its steps `page_text`, `packed` and `terms`;
 `call`, a file of the index.
 """
 
@@ -11,10 +11,10 @@ import json
 from coursebuild.model import Document
 from coursebuild.render.characters import visible
 from coursebuild.render.lesson import LessonHead
+from coursebuild.render.page_inputs import Highlighted, PageInputs, Shown, ShownBench
 from coursebuild.render.search.sections import document_sections
 from coursebuild.render.search.values import PageText, Piece, Searched, Section
 from coursebuild.render.search.words import TERMS, runs
-from coursebuild.render.sheet import Highlighted, Sheet, Shown, ShownBench
 
 _LEFT_OUT = frozenset({"home", "notfound", "search"})
 """Kinds of pages that nobody looks for: all that stands on them stands on others as well."""
@@ -44,40 +44,40 @@ _FUNCTION = "coursebuildSearch.take"
 """What a file of the index calls: browsers load scripts from a disk, but no other data."""
 
 
-def searched(sheet: Sheet, document: Document | None, body: str) -> Searched | None:
+def searched(inputs: PageInputs, document: Document | None, body: str) -> Searched | None:
     """What a page gives to the search; `None` where it is not searched. See `page_text`."""
-    text = page_text(sheet, document, body)
+    text = page_text(inputs, document, body)
     if text is None:
         return None
     return Searched(text.name, call("page", "", packed(text)), terms(text))
 
 
-def page_text(sheet: Sheet, document: Document | None, body: str) -> PageText | None:
+def page_text(inputs: PageInputs, document: Document | None, body: str) -> PageText | None:
     """What a page is found by; `None` where it is not searched.
 
     Args:
-        sheet: what is drawn.
+        inputs: what is drawn.
         document: of the page, with its prose, where it has one.
         body: as it was drawn.
     """
-    if sheet.kind in _LEFT_OUT or not (sheet.indexed or sheet.kind in _LEADS):
+    if inputs.kind in _LEFT_OUT or not (inputs.indexed or inputs.kind in _LEADS):
         return None
-    head = sheet.values.get("lesson")
+    head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonHead) else ""
-    lead = (sheet.description, *(head.objectives if isinstance(head, LessonHead) else ()))
+    lead = (inputs.description, *(head.objectives if isinstance(head, LessonHead) else ()))
     if document is not None:
-        known = sheet.shown or Shown()
+        known = inputs.shown or Shown()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}
         measured = {at: _scenario(shown) for at, shown in known.benches.items()}
-        return PageText(sheet.title, name, document_sections(document, lead, labels, measured))
-    code = [v.text for v in sheet.values.values() if isinstance(v, Highlighted)]
+        return PageText(inputs.title, name, document_sections(document, lead, labels, measured))
+    code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
     pieces = [Piece("text", text) for text in lead if text] + [Piece("code", t) for t in code if t]
-    return PageText(sheet.title, name, (Section("", "", 0, tuple(pieces)), *_drawn(sheet, body)))
+    return PageText(inputs.title, name, (Section("", "", 0, tuple(pieces)), *_drawn(inputs, body)))
 
 
-def _drawn(sheet: Sheet, body: str) -> tuple[Section, ...]:
+def _drawn(inputs: PageInputs, body: str) -> tuple[Section, ...]:
     """The sections of a page that was made from no document."""
-    if sheet.kind in _LEADS:
+    if inputs.kind in _LEADS:
         return ()
     from coursebuild.render.search.sections import drawn_sections  # and a parser of HTML
 

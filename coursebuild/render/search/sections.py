@@ -225,7 +225,7 @@ def _line(text: str) -> str:
 
 _HEADINGS = {f"h{level}": level for level in range(1, 7)}
 _HIDDEN = frozenset(("script", "style", "nav", "svg", "pre", "template", "button", "select"))
-"""Elements that say nothing to a search; code is known from the page's sheet."""
+"""Elements that say nothing to a search; code is known from the page's inputs."""
 _LINES = frozenset(
     "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
 )

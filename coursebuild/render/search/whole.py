@@ -13,7 +13,7 @@ from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
 from coursebuild.render.search.files import Entry, SearchFiles
 from coursebuild.render.search.page import searched
-from coursebuild.render.search.sheet import search_words
+from coursebuild.render.search.page_inputs import search_words
 from coursebuild.render.search.values import Searched
 from coursebuild.results import OutputFile
 
@@ -61,7 +61,7 @@ class SearchedPages:
         entry = self._entries[draft.path]
         document = entry.document(self._library)
         whole = None if document is None else self._whole(document)
-        return searched(entry.sheet(self._library), whole, str(draft.body))
+        return searched(entry.inputs(self._library), whole, str(draft.body))
 
 
 class _Memory:

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from coursebuild.render import urls
 from coursebuild.render.library import Library
-from coursebuild.render.sheet import Sheet
+from coursebuild.render.page_inputs import PageInputs
 
 _LIVE = "search.live."
 
 
-def search_sheet(library: Library) -> Sheet:
+def search_inputs(library: Library) -> PageInputs:
     """A form, which the page's script brings to life."""
     place = urls.Place(urls.SEARCH)
     words = library.words
-    return Sheet(
+    return PageInputs(
         urls.SEARCH,
         "search",
         words("search.title"),

@@ -1,9 +1,9 @@
 """A page that is to be drawn, as a value: everything that it shows but the text of its document.
 
-Entry point: `Sheet`.
+Entry point: `PageInputs`.
 
-A page is drawn from its sheet, its document, and the tool's templates and words, and from nothing
-else: so it need be drawn again only when one of these is another. What a sheet is made of are plain
+A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
+else: so it need be drawn again only when one of these is another. What inputs are made of are plain
 values (texts, numbers, tuples, mappings and data classes of them); what a page looks up in the
 course (where a link leads, what a script printed) stands in it as the answer.
 """
@@ -149,7 +149,7 @@ class Graphed(Struct, frozen=True):
     """Ids: what is needed, and what needs it."""
 
 
-class Sheet(Struct, frozen=True):
+class PageInputs(Struct, frozen=True):
     """A page that is to be drawn."""
 
     path: str

@@ -1,4 +1,4 @@
-"""Sheets as bytes: pages are drawn from what is read out of them."""
+"""inputs as bytes: pages are drawn from what is read out of them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.render.library import Library
+from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.page_list import page_list
-from coursebuild.render.sheet import Sheet
 
 TEXT = """\
 See [itself](lesson:1.1) and *terms*{term=spin}, by $x^2$.
@@ -29,11 +29,11 @@ def test_a_sheet_comes_back_as_it_was(make: Callable[..., Any]) -> None:
     library = Library.of(made.course, made.results, made.assets)
     kinds = set()
     for page in page_list(library):
-        sheet = page.sheet(library)
-        back = decode(encode(sheet), Sheet)
-        assert back == sheet
-        # What it is made of is not the same objects: equal sheets have equal bytes.
-        assert encode(back) == encode(sheet) == encode(page.sheet(library))
-        assert fingerprint(back) == fingerprint(sheet)
-        kinds.add(sheet.kind)
+        inputs = page.inputs(library)
+        back = decode(encode(inputs), PageInputs)
+        assert back == inputs
+        # What it is made of is not the same objects: equal inputs have equal bytes.
+        assert encode(back) == encode(inputs) == encode(page.inputs(library))
+        assert fingerprint(back) == fingerprint(inputs)
+        kinds.add(inputs.kind)
     assert {"home", "level", "lesson"} <= kinds
