@@ -45,8 +45,8 @@ class KeptBindings:
     def __init__(self, store: Memo) -> None:
         self._store = store
         self._key = hashlib.sha256(f"bindings\0{tool_digest()}".encode()).hexdigest()
-        data = store.get(_BINDINGS, self._key, local=True)
-        self._before = frozenset(data.decode("ascii").split()) if data is not None else frozenset()
+        known = store.get_value(_BINDINGS, self._key, list[str], local=True)
+        self._before = frozenset(known or ())
         self._now: set[str] = set()
 
     def holds(self, key: str, leans: Asked) -> bool:
@@ -69,5 +69,4 @@ class KeptBindings:
     def save(self) -> None:
         """Keep what was found."""
         if self._now != self._before:
-            data = " ".join(sorted(self._now)).encode("ascii")
-            self._store.put(_BINDINGS, self._key, data, local=True)
+            self._store.put_value(_BINDINGS, self._key, sorted(self._now), local=True)

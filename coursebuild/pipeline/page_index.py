@@ -51,18 +51,12 @@ class PageKeys:
     def save(self) -> None:
         """Keep them for the next build."""
         if self._around is not None and (self._changed or self._before):
-            rows = (f"{key} {row}" for row, key in self._now.items())
-            data = "\n".join((self._around, *rows)).encode()
-            self._store.put(_KIND, self._name, data, local=True)
+            known = self._around, self._now
+            self._store.put_value(_KIND, self._name, known, local=True)
 
     def _load(self) -> dict[str, str]:
-        data = self._store.get(_KIND, self._name, local=True)
-        if data is None or self._around is None:
-            return {}
-        around, *rows = data.decode().split("\n")
-        if around != self._around:
-            return {}
-        return {row: key for key, _, row in (line.partition(" ") for line in rows)}
+        known = self._store.get_value(_KIND, self._name, tuple[str, dict[str, str]], local=True)
+        return known[1] if known is not None and known[0] == self._around else {}
 
 
 def _row(path: str, document: str) -> str:

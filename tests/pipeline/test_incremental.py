@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import os
+import pickle
 import shutil
 
+import msgspec
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.memo import Memo, sealed
 from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
 
 pytestmark = pytest.mark.site
+
+SERVED = ("chapters", "chapters-noted", "compressed", "fonts", "published", "search", "unchanged")
+"""Kinds of entries that are bytes of the site, or none of the memo's."""
+
+
+class Trap:
+    """Ends the process when it is unpickled."""
+
+    def __reduce__(self) -> object:
+        return os._exit, (70,)
 
 
 def lesson(id: str) -> str:
@@ -159,6 +172,34 @@ def test_a_damaged_store_is_made_again(course: Course) -> None:
     assert course.folder.spoil() > 30
     course.edit("1.1", "Prose", "Pros")
     course.edit("1.1", "Pros", "Prose")
+    shutil.rmtree(course.folder.root / "public")
+    assert course.folder.main("build", "--quiet").status == 0
+    assert course.folder.tree("public") == before
+
+
+@pytest.mark.parametrize(
+    "junk",
+    [
+        b"",
+        b"null",
+        b"[[1]]",
+        msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
+        pickle.dumps(Trap()),
+    ],
+    ids=["empty", "null", "other", "a call", "pickle"],
+)
+def test_whole_entries_that_somebody_else_wrote_are_ignored(course: Course, junk: bytes) -> None:
+    assert course.folder.main("build", "--quiet").status == 0
+    before = course.folder.tree("public")
+    folder = course.folder.root / ".coursebuild"
+    kinds = set()
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        kind = name.partition("/")[0]
+        if path.is_file() and len(path.name) == 64 and kind not in SERVED:
+            path.write_bytes(sealed(name, junk))
+            kinds.add(kind)
+    assert {"summaries", "pages", "maps", "keys"} <= kinds
     shutil.rmtree(course.folder.root / "public")
     assert course.folder.main("build", "--quiet").status == 0
     assert course.folder.tree("public") == before
