@@ -10,7 +10,6 @@ Entry point: `Documents`, a context manager, which gives summaries (`parse`) and
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -18,9 +17,9 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.steps import step_key
 from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.fingerprints import course_fingerprint
 from coursebuild.pipeline.tasks import (
@@ -30,11 +29,10 @@ from coursebuild.pipeline.tasks import (
     Draw,
     Drawn,
     Later,
-    Read,
     Request,
     Task,
 )
-from coursebuild.source import Source, key_of
+from coursebuild.source import Source
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
@@ -106,7 +104,7 @@ class Documents:
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; nothing where it found nothing in one of this fingerprint."""
-        key = hashlib.sha256(f"checked course\0{tool_digest()}".encode()).hexdigest()
+        key = step_key("checked course")
         state = (self.fingerprint(course) or "").encode()
         if state and self._store.get(_CHECKED, key, local=True) == state:
             return ()
@@ -148,7 +146,7 @@ class Documents:
                 self._readers[task.source.path] = reader
 
     def _requests(self, tasks: Sequence[Task]) -> Iterator[tuple[int | None, Request]]:
-        yield from ((None, Read(task)) for task in tasks)
+        yield from ((None, task) for task in tasks)
         if self._workers is not None:
             for name in self._following:
                 importlib.import_module(name)
@@ -186,7 +184,7 @@ class Documents:
         self, kind: str, source: Source, parse: Callable[[Source], Parsed[Value]]
     ) -> Parsed[Value]:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
-        key = key_of(tool_digest(), source.path, source.text)
+        key = step_key(kind, source.path, source.text)
         data = self._store.get(kind, key, local=True)
         found = decode(data, Parsed, source)
         if found is not None:

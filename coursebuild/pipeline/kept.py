@@ -6,14 +6,13 @@ Entry points: `kept_font`; `KeptBindings`.
 from __future__ import annotations
 
 import functools
-import hashlib
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.steps import step_key
 from coursebuild.effects.prepared import prepared_cut, prepared_source
-from coursebuild.effects.tool import tool_digest
 
 if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob
@@ -44,7 +43,7 @@ class KeptBindings:
 
     def __init__(self, store: Memo) -> None:
         self._store = store
-        self._key = hashlib.sha256(f"bindings\0{tool_digest()}".encode()).hexdigest()
+        self._key = step_key("bindings")
         known = store.get_value(_BINDINGS, self._key, list[str], local=True)
         self._before = frozenset(known or ())
         self._now: set[str] = set()

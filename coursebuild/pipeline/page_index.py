@@ -13,7 +13,7 @@ import hashlib
 import sys
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.effects.tool import tool_digest
+from coursebuild.core.engine.steps import step_key
 from coursebuild.render.links import has
 from coursebuild.render.record import PageRecord
 from coursebuild.render.shared import PageFacts
@@ -28,7 +28,7 @@ class PageKeys:
         """`around`: a hash of all that inputs are made of besides documents, where it is known."""
         self._store = store
         self._around = around
-        self._name = hashlib.sha256(f"keys of pages\0{tool_digest()}".encode()).hexdigest()
+        self._name = step_key("keys of pages")
         self._before = self._load()
         """What was not asked for yet; what was is moved, so that no row is held twice."""
         self._now: dict[str, str] = {}

@@ -16,7 +16,6 @@ Of a page no more is held than its key and how its inputs are made: a course may
 from __future__ import annotations
 
 import functools
-import hashlib
 import itertools
 import operator
 from collections.abc import Iterable, Iterator
@@ -25,8 +24,8 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.values import decode, encode, fingerprint
-from coursebuild.effects.tool import tool_digest
+from coursebuild.core.engine.steps import step_key
+from coursebuild.core.values import decode, encode
 from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
@@ -129,10 +128,10 @@ class Pages:
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
-        frame = hashlib.sha256(self._frame(names).encode()).hexdigest()
+        frame = self._frame(names)
         frames = Frames(self._library, names)
         for page in self._pages:
-            key = hashlib.sha256(f"{page.wanted.key}{frame}".encode()).hexdigest()
+            key = key_of(page.wanted.key, frame)
             make = functools.partial(self._framed, page.wanted, frames)
             yield CachedFile(page.wanted.path, key, make)
 
@@ -171,7 +170,7 @@ class Pages:
         if course is None:
             return None
         results = results_fingerprint(self._library.results, self._library.reports)
-        return hashlib.sha256(f"{course}{results}".encode()).hexdigest()
+        return key_of(course, results)
 
     def _wanted(self, page: PageEntry, keys: PageKeys) -> _Wanted:
         document = page.document(self._library)
@@ -197,10 +196,10 @@ class Pages:
         return Draw(inputs, task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
-        """All that a frame shows besides its page."""
+        """The key of all that a frame shows besides its page."""
         course, results = self._library.course, self._library.results
-        shown = (
-            tool_digest(),
+        return step_key(
+            "frame",
             course.language,
             course.title,
             course.key,
@@ -213,7 +212,6 @@ class Pages:
             results.python,
             names,
         )
-        return fingerprint(shown)
 
     # --- records and bodies
 
@@ -278,6 +276,5 @@ def page_key(course: Course, documents: Documents, document: str | None, inputs:
 
 def text_page_key(course: Course, text: Task | None, inputs: bytes) -> str:
     """The same, by the text of its document."""
-    shown = hashlib.sha256(inputs).hexdigest()
     key = text.key if text is not None else ""
-    return key_of(tool_digest(), course.language, course.base_url, shown, key)
+    return step_key("page", course.language, course.base_url, inputs, key)

@@ -1,8 +1,8 @@
 """Documents read and pages drawn, one request at a time, here or in a copy of this process.
 
-Entry point: `Reader`, whose `answer` takes a `Read` or a `Draw`.
+Entry point: `Reader`, whose `answer` takes a `Task` or a `Draw`.
 
-1. `Read`: the text is parsed and its formulas are typeset; the summary is kept in the store.
+1. `Task`: the text is parsed and its formulas are typeset; the summary is kept in the store.
 2. `Draw`: a page is drawn from its inputs and its document; body and record are kept in the store.
 3. The document and its formulas stay for the drawing. Those that an earlier build has read, or
    another process, are parsed again, and their MathML comes from the store.
@@ -24,11 +24,12 @@ from msgspec.structs import replace
 
 from coursebuild.checks.formulas import document_formulas, formula_findings
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.steps import step_key
 from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.effects.prepared import prepared_folder
 from coursebuild.effects.resources import template_texts
-from coursebuild.effects.tool import tool_digest, typesetter_digest
+from coursebuild.effects.tool import typesetter_digest
 from coursebuild.effects.versions import package_version
 from coursebuild.model import Document, Script, document_blocks
 from coursebuild.model.summary import without_prose
@@ -45,7 +46,6 @@ from coursebuild.pipeline.tasks import (
     Drawn,
     KeptPage,
     Later,
-    Read,
     Request,
     Task,
 )
@@ -138,8 +138,8 @@ class Reader:
     def answer(self, request: Request) -> Answer:
         """Do what is asked."""
         match request:
-            case Read():
-                return self._read(request.task)
+            case Task():
+                return self._read(request)
             case Draw():
                 self._rest()
                 return self._draw(request)
@@ -286,7 +286,7 @@ class _Marks:
         self._version = package_version("pygments")
 
     def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
-        key = key_of(tool_digest(), self._version, language, code)
+        key = step_key("code", self._version, language, code)
         found = self._store.get_value(_CODE, key, list[str], local=True)
         if found is not None:
             return tuple(map(Markup, found))

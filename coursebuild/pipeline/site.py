@@ -20,13 +20,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.steps import step_key
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.digests import Digests
 from coursebuild.effects.packages import distributions, library_files
 from coursebuild.effects.prepared import prepared_copy, prepared_folder
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Course
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
@@ -111,7 +111,7 @@ class _Site:
         if not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        listed = file_list(names, key_of(tool_digest(), repr(names)))
+        listed = file_list(names, step_key("list of files", names))
         return Site(everything, listed, found, pages.drawn)
 
     # --- what all pages share
@@ -119,8 +119,7 @@ class _Site:
     def _shared(self, facts: PageFacts) -> tuple[Names, list[SiteFile]]:
         """The shared files, made only for characters and styles for which they were not made."""
         facts = replace(facts, text=facts.text | common_characters(self.library))
-        parts = (facts.text, facts.mathematics, facts.declarations)
-        key = key_of(tool_digest(), *("\0".join(sorted(part)) for part in parts))
+        key = step_key("shared files", facts)
         data = _Data(self.store, key, functools.partial(self._make_shared, facts))
         names, paths = data.listing()
         files = [CachedFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
@@ -186,7 +185,7 @@ class _Site:
         for make in zips.archives(self.library, around):
             archive = make()
             if archive is not None:
-                key = key_of(tool_digest(), archive.key)
+                key = step_key("archive", archive.key)
                 self._packed[archive.path] = key, make
                 yield CachedFile(archive.path, key, functools.partial(_packed, make))
 

@@ -1,21 +1,21 @@
 """What is asked of a `Reader`, and what it answers and keeps.
 
-Entry points: `Task`, a text to parse, and its `DocumentSummary`; `Read`, `Draw` and `Ask`, tasks;
-`Later`, a page that is put together when it is sent; `Drawn`, and `KeptPage`, the same in the memo.
+Entry points: `Task`, a text to parse, and what is known of it then, its `DocumentSummary`; `Draw`
+and `Ask`, what is made of a page; `Later`, a page that is put together when it is sent; `Drawn`,
+and `KeptPage`, the same in the memo.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.engine.steps import step_key
 from coursebuild.core.values import decode, encode
 from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.tool import tool_digest
 from coursebuild.model import Document
 from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.record import PageRecord
@@ -33,7 +33,7 @@ SUMMARIES, PAGES, BYPRODUCTS, ITEMS = "summaries", "pages", "byproducts", "items
 
 
 class Task(Struct, frozen=True):
-    """A text to parse."""
+    """Parse a text."""
 
     source: Source
     callouts: frozenset[str]
@@ -44,16 +44,8 @@ class Task(Struct, frozen=True):
     @classmethod
     def of(cls, source: Source, callouts: frozenset[str], lesson: bool) -> Task:
         """With its key."""
-        parts = (
-            tool_digest(),
-            str(lesson),
-            *sorted(callouts),
-            "",
-            source.path,
-        )
-        digest = hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass"))
-        digest.update(b"\0" + source.digest)
-        return cls(source, callouts, lesson, digest.hexdigest())
+        key = step_key("summary", lesson, callouts, source.path, source.digest)
+        return cls(source, callouts, lesson, key)
 
     def is_of(self, source: Source, callouts: frozenset[str], lesson: bool) -> bool:
         """Whether it is the task of these."""
@@ -82,12 +74,6 @@ def all_imports(summaries: Iterable[DocumentSummary]) -> dict[str, frozenset[str
 
 
 # --- drawing
-
-
-class Read(Struct, frozen=True):
-    """Read a text."""
-
-    task: Task
 
 
 class Draw(Struct, frozen=True):
@@ -147,7 +133,7 @@ class Drawn(Struct, frozen=True):
     """What it gives to the files beside it."""
 
 
-Request: TypeAlias = Read | Draw | Ask | Later
+Request: TypeAlias = Task | Draw | Ask | Later
 Answer: TypeAlias = bytes
 """The summary of what was read; the packed record of the page that was drawn; the packed
 items of its quizzes."""
