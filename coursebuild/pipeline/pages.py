@@ -218,7 +218,7 @@ class Pages:
     def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> list[_Page]:
         """The pages with what their records say; they are drawn where they have none."""
         pages: list[_Wanted] = []
-        tasks: dict[str, PageRecord] = {}
+        records: dict[str, PageRecord] = {}
         new: list[_Wanted] = []
 
         def missing() -> Iterator[Later]:  # inputs are made while pages are drawn
@@ -231,15 +231,15 @@ class Pages:
                     yield self._later(page)
                 else:
                     self._inputs.pop(page.path, None)
-                    tasks[page.path] = record
+                    records[page.path] = record
 
         for page, data in zip(new, self._documents.draw(missing()), strict=True):
             record = decode(data, PageRecord)
             assert record is not None
-            tasks[page.path] = record
+            records[page.path] = record
         self.drawn = tuple(page.path for page in new)
         """Site paths of the pages that were drawn just now."""
-        return [self._noted(page, tasks[page.path]) for page in pages]
+        return [self._noted(page, records[page.path]) for page in pages]
 
     def _later(self, page: _Wanted) -> Later:
         return Later(page.document, functools.partial(self._request, page))
