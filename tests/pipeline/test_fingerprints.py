@@ -28,7 +28,7 @@ from coursebuild.scripts.compare import verify
 from coursebuild.scripts.extract import extract
 from coursebuild.source import Source
 from coursebuild.syntax.coursemap import parse_course_map
-from support.skeleton_lessons import MAP, PARTS, document, library_of, with_documents
+from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
 
 pytestmark = pytest.mark.site
 
