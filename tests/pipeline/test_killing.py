@@ -95,12 +95,15 @@ def again(template: Folder, folder: Folder) -> None:
 
 
 def leftovers(folder: Folder) -> list[str]:
-    """What no command leaves where it got through."""
+    """What no command leaves where it got through; half an entry of the memo goes later."""
     everything = [path.relative_to(folder.root).as_posix() for path in folder.root.rglob("*")]
+    kept = ".coursebuild/published/"
+    parts = ("tmp", ".new-", ".coursebuild-new", ".coursebuild-old", "__pycache__")
     return [
         name
         for name in everything
-        if "tmp" in name or ".new-" in name or ".old-" in name or "__pycache__" in name
+        if any(part in name for part in parts)
+        and (name.startswith(kept) or not name.startswith(".coursebuild/"))
     ]
 
 
