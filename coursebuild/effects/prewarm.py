@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from coursebuild.effects.store import Store
+from coursebuild.core.engine.memo import Memo
 from coursebuild.results import ScriptRun
 
 RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
@@ -34,7 +34,7 @@ _LATEST = 4
 
 
 @contextlib.contextmanager
-def prewarmed_runner(root: Path, store: Store) -> Iterator[RunAll | None]:
+def prewarmed_runner(root: Path, store: Memo) -> Iterator[RunAll | None]:
     """What runs scripts, once, where some are likely to be run.
 
     It has begun to import what they need, and is closed when it has run them, or in the end.
@@ -56,7 +56,7 @@ def prewarmed_runner(root: Path, store: Store) -> Iterator[RunAll | None]:
         yield run
 
 
-def scripts_will_run(root: Path, store: Store) -> bool:
+def scripts_will_run(root: Path, store: Memo) -> bool:
     """Whether there is a script that is not what `examples/` holds, or no result is to be used."""
     found = [
         (root / os.fsdecode(path), code)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.prewarm import prewarmed_runner, scripts_will_run
-from coursebuild.effects.store import Store
 from coursebuild.results import Outcome, ScriptJob
 
 CODE = "import mujoco\nprint(6 * 7)\n"
@@ -29,21 +29,21 @@ def write(root: Path, text: str, name: str = "1.1-a.md") -> None:
     (root / "content/lessons" / name).write_bytes(text.encode())
 
 
-def known(root: Path) -> Store:
+def known(root: Path) -> Memo:
     """A store in which there are results."""
     (root / ".coursebuild/scripts").mkdir(parents=True, exist_ok=True)
-    return Store(root)
+    return Memo(root)
 
 
 def test_where_nothing_is_known_any_script_will_run(root: Path) -> None:
-    assert not scripts_will_run(root, Store(root))
+    assert not scripts_will_run(root, Memo(root))
     (root / "examples/a.py").write_text(CODE)
     for fence in ("```", "````", "~~~"):
         for end in ("\n", "\r\n"):
             write(root, text(fence=fence).replace("\n", end))
-            assert scripts_will_run(root, Store(root)), (fence, end)
+            assert scripts_will_run(root, Memo(root)), (fence, end)
             assert not scripts_will_run(root, known(root)), (fence, end)
-            assert scripts_will_run(root, Store(root, fresh=True)), (fence, end)
+            assert scripts_will_run(root, Memo(root, fresh=True)), (fence, end)
             (root / ".coursebuild/scripts").rmdir()
 
 
@@ -56,7 +56,7 @@ def test_where_there_is_no_script_none_will_run(root: Path) -> None:
         "```python file=examples/a.py\nno end",
     ):
         write(root, lesson)
-        assert not scripts_will_run(root, Store(root)), lesson
+        assert not scripts_will_run(root, Memo(root)), lesson
 
 
 def test_a_script_that_was_changed_will_run(root: Path) -> None:
@@ -76,7 +76,7 @@ def test_any_bytes(root: Path) -> None:
     (root / "content/lessons/1.2-b.md").mkdir()
     (root / "content/lessons/1.3-c.md").symlink_to("nowhere")
     os.mkfifo(root / "content/lessons/1.4-d.md")
-    assert not scripts_will_run(root, Store(root))
+    assert not scripts_will_run(root, Memo(root))
     write(root, text(), "1.5-e.md")
     os.mkfifo(root / "examples/a.py")
     assert scripts_will_run(root, known(root))
@@ -86,7 +86,7 @@ def test_they_are_run_by_what_was_begun(root: Path) -> None:
     write(root, text())
     (root / "examples/a.py").write_text("print(6 * 7)\n")
     job = ScriptJob("examples/a.py", (), 20.0, (), norun=False)
-    with prewarmed_runner(root, Store(root)) as run_all:
+    with prewarmed_runner(root, Memo(root)) as run_all:
         assert run_all is not None
         [run] = run_all(root, [job], parallel=2)
         assert (run.outcome, run.stdout) == (Outcome.OK, "42\n")
