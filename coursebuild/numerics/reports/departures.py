@@ -12,17 +12,17 @@ Entry points: `scene_departures(recorded, measured, bands)`, `case_departures`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import TypeAlias, TypeVar
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,
     SceneReport,
-    Setting,
     StableRow,
     WorkPrecisionRow,
 )
@@ -40,6 +40,7 @@ _SAME = 1e-9
 Value: TypeAlias = float | str | bool | None
 _T = TypeVar("_T")
 _K = TypeVar("_K", bound=Hashable)
+_Run = TypeVar("_Run", WorkPrecisionRow, ErrorLine)
 
 
 class Departure(Struct, frozen=True):
@@ -75,8 +76,8 @@ def scene_departures(
     found: list[Departure] = []
     for name, old, new in _pairs(recorded.scenarios, measured.scenarios, lambda one: one.name):
         comparing = _Comparing(name, "", bands, found)
-        if comparing.both("scenario", old, new) and old is not None and new is not None:
-            _scenario(comparing, old, new)
+        if both := comparing.both("scenario", old, new):
+            _scenario(comparing, *both)
     return tuple(found)
 
 
@@ -87,71 +88,77 @@ def case_departures(
     found: list[Departure] = []
     for name, old, new in _pairs(recorded, measured, lambda one: one.name):
         comparing = _Comparing(name, "", bands, found)
-        if comparing.both("case", old, new) and old is not None and new is not None:
-            _case(comparing, old, new)
+        if both := comparing.both("case", old, new):
+            _case(comparing, *both)
     return tuple(found)
 
 
-class _Comparing:
+class _Comparing(Struct, frozen=True, eq=False):
     """Compares figures of one setting, and keeps what left its band."""
 
-    def __init__(self, where: str, setting: str, bands: Bands, found: list[Departure]) -> None:
-        self.where = where
-        self.setting = setting
-        self.bands = bands
-        self.found = found
+    where: str
+    setting: str
+    bands: Bands
+    found: list[Departure]
 
     def of(self, setting: str) -> _Comparing:
         """The same of another setting."""
-        return _Comparing(self.where, setting, self.bands, self.found)
+        return replace(self, setting=setting)
 
-    def both(self, what: str, old: object, new: object) -> bool:
-        """Whether something is in both; what is in one only is told."""
-        if (old is None) != (new is None):
+    def both(self, what: str, old: _T | None, new: _T | None) -> tuple[_T, _T] | None:
+        """Something that is in both; what is in one only is told."""
+        if old is not None and new is not None:
+            return old, new
+        if old is not None or new is not None:
             there = ["nothing" if one is None else "there" for one in (old, new)]
-            self._tell(what, there[0], there[1], "the same")
-        return old is not None and new is not None
+            self._depart(what, there[0], there[1], "the same")
+        return None
 
     def same(self, figure: str, old: Value, new: Value) -> None:
         """What must be as it was."""
         if old != new:
-            self._tell(figure, _said(old), _said(new), "the same")
+            self._depart(figure, _shown(old), _shown(new), "the same")
 
     def near(
-        self, figure: str, old: float | None, new: float | None, share: float, least: float
+        self, figure: str, old: float | None, new: float | None, share: float, least: float = 0.0
     ) -> None:
         """A number that may differ by a share of what it was, and by `least` in any case."""
-        if old is None and new is None:
-            return
-        band = f"± {100 * share:g} %"
-        if old is None or new is None or not abs(new - old) <= share * abs(old) + least:
-            self._tell(figure, _said(old), _said(new), band)
+        self._within(figure, old, new, share * abs(old or 0.0) + least, f"± {100 * share:g} %")
 
     def error(
-        self, name: str, old: tuple[float, float] | None, new: tuple[float, float] | None, lo: float
+        self,
+        name: str,
+        old: tuple[float, float] | None,
+        new: tuple[float, float] | None,
+        least: float,
     ) -> None:
-        """An error, at its largest and at the end; none is known better than to `lo`."""
+        """An error, at its largest and at the end; none is known better than to `least`."""
+        share = self.bands.error
         if old is None or new is None:
-            if old != new:
-                shown = [None if pair is None else pair[0] for pair in (old, new)]
-                self.near(f"error of {name}", shown[0], shown[1], self.bands.error, 0.0)
+            a, b = (None if pair is None else pair[0] for pair in (old, new))
+            self.near(f"error of {name}", a, b, share)
             return
         for where, a, b in zip(("", " at the end"), old, new, strict=True):
-            self.near(f"error of {name}{where}", a, b, self.bands.error, lo)
+            self.near(f"error of {name}{where}", a, b, share, least)
 
     def order(self, name: str, old: float | None, new: float | None) -> None:
         """A fitted order."""
         band = self.bands.order
+        self._within(f"order of {name}", old, new, band, f"± {band:g}")
+
+    def _within(
+        self, figure: str, old: float | None, new: float | None, room: float, band: str
+    ) -> None:
         if old is None and new is None:
             return
-        if old is None or new is None or not abs(new - old) <= band:
-            self._tell(f"order of {name}", _said(old), _said(new), f"± {band:g}")
+        if old is None or new is None or not abs(new - old) <= room:
+            self._depart(figure, _shown(old), _shown(new), band)
 
-    def _tell(self, figure: str, old: str, new: str, band: str) -> None:
+    def _depart(self, figure: str, old: str, new: str, band: str) -> None:
         self.found.append(Departure(self.where, self.setting, figure, old, new, band))
 
 
-def _said(value: Value) -> str:
+def _shown(value: Value) -> str:
     match value:
         case None:
             return "nothing"
@@ -167,9 +174,8 @@ def _pairs(
     old: Sequence[_T], new: Sequence[_T], key: Callable[[_T], _K]
 ) -> Iterator[tuple[_K, _T | None, _T | None]]:
     """What has the same key, in the order of the first, then what only the second has."""
-    first: Mapping[_K, _T] = {key(one): one for one in old}
-    second: Mapping[_K, _T] = {key(one): one for one in new}
-    for name in (*first, *(name for name in second if name not in first)):
+    first, second = {key(one): one for one in old}, {key(one): one for one in new}
+    for name in first | second:
         yield name, first.get(name), second.get(name)
 
 
@@ -177,57 +183,65 @@ def _pairs(
 
 
 def _scenario(comparing: _Comparing, old: ScenarioReport, new: ScenarioReport) -> None:
-    comparing.near("duration", old.duration, new.duration, _SAME, 0.0)
-    comparing.near("hold", old.hold, new.hold, _SAME, 0.0)
-    comparing.near("horizon", old.horizon, new.horizon, comparing.bands.error, 0.0)
+    comparing.near("duration", old.duration, new.duration, _SAME)
+    comparing.near("hold", old.hold, new.hold, _SAME)
+    comparing.near("horizon", old.horizon, new.horizon, comparing.bands.error)
     comparing.same("reference", old.reference, new.reference)
     comparing.same("figure", old.figure, new.figure)
-    least = (
-        FLOORS * max(old.floor, new.floor),
-        FLOORS * max(old.velocity_floor, new.velocity_floor),
-    )
+    place = FLOORS * max(old.floor, new.floor)
+    speed = FLOORS * max(old.velocity_floor, new.velocity_floor)
     known = all(one.horizon >= one.duration * (1 - _SAME) for one in (old, new))
-
-    def setting_of(row: WorkPrecisionRow) -> Setting:
-        return row.setting
-
-    for setting, before, after in _pairs(old.rows, new.rows, setting_of):
+    for setting, before, after in _pairs(old.rows, new.rows, lambda row: row.setting):
         one = comparing.of(setting_text(setting))
-        if one.both("setting", before, after) and before is not None and after is not None:
-            _row(one, before, after, least, known=known)
+        if rows := one.both("setting", before, after):
+            _row(one, *rows, place, speed, known=known)
     _orders(comparing, old.orders, new.orders)
     for name, limit, now in _pairs(old.stable, new.stable, lambda row: row.integrator):
         one = comparing.of(name)
-        if one.both("largest stable timestep", limit, now) and limit and now:
-            _largest(one, limit, now)
+        if limits := one.both("largest stable timestep", limit, now):
+            _largest(one, *limits)
 
 
 def _row(
     comparing: _Comparing,
     old: WorkPrecisionRow,
     new: WorkPrecisionRow,
-    least: tuple[float, float],
+    place: float,
+    speed: float,
     *,
     known: bool,
 ) -> None:
-    """`known`: whether the motion can be told to its end."""
+    """Compare a setting; `known`: whether the motion can be told to its end.
+
+    `place`, `speed`: what errors of places and velocities are not known better than.
+    """
     comparing.same("own setting", old.own, new.own)
+    if not _run(comparing, old, new, place, speed, known=known):
+        return
+    share = comparing.bands.error
+    comparing.error("figure", old.figure, new.figure, place)
+    comparing.near("visible error", old.seen, new.seen, share, _INVISIBLE)
+    comparing.near("model error", old.model_error, new.model_error, share, place + _ROUNDING)
+    if old.status == "ok" and known:
+        comparing.near("slip", old.slip, new.slip, share, _ROUNDING)
+
+
+def _run(
+    comparing: _Comparing, old: _Run, new: _Run, place: float, speed: float, *, known: bool = True
+) -> bool:
+    """What is measured of every run; whether both went alike."""
     comparing.same("status", status_text(old.status), status_text(new.status))
     if old.status != new.status:
-        return  # what else differs does so for that reason
+        return False  # what else differs does so for that reason
     comparing.same("refsafe", old.refsafe, new.refsafe)
-    for name in ("figure", "position", "attitude"):
-        comparing.error(name, getattr(old, name), getattr(new, name), least[0])
-    comparing.error("velocity", old.velocity, new.velocity, least[1])
-    share = comparing.bands.error
-    comparing.near("visible error", old.seen, new.seen, share, _INVISIBLE)
-    comparing.near("model error", old.model_error, new.model_error, share, least[0] + _ROUNDING)
-    if old.status != "ok" or not known:
-        return  # how a lost run ended, or a chaotic one, says nothing
-    comparing.near("energy drift", old.energy_drift, new.energy_drift, share, _ROUNDING)
-    comparing.near("momentum drift", old.momentum_drift, new.momentum_drift, share, _ROUNDING)
-    comparing.near("penetration", old.penetration, new.penetration, share, _ROUNDING)
-    comparing.near("slip", old.slip, new.slip, share, _ROUNDING)
+    comparing.error("position", old.position, new.position, place)
+    comparing.error("attitude", old.attitude, new.attitude, place)
+    comparing.error("velocity", old.velocity, new.velocity, speed)
+    if old.status == "ok" and known:  # how a lost run ended, or a chaotic one, says nothing
+        for name in ("energy_drift", "momentum_drift", "penetration"):
+            a, b = getattr(old, name), getattr(new, name)
+            comparing.near(name.replace("_", " "), a, b, comparing.bands.error, _ROUNDING)
+    return True
 
 
 def _orders(comparing: _Comparing, old: Sequence[OrderRow], new: Sequence[OrderRow]) -> None:
@@ -240,11 +254,12 @@ def _orders(comparing: _Comparing, old: Sequence[OrderRow], new: Sequence[OrderR
 def _largest(
     comparing: _Comparing, old: StableRow | BoundaryLine, new: StableRow | BoundaryLine
 ) -> None:
+    name = "largest stable timestep"
     if old.largest is None or new.largest is None:
-        shown = ["all" if x.largest is None else seconds_text(x.largest) for x in (old, new)]
-        comparing.same("largest stable timestep", shown[0], shown[1])
+        a, b = ("all" if x.largest is None else seconds_text(x.largest) for x in (old, new))
+        comparing.same(name, a, b)
     else:
-        comparing.near("largest stable timestep", old.largest, new.largest, _STABLE, 0.0)
+        comparing.near(name, old.largest, new.largest, _STABLE)
     comparing.same("monotone", old.monotone, new.monotone)
 
 
@@ -256,53 +271,31 @@ def _case(comparing: _Comparing, old: CaseReport, new: CaseReport) -> None:
     least = FLOORS * max(floors, default=0.0)
     for name, limit, now in _pairs(old.boundaries, new.boundaries, lambda line: line.integrator):
         one = comparing.of(name)
-        if one.both("largest stable timestep", limit, now) and limit and now:
-            _largest(one, limit, now)
-            one.same("beyond", status_text(limit.beyond), status_text(now.beyond))
-            one.near("growth", limit.growth, now.growth, comparing.bands.error, 0.0)
-
-    def name_of(line: FigureLine) -> tuple[str, str]:
-        return line.name, line.integrator
-
-    for (figure, name), first, last in _pairs(old.figures, new.figures, name_of):
+        if limits := one.both("largest stable timestep", limit, now):
+            before, after = limits
+            _largest(one, before, after)
+            one.same("beyond", status_text(before.beyond), status_text(after.beyond))
+            one.near("growth", before.growth, after.growth, comparing.bands.error)
+    figures = _pairs(old.figures, new.figures, lambda line: (line.name, line.integrator))
+    for (figure, name), first, last in figures:
         one = comparing.of(name)
-        if one.both(figure, first, last) and first and last:
-            _figure(one, first, last, least)
+        if lines := one.both(figure, first, last):
+            _figure(one, *lines, least)
     _orders(comparing, old.orders, new.orders)
-
-    def run_of(line: ErrorLine) -> tuple[str, float]:
-        return line.integrator, line.timestep
-
-    for (name, timestep), run, rerun in _pairs(old.errors, new.errors, run_of):
+    runs = _pairs(old.errors, new.errors, lambda line: (line.integrator, line.timestep))
+    for (name, timestep), run, again in runs:
         one = comparing.of(f"{name} at {seconds_text(timestep)}")
-        if one.both("run", run, rerun) and run and rerun:
-            _error_line(one, run, rerun, least)
+        if pair := one.both("run", run, again):
+            _run(one, *pair, least, least)
 
 
 def _figure(comparing: _Comparing, old: FigureLine, new: FigureLine, least: float) -> None:
     """What is known exactly is compared by how far it is off, and what is not by its size."""
     share = comparing.bands.error
-    if None in (old.exact, new.exact, old.measured, new.measured):
-        comparing.near(f"exact {old.name}", old.exact, new.exact, _SAME, 0.0)
+    comparing.near(f"exact {old.name}", old.exact, new.exact, _SAME)
+    if old.exact is None or new.exact is None or old.measured is None or new.measured is None:
         comparing.near(old.name, old.measured, new.measured, share, _ROUNDING)
         return
-    assert old.exact is not None and new.exact is not None
-    assert old.measured is not None and new.measured is not None
-    comparing.near(f"exact {old.name}", old.exact, new.exact, _SAME, 0.0)
     size = max(abs(old.exact), abs(old.measured))
     off = (old.measured - old.exact, new.measured - new.exact)
     comparing.near(f"{old.name}, against theory", *off, share, _ROUNDING * size + least)
-
-
-def _error_line(comparing: _Comparing, old: ErrorLine, new: ErrorLine, least: float) -> None:
-    comparing.same("status", status_text(old.status), status_text(new.status))
-    if old.status != new.status:
-        return
-    comparing.same("refsafe", old.refsafe, new.refsafe)
-    for name in ("position", "attitude", "velocity"):
-        comparing.error(name, getattr(old, name), getattr(new, name), least)
-    if old.status == "ok":
-        share = comparing.bands.error
-        comparing.near("energy drift", old.energy_drift, new.energy_drift, share, _ROUNDING)
-        comparing.near("momentum drift", old.momentum_drift, new.momentum_drift, share, _ROUNDING)
-        comparing.near("penetration", old.penetration, new.penetration, share, _ROUNDING)
