@@ -26,7 +26,7 @@ def bench(arguments: argparse.Namespace) -> int:
     """Report speed against error of the course's models."""
     from msgspec.structs import replace
 
-    from coursebuild.pipeline.plots import plot_file, write_plots
+    from coursebuild.pipeline.bench import plot_file, write_plots
     from coursebuild.report.bench import bench_text
     from coursebuild.report.bench_json import bench_values
     from coursebuild.report.measuring import measured_json, measured_text

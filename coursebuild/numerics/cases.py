@@ -116,7 +116,7 @@ def _reference(problem: Problem) -> ReferenceLine | None:
 
 
 def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
-    measured, exact = check.measure(integrator), check.exact(integrator)
+    measured, exact = check.measure(integrator), check.expected(integrator)
     return FigureLine(
         check.name,
         check.unit,

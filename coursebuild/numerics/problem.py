@@ -140,11 +140,15 @@ class ScalarCheck(Struct, frozen=True):
 
     name: str
     unit: str
-    exact: Callable[[Integrator], float | None]
-    """What it is in theory; `None` where theory does not say it for this integrator."""
+    exact: float | Callable[[Integrator], float] | None
+    """What it is in theory, perhaps for an integrator; `None` where theory does not say it."""
     measure: Callable[[Integrator], float]
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
+
+    def expected(self, integrator: Integrator) -> float | None:
+        """What it is in theory for an integrator."""
+        return self.exact(integrator) if callable(self.exact) else self.exact
 
 
 class Setup(Struct, frozen=True, kw_only=True):

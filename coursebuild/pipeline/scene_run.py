@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _SCENE, _SCENARIO = "bench", "bench-scenarios"
 """Kinds of what is kept."""
 _T = TypeVar("_T")
-_CODE = ("coursebuild/numerics", "coursebuild/pipeline/cards.py", "mjcourse/spatial")
+_CODE = ("coursebuild/numerics", "coursebuild/pipeline/measuring.py", "mjcourse/spatial")
 """What measures and says what was measured."""
 _LOCK = "bench-lock"
 
@@ -102,7 +102,7 @@ class SceneRun:
             kept = SceneReport(scene.name, scene.digest, self.quick, here, found)
             self._keep(_SCENE, parts, kept)
         if self.cards and kept.card is None and kept.scenarios:
-            from coursebuild.pipeline.cards import with_card
+            from coursebuild.pipeline.measuring import with_card
 
             self.progress.doing(scene.name, "what it is made of")
             kept = with_card(self.options.root, scene, kept)

@@ -31,7 +31,9 @@ def recorded(course: Path, *found: ScenarioReport) -> Benched:
 @pytest.fixture
 def no_cards(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a model is made of is told elsewhere."""
-    monkeypatch.setattr("coursebuild.pipeline.cards.with_card", lambda root, scene, report: report)
+    monkeypatch.setattr(
+        "coursebuild.pipeline.measuring.with_card", lambda root, scene, report: report
+    )
 
 
 @pytest.mark.usefixtures("no_cards")

@@ -8,7 +8,7 @@ import pytest
 
 from coursebuild.effects.machine import machine
 from coursebuild.numerics.reports.bench import SceneReport
-from coursebuild.pipeline.cards import with_card
+from coursebuild.pipeline.measuring import with_card
 from coursebuild.pipeline.scenes import find_scenes
 
 pytestmark = pytest.mark.site

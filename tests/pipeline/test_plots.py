@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.pipeline.bench import plot_file, write_plots
 from coursebuild.pipeline.options import UsageError
-from coursebuild.pipeline.plots import plot_file, write_plots
 from support.bench_reports import lost, scenario, scene, swing
 
 

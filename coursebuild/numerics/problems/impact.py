@@ -216,7 +216,7 @@ def _restitutions() -> tuple[ScalarCheck, ...]:
         ScalarCheck(
             f"restitution, {steps} to {steps + 1} steps in a contact, at worst",
             "",
-            lambda _: 1.0,
+            1.0,
             lambda integrator, steps=steps: restitution(integrator, steps),  # type: ignore[misc]
             "no damping",
         )
@@ -265,7 +265,7 @@ def problems() -> tuple[Problem, ...]:
                 ScalarCheck(
                     "velocity of the last ball, 20 steps in a contact",
                     "m/s",
-                    lambda _: SPEED,
+                    SPEED,
                     lambda integrator: passed_on(integrator, 20),
                     "equal masses exchange their velocities",
                 ),

@@ -15,6 +15,7 @@ import math
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
@@ -113,132 +114,111 @@ def problems() -> tuple[Problem, ...]:
     )
 
 
-def _references(
-    law: str, pull: float, inertia: float, turn: float, across: bool, *, floor: float
-) -> tuple[Reference, Reference]:
-    """The closed form of a steady acceleration `pull` (m/s²), and the balance of energy.
-
-    `inertia` is that of the motion relative to the mass, `turn` rad for each metre.
-    """
-    closed = Reference(
-        "closed", law, lambda times: _straight(pull, turn, across, times), floor=floor
-    )
-    balance = Reference(
-        "ode",
-        "the balance of energy, Bulirsch–Stoer",
-        lambda times: _integrated(pull * inertia, inertia, turn, across, times),
-        floor=10 * floor,
-    )
-    return closed, balance
-
-
-_LADDER = (2e-3, 1e-3, 5e-4)
-
-
 def _sliding(cone: Cone, across: bool) -> Problem:
-    pull = GRAVITY * (math.sin(SLIDING) - FRICTION * math.cos(SLIDING))
+    fall, press = GRAVITY * math.sin(SLIDING), GRAVITY * math.cos(SLIDING)
     text = mjcf("box", SLIDING, across, cone, FRICTION)
-    where = "across" if across else "along"
-    said = "between the axes" if across else "along an axis"
-    law = "Coulomb's law, a = g (sin α − μ cos α)"
-    reference, second = _references(law, pull, 1.0, 0.0, across, floor=1e-14)
-    return Problem(
-        name=f"sliding-block-{cone}-{where}",
-        title=f"Block sliding {said} of an {cone} cone"
-        if cone == "elliptic"
-        else f"Block sliding {said} of a {cone} cone",
-        case=7,
-        mjcf=text,
-        scenario=_SCENARIO,
-        position_bound=20.0,
-        velocity_bound=20.0,
-        reference=reference,
-        second=second,
-        timesteps=_LADDER,
-        checks=(
-            ScalarCheck(
-                "acceleration when sliding, from 0.5 s to 1 s at 1 ms",
-                "m/s²",
-                lambda _: pull,
-                lambda integrator: acceleration(text, integrator),
-                "Coulomb's law",
-            ),
-            *(_blunted(text),) * (cone == "pyramidal" and across),
-        ),
-        smooth=False,
-        penetration_bound=_HALF / 2,
-        note="the error is the model's: soft contacts, and the cone; no order is to be expected",
-    )
-
-
-def _blunted(text: str) -> ScalarCheck:
-    """Half-way between the axes |f₁| + |f₂| ≤ μ f leaves μ/√2."""
-    pull = GRAVITY * (math.sin(SLIDING) - FRICTION / math.sqrt(2) * math.cos(SLIDING))
-    return ScalarCheck(
-        "the same, against a pyramid's friction",
-        "m/s²",
-        lambda _: pull,
-        lambda integrator: acceleration(text, integrator),
-        "|f₁| + |f₂| ≤ μ f",
+    name, pull = "acceleration when sliding, from 0.5 s to 1 s at 1 ms", fall - FRICTION * press
+    checks = [_acceleration(name, text, pull, "Coulomb's law")]
+    if cone == "pyramidal" and across:  # |f₁| + |f₂| ≤ μ f leaves μ/√2 half-way between the axes
+        name, blunted = "the same, against a pyramid's friction", FRICTION / math.sqrt(2)
+        checks.append(_acceleration(name, text, fall - blunted * press, "|f₁| + |f₂| ≤ μ f"))
+    where = "between the axes" if across else "along an axis"
+    article = "an" if cone == "elliptic" else "a"
+    return _problem(
+        f"sliding-block-{cone}-{'across' if across else 'along'}",
+        f"Block sliding {where} of {article} {cone} cone",
+        text,
+        _references("Coulomb's law, a = g (sin α − μ cos α)", pull, across=across, floor=1e-14),
+        tuple(checks),
+        "the error is the model's: soft contacts, and the cone; no order is to be expected",
     )
 
 
 def _rolling(cone: Cone) -> Problem:
     pull = 5 / 7 * GRAVITY * math.sin(ROLLING)
     text = mjcf("sphere", ROLLING, False, cone, 1.0)
-    law = "rolling without slipping, a = 5/7 g sin α"
-    reference, second = _references(law, pull, 7 / 5, 1 / _HALF, False, floor=1e-13)
-    return Problem(
-        name=f"rolling-ball-{cone}",
-        title=f"Ball rolling, {cone} cone",
-        case=7,
-        mjcf=text,
-        scenario=_SCENARIO,
-        position_bound=20.0,
-        velocity_bound=200.0,
-        reference=reference,
-        second=second,
-        timesteps=_LADDER,
-        checks=(
-            ScalarCheck(
-                "acceleration when rolling, from 0.5 s to 1 s at 1 ms",
-                "m/s²",
-                lambda _: pull,
-                lambda integrator: acceleration(text, integrator),
-                "a = 5/7 g sin α",
-            ),
+    name, law = "acceleration when rolling, from 0.5 s to 1 s at 1 ms", "a = 5/7 g sin α"
+    found = _problem(
+        f"rolling-ball-{cone}",
+        f"Ball rolling, {cone} cone",
+        text,
+        _references(
+            f"rolling without slipping, {law}", pull, inertia=7 / 5, turn=1 / _HALF, floor=1e-13
         ),
-        smooth=False,
-        penetration_bound=_HALF / 2,
-        note="the ball sinks in, and so rolls on a shorter arm: the error is the model's",
+        (_acceleration(name, text, pull, law),),
+        "the ball sinks in, and so rolls on a shorter arm: the error is the model's",
     )
+    return replace(found, velocity_bound=200.0)
 
 
 def _sticking(cone: Cone) -> Problem:
     text = mjcf("box", STICKING, False, cone, FRICTION)
-    law = "Coulomb's law: tan α < μ, so that it rests"
-    reference, second = _references(law, 0.0, 1.0, 0.0, False, floor=1e-15)
+
+    def slipped(integrator: Integrator) -> float:
+        return creep(text, integrator)
+
+    found = _problem(
+        f"sticking-block-{cone}",
+        f"Block that should stick, {cone} cone",
+        text,
+        _references("Coulomb's law: tan α < μ, so that it rests", 0.0, floor=1e-15),
+        (ScalarCheck("creep after 2 s at 1 ms", "m/s", 0.0, slipped, "Coulomb's law"),),
+        "soft friction gives way at a steady velocity",
+    )
+    return replace(found, scenario=Scenario(2.0, 0.1), position_bound=1.0, velocity_bound=1.0)
+
+
+def _acceleration(name: str, text: str, exact: float, law: str) -> ScalarCheck:
+    return ScalarCheck(name, "m/s²", exact, lambda integrator: acceleration(text, integrator), law)
+
+
+def _problem(
+    name: str,
+    title: str,
+    text: str,
+    references: tuple[Reference, Reference],
+    checks: tuple[ScalarCheck, ...],
+    note: str,
+) -> Problem:
     return Problem(
-        name=f"sticking-block-{cone}",
-        title=f"Block that should stick, {cone} cone",
+        name=name,
+        title=title,
         case=7,
         mjcf=text,
-        scenario=Scenario(2.0, 0.1),
-        position_bound=1.0,
-        velocity_bound=1.0,
-        reference=reference,
-        second=second,
-        timesteps=_LADDER,
-        checks=(
-            ScalarCheck(
-                "creep after 2 s at 1 ms",
-                "m/s",
-                lambda _: 0.0,
-                lambda integrator: creep(text, integrator),
-                "Coulomb's law",
-            ),
-        ),
-        smooth=False,
+        scenario=_SCENARIO,
+        position_bound=20.0,
+        velocity_bound=20.0,
         penetration_bound=_HALF / 2,
-        note="soft friction gives way at a steady velocity",
+        reference=references[0],
+        second=references[1],
+        timesteps=(2e-3, 1e-3, 5e-4),
+        checks=checks,
+        smooth=False,
+        note=note,
+    )
+
+
+def _references(
+    law: str,
+    pull: float,
+    *,
+    inertia: float = 1.0,
+    turn: float = 0.0,
+    across: bool = False,
+    floor: float,
+) -> tuple[Reference, Reference]:
+    """The closed form of a steady acceleration `pull` (m/s²), and the balance of energy.
+
+    `inertia` is that of the motion relative to the mass, `turn` rad for each metre.
+    """
+
+    def closed(times: Array) -> Motion:
+        return _straight(pull, turn, across, times)
+
+    def balance(times: Array) -> Motion:
+        return _integrated(pull * inertia, inertia, turn, across, times)
+
+    return (
+        Reference("closed", law, closed, floor=floor),
+        Reference("ode", "the balance of energy, Bulirsch–Stoer", balance, floor=10 * floor),
     )

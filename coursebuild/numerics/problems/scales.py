@@ -142,7 +142,7 @@ def _cube() -> Problem:
             ScalarCheck(
                 "how deep it rests in the floor, in edges",
                 "",
-                lambda _: 0.0,
+                0.0,
                 sunk,
                 "rigid bodies do not sink",
             ),
@@ -171,7 +171,7 @@ def _distant() -> Problem:
             ScalarCheck(
                 f"distance gone in 1 s at 1 mm/s, {timestep:g} s a step",
                 "m",
-                lambda _: CRAWL,
+                CRAWL,
                 lambda integrator, timestep=timestep: crawled(integrator, timestep),  # type: ignore[misc]
                 "a uniform motion",
                 (Integrator.EULER, Integrator.RK4),
@@ -201,7 +201,7 @@ def _plate() -> Problem:
             ScalarCheck(
                 "axial moment of the plate with four digits, after balanceinertia",
                 "kg m²",
-                lambda _: PLATE_MOMENTS[2],
+                PLATE_MOMENTS[2],
                 _axial_moment,
                 "what was written",
                 (Integrator.EULER,),

@@ -120,14 +120,14 @@ def _problem(ratio: float) -> Problem:
             ScalarCheck(
                 f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
                 "m",
-                lambda _: float(rest.sum()),
+                float(rest.sum()),
                 lambda integrator: _sunk(integrator, ratio),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
             ScalarCheck(
                 "velocity that is left then",
                 "m/s",
-                lambda _: 0.0,
+                0.0,
                 lambda integrator: _speed(integrator, ratio),
                 "at rest",
             ),

@@ -235,7 +235,7 @@ def problem() -> Problem:
             ScalarCheck(
                 "change of the kinetic energy over 20 s at 2 ms",
                 "%",
-                lambda _: 0.0,
+                0.0,
                 kinetic_drift,
                 "no torque acts",
             ),
@@ -252,7 +252,7 @@ def _flip(nudge: float) -> ScalarCheck:
     return ScalarCheck(
         f"flip interval after a nudge of {nudge:g} rad/s, at 2 ms",
         "s",
-        lambda _: Tumbling(nudge, SPIN).flip_interval,
+        Tumbling(nudge, SPIN).flip_interval,
         lambda integrator: 2 * measured_crossing(integrator, nudge),
         "2 K(m)/λ",
         (Integrator.EULER, Integrator.IMPLICITFAST, Integrator.RK4),

@@ -8,6 +8,7 @@ must be in vain whatever happens is its `proof`; without one only runs speak for
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from msgspec import Struct
@@ -75,6 +76,11 @@ class Look(Struct, frozen=True, eq=False):
     def model(self) -> Any:
         """The whole model, compiled."""
         return self.scene.model
+
+
+def worded(items: Sequence[Item], one: str, many: str) -> str:
+    """What to say of one item, or of several."""
+    return one if len(items) == 1 else many
 
 
 def named_item(element: Element, *more: Element) -> Item:

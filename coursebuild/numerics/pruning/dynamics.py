@@ -20,7 +20,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.edits import set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import thing_kind
@@ -57,11 +57,13 @@ def _tendons(look: Look) -> Iterator[Candidate]:
         if all(_slack(look.model, number) for number in thing.ids):
             items.append(named_item(element))
     if items:
-        what = "the tendon {}, and nobody reads its length"
-        if len(items) > 1:
-            what = "the tendons {}, and nobody reads their lengths"
+        message = worded(
+            items,
+            "nothing acts along the tendon {}, and nobody reads its length",
+            "nothing acts along the tendons {}, and nobody reads their lengths",
+        )
         proof = "it has no stiffness, damping, friction, inertia or limit, and nothing refers to it"
-        yield Candidate("tendon-idle", f"nothing acts along {what}", tuple(items), proof)
+        yield Candidate("tendon-idle", message, tuple(items), proof)
 
 
 _TENDON = frozenset(("tendon", "tendon1", "tendon2", "objname", "refname"))
@@ -102,14 +104,13 @@ def _actuators(look: Look) -> Iterator[Candidate]:
     blocked = ""
     if "controls" in look.numbered:
         blocked = "scenarios give commands by number: their rows would have to be shortened"
-    said = "nobody commands the actuator{}"
+    said = "nobody commands the actuator {}", "nobody commands the actuators {}"
     if free:
         proof = "its force is a multiple of a command that is always 0"
-        message = said.replace("{}", " {}" if len(free) == 1 else "s {}")
+        message = worded(free, *said)
         yield Candidate("actuator-idle", message, tuple(free), proof, blocked=blocked)
     if held:
-        message = said.replace("{}", " {}" if len(held) == 1 else "s {}")
-        message += ", and no force came of " + ("it" if len(held) == 1 else "them")
+        message = worded(held, *said) + ", and no force came of " + worded(held, "it", "them")
         yield Candidate("actuator-idle", message, tuple(held), blocked=blocked)
 
 
@@ -220,7 +221,7 @@ def _geoms(look: Look, pairs: frozenset[Pair], apart: frozenset[Pair]) -> Iterat
             name = element.get("name") or place_of(element)
             items.append(Item(name, element, edits=edits))
     if items:
-        what = "the geom {}" if len(items) == 1 else "the geoms {}"
+        what = worded(items, "the geom {}", "the geoms {}")
         yield Candidate(
             "collision-unreachable",
             f"contacts are searched for on {what}, which can touch nothing",

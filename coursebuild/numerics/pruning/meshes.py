@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, worded
 from coursebuild.numerics.pruning.edits import Edit, drop_attribute, set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.unused import asset_name
@@ -41,7 +41,7 @@ def meshes(look: Look) -> Iterator[Candidate]:
         if item is not None:
             items.append(item)
     if items:
-        what = "the geom {} is" if len(items) == 1 else "the geoms {} are"
+        what = worded(items, "the geom {} is", "the geoms {} are")
         blocked = "whether the shape is near enough to look at is for a person to say"
         yield Candidate(
             "mesh-primitive",

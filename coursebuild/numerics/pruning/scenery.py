@@ -21,7 +21,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.reachability import moving_ball
 from coursebuild.numerics.pruning.trees import Box, References, Trees, Vector
@@ -61,10 +61,9 @@ def _bodies(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Ite
     if items:
         nearest = min(region.distance(trees.region([root])) for root in roots)
         farthest = max(trees.way(root) for root in roots)
-        one = len(items) == 1
-        message = f"the {'body' if one else 'bodies'} {{}} {'stays' if one else 'stay'} at least "
-        message += f"{nearest:.3g} m away from what the scene is about, and "
-        message += f"{'moves' if one else 'move'} {farthest:.2g} m"
+        message = worded(items, "the body {} stays", "the bodies {} stay")
+        message += f" at least {nearest:.3g} m away from what the scene is about, and "
+        message += worded(items, "moves", "move") + f" {farthest:.2g} m"
         who = look.readers.whole("number") or look.readers.whole("body-number")
         blocked = ""
         if look.numbered & {"qpos", "qvel"}:
@@ -124,10 +123,9 @@ def _geoms(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Iter
             done |= set(element.walk())
             items.append(Item(_name(element), element, (element, *refers.loose)))
     if items and not look.readers.whole("shape"):
-        what = "the geom {}" if len(items) == 1 else "the geoms {}"
-        message = f"{what} of the world can be reached by nothing, and lie far away"
-        if len(items) == 1:
-            message = f"{what} of the world can be reached by nothing, and lies far away"
+        message = worded(items, "the geom {}", "the geoms {}")
+        message += " of the world can be reached by nothing, and "
+        message += worded(items, "lies far away", "lie far away")
         proof = "" if ball is None else "whatever the joints do, all that moves stays away from it"
         who = look.readers.whole("body-number")
         doubt = f"{who} may count geoms by number" if who else ""

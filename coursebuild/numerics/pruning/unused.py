@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from pathlib import PurePosixPath
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item
+from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import thing_kind
 
@@ -43,7 +43,7 @@ _UNNAMED = "nothing refers to it, and nobody mentions it"
 
 def _some(kind: str, message: str, items: list[Item], proof: str, what: str) -> Iterator[Candidate]:
     if items:
-        named = (what if len(items) == 1 else _PLURALS.get(what, f"{what}s")) + " {}"
+        named = worded(items, what, _PLURALS.get(what, f"{what}s")) + " {}"
         timed = what in ("site", "sensor")
         message = message.replace("{}", named)
         if any(len(item.gone) > 1 for item in items):
