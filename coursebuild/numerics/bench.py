@@ -21,6 +21,7 @@ from coursebuild.model.scenarios import Declarations
 from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import Placed, Point, front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
+from coursebuild.numerics.observe import quantity_name
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.problem import STANDARD
 from coursebuild.numerics.references import conserved, energy_beyond, references
@@ -35,7 +36,6 @@ from coursebuild.numerics.rows import Basis, Measured, measured
 from coursebuild.numerics.scene import Scene, scenes
 from coursebuild.numerics.settings import own_setting, settings, stable
 from coursebuild.numerics.timing import Clock, Cost, costs, subnormal
-from coursebuild.numerics.visible import quantity_name
 from mjcourse.spatial import angular_distance
 
 _STRAIGHT = 0.75

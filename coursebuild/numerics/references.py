@@ -29,8 +29,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.model.scenarios import DeclaredScenario
-from coursebuild.numerics.closed_forms import closed_motion
-from coursebuild.numerics.contacts import Sticks, sticking
+from coursebuild.numerics.cases import closed_motion
 from coursebuild.numerics.detector import Judgement, Status
 from coursebuild.numerics.engine import (
     Run,
@@ -58,11 +57,11 @@ from coursebuild.numerics.measure import (
     errors,
     momentum_drift,
 )
+from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
 from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
 from coursebuild.numerics.scene import SceneError
 from coursebuild.numerics.settings import CONES
-from coursebuild.numerics.visible import visible_error
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""

@@ -20,7 +20,6 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.contacts import slip
 from coursebuild.numerics.engine import Run, States, motion_of, refsafe_active, simulate
 from coursebuild.numerics.measure import (
     FLOORS,
@@ -30,13 +29,13 @@ from coursebuild.numerics.measure import (
     momentum_drift,
     raised,
 )
+from coursebuild.numerics.observe import quantity_name, quantity_values, slip, visible_error
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.references import Cone, Conserved, Known
 from coursebuild.numerics.reports.bench import Setting, WorkPrecisionRow
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.settings import with_setting
 from coursebuild.numerics.stability import attempted
-from coursebuild.numerics.visible import quantity_name, quantity_values, visible_error
 
 
 class Basis(Struct, frozen=True, eq=False):

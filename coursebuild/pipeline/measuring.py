@@ -22,8 +22,8 @@ from msgspec.structs import replace
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.errors import EffectError
 from coursebuild.numerics.bench import measure_scenario
-from coursebuild.numerics.contacts import touched_pairs
 from coursebuild.numerics.engine import silent
+from coursebuild.numerics.observe import touched_pairs
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look
 from coursebuild.numerics.pruning.compare import Case, Comparison, Seen, watch
 from coursebuild.numerics.pruning.dynamics import collisions, idle, settings
 from coursebuild.numerics.pruning.edits import Edit, merge_edits
@@ -26,7 +25,15 @@ from coursebuild.numerics.pruning.meshes import meshes
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.pruning.scenery import scenery
-from coursebuild.numerics.pruning.trials import NotTriedError, Ratio, Trial, Trials
+from coursebuild.numerics.pruning.trials import (
+    Candidate,
+    Item,
+    Look,
+    NotTriedError,
+    Ratio,
+    Trial,
+    Trials,
+)
 from coursebuild.numerics.pruning.unused import unused
 from coursebuild.numerics.reports.diet import (
     CHANGES,

@@ -20,11 +20,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.edits import set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
+from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
 
 _NO_BIAS = int(mujoco.mjtBias.mjBIAS_NONE)
 _NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)

@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, worded
 from coursebuild.numerics.pruning.edits import Edit, drop_attribute, set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.trials import Candidate, Item, Look, worded
 from coursebuild.numerics.pruning.unused import asset_name
 from mjcourse.spatial import quat_conj, quat_rotate
 

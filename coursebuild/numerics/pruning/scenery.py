@@ -21,10 +21,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.reachability import moving_ball
 from coursebuild.numerics.pruning.trees import Box, References, Trees, Vector
+from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
 
 REGIONS = 5.0
 """Sizes of the region that what matters sweeps, or can reach."""

@@ -16,9 +16,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from coursebuild.numerics.pruning.candidates import Look
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import is_repeated
+from coursebuild.numerics.pruning.trials import Look
 from coursebuild.numerics.pruning.unused import unread_sensors
 
 Vector = NDArray[np.float64]

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from pathlib import PurePosixPath
 
-from coursebuild.numerics.pruning.candidates import Candidate, Item, Look, named_item, worded
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import thing_kind
+from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
 
 _SITE = frozenset(
     "site site1 site2 refsite cranksite slidersite sidesite objname refname".split(" ")

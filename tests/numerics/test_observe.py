@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.contacts import slip, speeds_of, sticking, touched_pairs
 from coursebuild.numerics.engine import States
+from coursebuild.numerics.observe import slip, speeds_of, sticking, touched_pairs
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.scene import Scene, scenes
