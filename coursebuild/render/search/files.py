@@ -1,8 +1,8 @@
 """The files of the search: the list of pages, the shards of the index, the text of each page.
 
-Entry point: `SearchFiles`, a sequence of steps that need little memory however long the course is.
+Entry point: `SearchFiles`.
 
-1. The terms of a bucket's pages become cells, unless `shelf` has them from an earlier build.
+1. The terms of a bucket's pages are sorted into slices, unless `shelf` has these from before.
 2. Every file is known by name and key before it is made, and is made when it is published.
 3. `search/index.js` lists pages and names; it has the one name that is always the same, so that a
    page need not change with the index.
@@ -20,15 +20,13 @@ from msgspec import Struct
 from coursebuild.render import urls
 from coursebuild.render.compressed import COPIES, copy_of
 from coursebuild.render.search import index
-from coursebuild.render.search.index import DIGEST, Cells, Numbers, Plan
+from coursebuild.render.search.index import Numbers, Plan
 from coursebuild.render.search.page import call
 from coursebuild.results import CachedFile
 
 FOLDER = "assets/search"
 _QUALITY = 5
 """Of Brotli: the tenth would be a seventh less for ten times the time."""
-_MOST = 64
-"""Buckets of which the numbers of pages are remembered."""
 
 
 class Entry(Struct, frozen=True):
@@ -82,16 +80,16 @@ class SearchFiles:
         self._entries, self._words = entries, words
         self._text, self._terms, self._shelf = text, terms, shelf
         self._plan = Plan.of(len(entries))
-        self._members: list[list[int]] = [[] for _ in range(self._plan.buckets)]
+        members: list[list[int]] = [[] for _ in range(self._plan.buckets)]
         for number, entry in enumerate(entries):
-            self._members[self._plan.bucket(entry.path)].append(number)
-        self._numbers = functools.lru_cache(_MOST)(self._numbers_of)
-        self._made: dict[tuple[int, int], bytes] = {}
-        self._group: tuple[int, list[list[bytes]]] = (-1, [])
-        self._last: tuple[int, bytes] = (-1, b"")
-        digests = [self._digests(bucket) for bucket in range(self._plan.buckets)]
+            members[self._plan.bucket(entry.path)].append(number)
+        self._numbers = list(map(Numbers, members))
+        buckets = map(self._slices_of, members)
+        self._slices = list(zip(*buckets, strict=True))
+        """Of each shard, in the order of the buckets."""
         order = hashlib.sha256("\n".join(entry.path for entry in entries).encode()).hexdigest()
-        self._names = tuple(index.names(self._plan, digests, order))
+        self._names = tuple(index.name(slices, order) for slices in self._slices)
+        self._shard = functools.lru_cache(maxsize=1)(self._shard_of)  # its copies come next
 
     def files(self) -> Iterator[CachedFile]:
         """All of them, with smaller copies of the index but not of the pages' texts."""
@@ -128,58 +126,23 @@ class SearchFiles:
         }
         return call("index", "", value)
 
-    # --- shards
+    def _shard_of(self, number: int) -> bytes:
+        parts = zip(self._slices[number], self._numbers, strict=True)
+        return call("shard", f"{number}", index.shard(parts))
 
-    def _shard(self, number: int) -> bytes:
-        if self._last[0] != number:  # its copies are asked for next
-            self._last = number, self._merged(number)
-        return self._last[1]
-
-    def _merged(self, number: int) -> bytes:
-        group = next(g for g, numbers in enumerate(self._plan.groups) if number in numbers)
-        at = number - self._plan.groups[group].start
-        if self._group[0] != group:
-            buckets = range(self._plan.buckets)
-            self._group = group, [index.slices(self._cell(b, group)) for b in buckets]
-        parts = (slices[at] for slices in self._group[1])
-        numbers = map(self._numbers, range(self._plan.buckets))
-        return call("shard", f"{number}", index.shard(zip(parts, numbers, strict=True)))
-
-    def _numbers_of(self, bucket: int) -> Numbers:
-        return Numbers(self._members[bucket])
-
-    def _digests(self, bucket: int) -> bytes:
-        """Of all slices of a bucket."""
-        known = self._shelf.get(self._key(bucket, "digests"))
-        size = (self._plan.terms + self._plan.words) * DIGEST
-        if known is not None and len(known) == size:
-            return known
-        return self._sorted(bucket).digests
-
-    def _cell(self, bucket: int, group: int) -> bytes:
-        made = self._made.get((bucket, group))
-        if made is not None:
-            return made
-        known = self._shelf.get(self._key(bucket, str(group)))
-        if known is not None and known.count(b"\0") == len(self._plan.groups[group]) - 1:
-            return known
-        return self._sorted(bucket).groups[group]
-
-    def _sorted(self, bucket: int) -> Cells:
-        """The cells of a bucket, made now and kept."""
-        pages = (self._terms(self._entries[number].path) for number in self._members[bucket])
-        found = index.cells(self._plan, pages)
-        for group, data in enumerate(found.groups):
-            self._made[bucket, group] = data
-            self._shelf.put(self._key(bucket, str(group)), data)
-        self._shelf.put(self._key(bucket, "digests"), found.digests)
-        return found
-
-    def _key(self, bucket: int, part: str) -> str:
+    def _slices_of(self, members: Sequence[int]) -> list[bytes]:
+        """What the pages of a bucket give to each shard."""
         plan = self._plan
-        said = [f"cells {index.FORMAT} {plan.terms} {plan.words} {part}"]
-        said += [self._entries[number].digest for number in self._members[bucket]]
-        return hashlib.sha256("\n".join(said).encode()).hexdigest()
+        said = [f"slices {index.FORMAT} {plan.terms} {plan.words}"]
+        said += [self._entries[number].digest for number in members]
+        key = hashlib.sha256("\n".join(said).encode()).hexdigest()
+        known = self._shelf.get(key)
+        found = [] if known is None else known.split(b"\0")
+        if len(found) != plan.shards:
+            pages = (self._terms(self._entries[number].path) for number in members)
+            found = index.sort_terms(plan, pages)
+            self._shelf.put(key, b"\0".join(found))
+        return found
 
 
 def _copied(path: str, key: str, make: Callable[[], bytes]) -> Iterator[CachedFile]:

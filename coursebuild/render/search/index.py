@@ -1,19 +1,18 @@
 """The index of a course: terms and the pages that have them, in many small files.
 
-Entry points: `Plan`, how many files there are; `cells` and `shard`, by which they are made.
+Entry points: `Plan`, how many files there are; `sort_terms` and `shard`, by which they are made.
 
 A query loads the file of each of its words, and no other. Terms that begin alike stand in one file,
 so that the beginning of a word finds it. A third kind of file has the terms alone: by these a
 misspelt word is set right.
 
 1. Pages are dealt out to buckets by their path. The terms of a bucket's pages are sorted into the
-   shards of the index; what one shard gets of one bucket is a slice, and slices go by their digest.
-2. Shards stand in groups; the slices of one bucket for one group are a cell, which is kept.
-3. A shard is put together from its slices of all buckets, and is named by their digests. An edit
-   makes one bucket's cells anew, and of the shards those of which a slice is another.
+   shards of the index; what one shard gets of one bucket is a slice. The slices of a bucket are
+   kept from build to build.
+2. A shard is put together from its slices of all buckets, and is named by a hash of them. An edit
+   sorts one bucket anew, and makes those shards of which a slice is another.
 
-So what is held at once is a bucket or a column of cells, and every file follows from the pages and
-from nothing else.
+So every file follows from the pages and from nothing else.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
@@ -32,7 +31,6 @@ FORMAT = 1
 _PAGES_A_BUCKET = 16
 _PAGES_A_SHARD = 8
 _MOST_SHARDS = 1024
-_SHARDS_A_GROUP = 32
 _DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 
 
@@ -52,20 +50,15 @@ class Plan(Struct, frozen=True):
         return cls(_below(pages / _PAGES_A_BUCKET), terms, _below(terms / 8))
 
     @property
-    def groups(self) -> tuple[range, ...]:
-        """Numbers of the shards that stand together: those with pages, then those without."""
-        step, end = _SHARDS_A_GROUP, self.terms
-        return (*(range(at, min(at + step, end)) for at in range(0, end, step)), self._alone)
-
-    @property
-    def _alone(self) -> range:
-        return range(self.terms, self.terms + self.words)
+    def shards(self) -> int:
+        """All of them: those of terms with pages come first."""
+        return self.terms + self.words
 
     def bucket(self, path: str) -> int:
         """Which bucket has a page."""
         return _hash(path) & (self.buckets - 1)
 
-    def shards(self, term: str) -> tuple[int, ...]:
+    def places(self, term: str) -> tuple[int, ...]:
         """Numbers of the shards that have a term."""
         if term.isascii() and term.isalpha():  # as most are: what follows would give the same
             first, fuzzy = _placed(term[:BEGINNING]), 3 <= len(term) <= 24
@@ -91,45 +84,25 @@ def _hash(text: str) -> int:
 _placed = functools.lru_cache(maxsize=1 << 14)(_hash)
 
 
-class Cells(Struct, frozen=True):
-    """What the index gets of one bucket."""
-
-    groups: tuple[bytes, ...]
-    """For each group of shards its slices; see `slices`."""
-    digests: bytes
-    """Of all slices in order, `DIGEST` bytes each."""
-
-
-DIGEST = 8
-
-
-def cells(plan: Plan, pages: Iterable[bytes]) -> Cells:
+def sort_terms(plan: Plan, pages: Iterable[bytes]) -> list[bytes]:
     """Sort the terms of a bucket's pages, given in the order of the course, into slices."""
-    found: list[dict[str, str]] = [{} for _ in range(plan.terms + plan.words)]
+    found: list[dict[str, str]] = [{} for _ in range(plan.shards)]
     pages_of: defaultdict[str, list[str]] = defaultdict(list)
     for number, data in enumerate(pages):
         having = {digit: f" {number:x}{digit}" for digit in "0123456789abcdef"}
         for line in data.decode().split("\n") if data else ():
             pages_of[line[1:]].append(having[line[0]])
-    for term, places in pages_of.items():
-        first, *others = plan.shards(term)
-        found[first][term] = "".join(places)
-        for shard in others:
-            found[shard][term] = " "
-    slices = [_slice(terms) for terms in found]
-    groups = tuple(b"\0".join(slices[n] for n in group) for group in plan.groups)
-    digests = b"".join(hashlib.blake2b(part, digest_size=DIGEST).digest() for part in slices)
-    return Cells(groups, digests)
+    for term, said in pages_of.items():
+        first, *others = plan.places(term)
+        found[first][term] = "".join(said)
+        for place in others:
+            found[place][term] = " "
+    return [_slice(terms) for terms in found]
 
 
 def _slice(terms: dict[str, str]) -> bytes:
     """Lines of a term and the pages that have it: their hexadecimal number here, and the weight."""
     return "\n".join([term + terms[term] for term in sorted(terms)]).encode()
-
-
-def slices(group: bytes) -> list[bytes]:
-    """The slices of a cell."""
-    return group.split(b"\0")
 
 
 class Numbers(dict[str, int]):
@@ -194,15 +167,13 @@ def _digits(value: int) -> str:
     return said + _DIGIT[value]
 
 
-def names(plan: Plan, digests: Sequence[bytes], order: str) -> Iterator[str]:
-    """What each shard is called by: a hash of all that it is made from.
+def name(slices: Iterable[bytes], order: str) -> str:
+    """What a shard is called by: a hash of all that it is made from.
 
     Args:
-        plan: of the index.
-        digests: of the slices of each bucket.
-        order: a digest of the order of all pages, whose numbers the shards have.
+        slices: of all buckets.
+        order: a digest of the order of all pages, whose numbers the shard has.
     """
-    for at in range(0, (plan.terms + plan.words) * DIGEST, DIGEST):
-        parts = b"".join(bucket[at : at + DIGEST] for bucket in digests)
-        whole = hashlib.sha256(f"{FORMAT} {order} ".encode() + parts)
-        yield whole.hexdigest()[:8]
+    digests = (hashlib.blake2b(part, digest_size=8).digest() for part in slices)
+    whole = hashlib.sha256(f"{FORMAT} {order} ".encode() + b"".join(digests))
+    return whole.hexdigest()[:8]
