@@ -16,7 +16,7 @@ from coursebuild.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.model import CodeBlock
 from coursebuild.source import Excerpt, Source, Span
 from coursebuild.syntax.info import first_word, kind_of, parse_info
-from coursebuild.syntax.spans import Placed, Row, locate, trimmed
+from coursebuild.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
@@ -59,11 +59,11 @@ def is_ours(kind: str) -> bool:
     return kind in CORE_FENCES or kind in fence_names()
 
 
-def read_fence(token: Placed, base: Excerpt, *, nested: bool) -> Fence:
+def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     assert token.map is not None
     info_at = token.start + len(token.markup)
-    info = trimmed(locate(base, [Row(token.info, info_at)]))
+    info = trimmed(locate(base, [SourceSlice(token.info, info_at)]))
     closed = token.lines == token.map[1] - token.map[0] - 2
     body = locate(base, token.rows)
     if not token.lines:

@@ -22,7 +22,6 @@ from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.math import find_formula
 from coursebuild.syntax.mention import Item, plain, with_mentions
-from coursebuild.syntax.spans import Placer
 from coursebuild.syntax.targets import check_raw_scheme
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
@@ -160,7 +159,6 @@ class _Flow:
     def __init__(self, excerpt: Excerpt, balance: Balance) -> None:
         self.excerpt, self.text = excerpt, excerpt.text
         self.balance = balance
-        self.placer = Placer(excerpt)
         self.literal: list[str] = []
         """Open elements in which there are no formulas."""
         self.links = 0
@@ -192,7 +190,7 @@ class _Flow:
                 else:
                     yield from self._flush()
                     tex = self.excerpt.slice(formula.start, formula.end)
-                    yield Math(self.placer.span(start, at), tex, formula.display)
+                    yield Math(self.excerpt.span(start, at), tex, formula.display)
         self._add(at, len(self.text))
         yield from self._flush()
 
@@ -221,11 +219,11 @@ class _Flow:
     def _flush(self) -> list[Inline]:
         run, self.run = self.run, []
         make = plain if self.literal or self.links else with_mentions
-        return make(run, self.placer)
+        return make(run, self.excerpt)
 
     def _tag(self, tag: Tag) -> RawInline:
-        span = self.placer.span(tag.start, tag.end)
-        self.balance.add(tag, self.text, self.placer.span)
+        span = self.excerpt.span(tag.start, tag.end)
+        self.balance.add(tag, self.text, self.excerpt.span)
         if tag.closes and tag.name in self.literal:
             del self.literal[self.literal.index(tag.name) :]
         elif tag.name in _LITERAL and not tag.closes and not tag.complete:

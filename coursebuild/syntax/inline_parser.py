@@ -31,7 +31,7 @@ from markdown_it.utils import EnvType
 from coursebuild.patterns import pattern
 from coursebuild.syntax.attributes import Braces
 from coursebuild.syntax.math import math_inline
-from coursebuild.syntax.spans import InlineState, Placed
+from coursebuild.syntax.spans import InlineState, PositionedToken
 
 MAX_NESTING = 20
 """Brackets inside each other that may still become links and images."""
@@ -144,12 +144,6 @@ _STOP = pattern(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
 times as fast as several choices."""
 
 
-def next_mark(text: str, at: int) -> int:
-    """Where the first character from `at` on stands that may be more than text; -1 for none."""
-    found = _STOP.search(text, at)
-    return -1 if found is None else found.start()
-
-
 _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "\n": (newline,),
     "\\": (escape,),
@@ -241,7 +235,7 @@ def _place_inline(state: InlineState, before: int, at: int) -> None:
     tokens, after = state.tokens, state.pos
     cursor = at
     for token in tokens[before:]:
-        assert isinstance(token, Placed)
+        assert isinstance(token, PositionedToken)
         if token.end >= 0:
             continue
         if token.markup == "autolink":
@@ -276,7 +270,7 @@ def _order_lone_tildes(tokens: Sequence[Token]) -> None:
         first = i
         while first > 0 and tokens[first - 1].type == "s_close":
             first -= 1
-        moved = [t for t in tokens[first : i + 1] if isinstance(t, Placed)]
+        moved = [t for t in tokens[first : i + 1] if isinstance(t, PositionedToken)]
         cursor = min(t.start for t in moved)
         for t in moved:
             width = t.end - t.start

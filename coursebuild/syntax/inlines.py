@@ -1,7 +1,7 @@
 """Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
 
-Entry point: `InlineReader.read`. What `simple` can read has no tokens; of all else there is one
-pass over the flat tokens, with a stack of open emphasis, strong, strikethrough, links and terms:
+Entry point: `InlineReader.read`. There is one pass over the flat tokens, with a stack of open
+emphasis, strong, strikethrough, links and terms:
 
 1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
    and mentions (`mention`).
@@ -47,8 +47,7 @@ from coursebuild.syntax.html import Balance, tags
 from coursebuild.syntax.markdown import definition_label, inline_tokens
 from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
 from coursebuild.syntax.session import Session
-from coursebuild.syntax.simple import simple_inlines
-from coursebuild.syntax.spans import Placed, Placer, locate
+from coursebuild.syntax.spans import PositionedToken, locate
 from coursebuild.syntax.targets import check_scheme, classify
 from coursebuild.syntax.unread_math import unread_formula
 
@@ -66,7 +65,7 @@ _DEFINED = pattern(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 class _Frame(Struct):
     """An inline that is open."""
 
-    token: Placed | None
+    token: PositionedToken | None
     nodes: list[Inline] = field(default_factory=list)
 
 
@@ -91,10 +90,9 @@ class InlineReader:
 
     def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
         """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
-        found = simple_inlines(content, mentions=mentions)
-        return _Pass(self, content, mentions).read() if found is None else found
+        return _Pass(self, content, mentions).read()
 
-    def tokens(self, text: str) -> list[Placed]:
+    def tokens(self, text: str) -> list[PositionedToken]:
         """The inline tokens of a block's content."""
         if self.environment is None:
             self.environment = self.definitions.environment()
@@ -107,7 +105,6 @@ class _Pass:
     def __init__(self, reader: InlineReader, content: Excerpt, mentions: bool) -> None:
         self.reader = reader
         self.content = content
-        self.placer = Placer(content)
         self.stack = [_Frame(None)]
         self.run: list[Item] = []
         self.texts: list[tuple[int, str]] = []
@@ -150,22 +147,22 @@ class _Pass:
         self.run = []
         nodes = self.stack[-1].nodes
         if not self.links:
-            nodes += with_mentions(run, self.placer)
+            nodes += with_mentions(run, self.content)
         elif len(run) == 1 and run[0].text != "\n":
             text, start, end, _ = run[0]
-            nodes.append(Text(self.placer.span(start, end), text))
+            nodes.append(Text(self.content.span(start, end), text))
         else:
-            nodes += plain(run, self.placer)
+            nodes += plain(run, self.content)
 
     def _unread_math(self) -> None:
         dollar = unread_formula(self.texts)
         if dollar is not None:
-            span = self.placer.span(dollar, dollar + 1)
+            span = self.content.span(dollar, dollar + 1)
             what = "a dollar sign and TeX stand in the text: no formula was read here"
             self.reader.report(diagnose("math-unread", span, what, help=_UNREAD))
 
-    def _unclosed_math(self, token: Placed) -> None:
-        span = self.placer.span(token.start, token.end)
+    def _unclosed_math(self, token: PositionedToken) -> None:
+        span = self.content.span(token.start, token.end)
         help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
         self.reader.report(
             diagnose("math-unclosed", span, "display math is never closed", help=help)
@@ -174,7 +171,7 @@ class _Pass:
 
     # -- containers
 
-    def _open(self, token: Placed) -> None:
+    def _open(self, token: PositionedToken) -> None:
         self._flush()
         is_link = token.type == "link_open"
         flat = len(self.stack) > MAX_DEPTH and not is_link and token.type != "term_open"
@@ -182,7 +179,7 @@ class _Pass:
         self.reader.balance.enter()
         self.links += is_link or token.type == "term_open"
 
-    def _close(self, token: Placed) -> None:
+    def _close(self, token: PositionedToken) -> None:
         self._flush()
         frame = self.stack.pop()
         self.reader.balance.leave()
@@ -200,18 +197,20 @@ class _Pass:
             term = self._term(opened, token, children)
             into.extend(children if term is None else (term,))
         elif token.type == "strong_close":
-            into.append(Strong(self.placer.span(opened.start - 1, token.end + 1), children))
+            into.append(Strong(self.content.span(opened.start - 1, token.end + 1), children))
         else:
-            span = self.placer.span(opened.start, token.end)
+            span = self.content.span(opened.start, token.end)
             into.append(
                 Emphasis(span, children)
                 if token.type == "em_close"
                 else Strikethrough(span, children)
             )
 
-    def _term(self, opened: Placed, closed: Placed, children: tuple[Inline, ...]) -> Term | None:
+    def _term(
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    ) -> Term | None:
         assert closed.map is not None
-        span = self.placer.span(opened.start, closed.end)
+        span = self.content.span(opened.start, closed.end)
         report = self.reader.report
         braces = Braces(closed.map[0], closed.map[1], not closed.info)
         given = read_term(self.content, braces, report)
@@ -223,9 +222,11 @@ class _Pass:
             return None
         return Term(span, children, name, term_id(name), bool(given))
 
-    def _link(self, opened: Placed, closed: Placed, children: tuple[Inline, ...]) -> Link | None:
+    def _link(
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    ) -> Link | None:
         url = str(opened.attrs["href"])
-        span = self.placer.span(opened.start, closed.end)
+        span = self.content.span(opened.start, closed.end)
         destination = self._destination(opened, closed)
         wrong = check_scheme(url, destination)
         if wrong is not None:
@@ -234,11 +235,11 @@ class _Pass:
         title = str(opened.attrs.get("title", ""))
         return Link(span, classify(url), destination, title, children)
 
-    def _destination(self, opened: Placed, closed: Placed) -> Span:
+    def _destination(self, opened: PositionedToken, closed: PositionedToken) -> Span:
         """Where the destination of a link is written: in it, or in the definition that it names."""
         text, label_end = self.content.text, closed.start
         if opened.markup == "autolink":
-            return self.placer.span(opened.start + 1, closed.end - 1)
+            return self.content.span(opened.start + 1, closed.end - 1)
         return self._written(text, opened.start, label_end, closed.end)
 
     def _written(self, text: str, start: int, label_end: int, end: int) -> Span:
@@ -248,15 +249,15 @@ class _Pass:
                 at += 1
             found = parseLinkDestination(text, at, end)
             if not found.ok:
-                return self.placer.span(start, end)
+                return self.content.span(start, end)
             angle = text[at] == "<"
-            return self.placer.span(at + angle, found.pos - angle)
+            return self.content.span(at + angle, found.pos - angle)
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
         definition = self.reader.definitions.links.get(definition_label(label))
         if definition is None or not definition.rows:
-            return self.placer.span(start, end)
+            return self.content.span(start, end)
         rows = locate(definition.base, definition.rows)
         head = _DEFINED.match(rows.text)
         found = parseLinkDestination(rows.text, head.end() if head else 0, len(rows.text))
@@ -267,10 +268,10 @@ class _Pass:
 
     # -- leaves
 
-    def _leaf(self, token: Placed) -> None:
+    def _leaf(self, token: PositionedToken) -> None:
         if self.run:
             self._flush()
-        span = self.placer.span(token.start, token.end)
+        span = self.content.span(token.start, token.end)
         node: Inline | None = None
         match token.type:
             case "math":
@@ -292,7 +293,7 @@ class _Pass:
         if node is not None:
             self.stack[-1].nodes.append(node)
 
-    def _math(self, token: Placed, span: Span) -> Math:
+    def _math(self, token: PositionedToken, span: Span) -> Math:
         assert token.map is not None
         if not token.content.strip():
             self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
@@ -307,12 +308,12 @@ class _Pass:
             self.reader.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
-    def _number(self, token: Placed, span: Span) -> CodeSpan | NumberBinding:
+    def _number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
         assert token.map is not None
         if token.type == "number_unbound":
             braces = _BRACES.match(self.content.text, token.end)
             assert braces is not None
-            place = self.placer.span(braces.start(), braces.end())
+            place = self.content.span(braces.start(), braces.end())
             message = f"`{braces[0]}` does not say what the number is bound to"
             help = "write `{out}`, or `{out=examples/x.py}` with the path of a script"
             self.reader.report(diagnose("binding-attribute", place, message, help=help))
@@ -320,11 +321,11 @@ class _Pass:
         start, end = token.map
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1
-        return NumberBinding(span, token.content, self.placer.span(start, end), token.info or None)
+        return NumberBinding(span, token.content, self.content.span(start, end), token.info or None)
 
-    def _html(self, token: Placed, span: Span) -> RawInline:
+    def _html(self, token: PositionedToken, span: Span) -> RawInline:
         def place(start: int, end: int) -> Span:
-            return self.placer.span(token.start + start, token.start + end)
+            return self.content.span(token.start + start, token.start + end)
 
         for tag in tags(token.content):
             self.reader.balance.add(tag, token.content, place)
@@ -332,7 +333,7 @@ class _Pass:
                 self.links = max(0, self.links + (-1 if tag.closes else 1))
         return RawInline(span, token.content)
 
-    def _image(self, token: Placed, span: Span) -> Image:
+    def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
         place = self._written(self.content.text, token.start + 1, label_end, token.end)
@@ -346,7 +347,7 @@ class _Pass:
             self.reader.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
-    def _footnote(self, token: Placed, span: Span) -> FootnoteRef | None:
+    def _footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
         reference = self.reader.notes.refer(token.content, span)
         if reference is None:
             self.run.append(Item(f"[^{token.content}]", token.start, token.end))

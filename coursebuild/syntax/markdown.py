@@ -16,14 +16,14 @@ from markdown_it.common.utils import normalizeReference
 from markdown_it.utils import EnvType
 
 from coursebuild.source import Excerpt
-from coursebuild.syntax.block_parser import Blocks, Definitions
+from coursebuild.syntax.block_parser import MAX_NESTING, Definitions, block_parser
 from coursebuild.syntax.inline_parser import Inlines
-from coursebuild.syntax.spans import BlockState, Placed
+from coursebuild.syntax.spans import BlockState, PositionedToken
 
 
 def _configured() -> MarkdownIt:
-    md = MarkdownIt("zero", {"html": True, "tasklists": True})
-    md.block, md.inline = Blocks(), Inlines()
+    md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
+    md.block, md.inline = block_parser(), Inlines()
     md.inline.ruler2.disable("fragments_join")
     md.validateLink = lambda url: True  # type: ignore[method-assign]
     return md
@@ -32,23 +32,21 @@ def _configured() -> MarkdownIt:
 _MARKDOWN = _configured()
 
 
-def block_tokens(base: Excerpt, definitions: Definitions) -> list[Placed]:
+def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToken]:
     """The block tokens of a text with LF line ends and no NUL.
 
     Its link definitions are added to `definitions`.
     """
     env: EnvType = {**definitions.environment(), "definitions": definitions, "base": base}
-    # Whoever asks for a line of a file needs these as well.
-    known = base.source.line_starts if base.text is base.source.text else None
-    state = BlockState(base.text, _MARKDOWN, env, known)
+    state = BlockState(base.text, _MARKDOWN, env)
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
-    return cast(list[Placed], state.tokens)
+    return cast(list[PositionedToken], state.tokens)
 
 
-def inline_tokens(text: str, env: EnvType) -> list[Placed]:
+def inline_tokens(text: str, env: EnvType) -> list[PositionedToken]:
     """The inline tokens of a block's content; `env` comes from `Definitions.environment`."""
     tokens = _MARKDOWN.inline.parse(text, _MARKDOWN, env, [])
-    return cast(list[Placed], tokens)
+    return cast(list[PositionedToken], tokens)
 
 
 def definition_label(text: str) -> str:

@@ -19,7 +19,7 @@ from markdown_it.rules_inline import StateInline
 
 from coursebuild.patterns import pattern
 from coursebuild.syntax.attributes import Braces
-from coursebuild.syntax.spans import BlockState, InlineState, Placed
+from coursebuild.syntax.spans import BlockState, InlineState, PositionedToken
 
 _TEX = pattern(r"(?:[^\\`$]++|\\[\s\S])*+")
 _BLOCK_TEX = pattern(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
@@ -138,7 +138,7 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
         return True
     state.line = line
     token = state.push("math_block", "", 0)
-    assert isinstance(token, Placed)
+    assert isinstance(token, PositionedToken)
     token.content = state.getLines(start_line, line, state.sCount[start_line], False)
     token.rows = state.rows
     token.map = [start_line, line]

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from coursebuild.model import Inline, LessonTarget, LevelTarget, Link, SoftBreak, Text
 from coursebuild.patterns import pattern
-from coursebuild.syntax.spans import Placer
+from coursebuild.source import Excerpt
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*"
@@ -53,7 +53,7 @@ def may_mention(text: str) -> bool:
     return "Lesson" in text or "Level" in text
 
 
-def plain(run: Sequence[Item], placer: Placer) -> list[Inline]:
+def plain(run: Sequence[Item], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
     out: list[Inline] = []
     text: list[Item] = []
@@ -62,40 +62,40 @@ def plain(run: Sequence[Item], placer: Placer) -> list[Inline]:
             text.append(item)
             continue
         if text:
-            out.append(_text(text, placer))
+            out.append(_text(text, content))
             text = []
-        out.append(SoftBreak(placer.span(item.start, item.end)))
+        out.append(SoftBreak(content.span(item.start, item.end)))
     if text:
-        out.append(_text(text, placer))
+        out.append(_text(text, content))
     return out
 
 
-def _text(items: list[Item], placer: Placer) -> Text:
+def _text(items: list[Item], content: Excerpt) -> Text:
     if len(items) == 1:
         text, start, end, _ = items[0]
-        return Text(placer.span(start, end), text)
+        return Text(content.span(start, end), text)
     joined = "".join([item.text for item in items])
-    return Text(placer.span(items[0].start, items[-1].end), joined)
+    return Text(content.span(items[0].start, items[-1].end), joined)
 
 
-def with_mentions(run: Sequence[Item], placer: Placer) -> list[Inline]:
+def with_mentions(run: Sequence[Item], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
     joined = "".join([item.text for item in run])
     if not may_mention(joined):
-        return plain(run, placer)
+        return plain(run, content)
     starts = [0, *accumulate(len(item.text) for item in run)]
     out: list[Inline] = []
     at = 0
     for mention in _mentions(joined):
-        out += plain(_cut(run, starts, at, mention.start), placer)
-        children = tuple(plain(_cut(run, starts, mention.start, mention.end), placer))
+        out += plain(_cut(run, starts, at, mention.start), content)
+        children = tuple(plain(_cut(run, starts, mention.start, mention.end), content))
         number = _cut(run, starts, mention.id_start, mention.end)
         target = LessonTarget(mention.id, None) if mention.is_lesson else LevelTarget(mention.id)
-        place = placer.span(number[0].start, number[-1].end)
+        place = content.span(number[0].start, number[-1].end)
         span = children[0].span.to(children[-1].span)
         out.append(Link(span, target, place, "", children, mention=True))
         at = mention.end
-    return out + plain(_cut(run, starts, at, len(joined)), placer)
+    return out + plain(_cut(run, starts, at, len(joined)), content)
 
 
 def _mentions(text: str) -> Iterator[_Mention]:

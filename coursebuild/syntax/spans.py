@@ -1,7 +1,7 @@
 """Where markdown-it's tokens stand: tokens, parser states and excerpts that keep positions.
 
-Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are `Placed`),
-`locate` (content rows into an `Excerpt`), `Placer` (positions in an excerpt into spans).
+Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are
+`PositionedToken`s), `locate` (content rows into an `Excerpt`).
 
 1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows
    began.
@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -25,12 +25,10 @@ from markdown_it.rules_inline import StateInline
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
-from coursebuild.source import Excerpt, Source, Span
-
-_INDENT = (" ", "\t")
+from coursebuild.source import Excerpt, Source
 
 
-class Row(NamedTuple):
+class SourceSlice(NamedTuple):
     """A stretch of the parsed text that became part of a block's content."""
 
     text: str
@@ -40,93 +38,24 @@ class Row(NamedTuple):
     """Leading spaces of `text` that stand for a part of the tab before `at`."""
 
 
-class Placed(Token):
-    """A token that knows its place: in the parsed text, or for inline tokens in the content.
+@dataclass(slots=True)
+class PositionedToken(Token):
+    """A token that knows its place: in the parsed text, or for inline tokens in the content."""
 
-    There are many, and few have attributes: these are made when they are asked for.
-    """
-
-    __slots__ = ("end", "lines", "rows", "start")
-
-    def __init__(
-        self,
-        kind: str,
-        tag: str,
-        nesting: Literal[-1, 0, 1],
-        *,
-        level: int = 0,
-        content: str = "",
-        block: bool = False,
-        start: int = -1,
-        end: int = -1,
-    ) -> None:
-        self.type = kind
-        self.tag = tag
-        self.nesting = nesting
-        self.map = None
-        self.level = level
-        self.children = None
-        self.content = content
-        self.markup = self.info = ""
-        self.block = block
-        self.hidden = False
-        self.start = start
-        self.end = end
-        self.rows: Sequence[Row] = ()
-        """What a block's content was made of."""
-        self.lines = 0
-        """How many lines these are."""
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> dict[str, Any]:
-            """Attributes that nobody has set: their slots are empty."""
-            if name not in ("attrs", "meta"):
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            made: dict[str, Any] = {}
-            setattr(self, name, made)
-            return made
+    start: int = -1
+    end: int = -1
+    rows: Sequence[SourceSlice] = ()
+    """What a block's content was made of."""
+    lines: int = 0
+    """How many lines these are."""
 
 
 class BlockState(StateBlock):
     """The state of the block rules; notes the rows that the last rule cut out."""
 
-    def __init__(
-        self, src: str, md: MarkdownIt, env: EnvType, line_starts: Sequence[int] | None = None
-    ) -> None:
-        """The same as markdown-it's own, which looks at each line by itself.
-
-        `line_starts` are where the lines of the text begin, if somebody knows that already.
-        """
-        self.src, self.md, self.env = src, md, env
-        self.tokens: list[Token] = []
-        lines = src.split("\n")
-        starts = line_starts
-        if starts is None:
-            starts = list(accumulate([len(line) + 1 for line in lines[:-1]], initial=0))
-        ends = [start - 1 for start in starts[1:]]
-        if not lines[-1].strip(" \t"):  # which is no line where no line end follows
-            lines.pop()
-        else:
-            ends.append(len(src))
-        shifts = [len(x) - len(x.lstrip(" \t")) if x[:1] in _INDENT else 0 for x in lines]
-        self.bMarks = [*starts[: len(lines)], len(src)]
-        self.eMarks = [*ends, len(src)]
-        self.tShift = [*shifts, 0]
-        self.sCount = [*shifts, 0]
-        if "\t" in src:
-            for number, shift in enumerate(shifts):
-                if shift:
-                    self.sCount[number] = len(lines[number][:shift].expandtabs(4))
-        self.bsCount = [0] * len(self.bMarks)
-        self.lineMax = len(lines)
-        self.blkIndent = self.line = self.level = 0
-        self.ddIndent = self.listIndent = -1
-        self.tight = False
-        self.parentType = "root"
-        self.result = ""
-        self._code_enabled = True
-        self.rows: Sequence[Row] = ()
+    def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
+        super().__init__(src, md, env, [])
+        self.rows: Sequence[SourceSlice] = ()
         self.count = 0
         """How many lines the rows are."""
 
@@ -134,7 +63,7 @@ class BlockState(StateBlock):
         """Add a token; that of an item of a list, which has no rule of its own, gets its place."""
         if nesting < 0:
             self.level -= 1
-        token = Placed(ttype, tag, nesting, level=self.level, block=True)
+        token = PositionedToken(ttype, tag, nesting, level=self.level, block=True)
         if nesting > 0:
             self.level += 1
         if ttype == "list_item_open":
@@ -148,7 +77,7 @@ class BlockState(StateBlock):
         self.rows = rows = self._rows(begin, end, indent, keepLastLF)
         return rows[0].text if len(rows) == 1 else "".join([row.text for row in rows])
 
-    def _rows(self, begin: int, end: int, indent: int, line_end: bool) -> Sequence[Row]:
+    def _rows(self, begin: int, end: int, indent: int, line_end: bool) -> Sequence[SourceSlice]:
         if indent <= 0 and begin < end:
             # What stands together in the text is one row.
             starts, ends = self.bMarks, self.eMarks
@@ -156,14 +85,14 @@ class BlockState(StateBlock):
                 at + 1 for at in ends[begin : end - 1]
             ]:
                 first = starts[begin]
-                return (Row(self.src[first : ends[end - 1] + line_end], first),)
+                return (SourceSlice(self.src[first : ends[end - 1] + line_end], first),)
         return [self._row(line, indent, line_end or line + 1 < end) for line in range(begin, end)]
 
-    def _row(self, line: int, indent: int, line_end: bool) -> Row:
+    def _row(self, line: int, indent: int, line_end: bool) -> SourceSlice:
         src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
         if indent <= 0:
-            return Row(src[first:last], first)
+            return SourceSlice(src[first:last], first)
         shift = self.tShift[line]
         begin, column = first, 0
         while column < indent and first < last:
@@ -176,7 +105,7 @@ class BlockState(StateBlock):
                 break
             first += 1
         padding = max(0, column - indent)
-        return Row(" " * padding + src[first:last], first, padding)
+        return SourceSlice(" " * padding + src[first:last], first, padding)
 
 
 class InlineState(StateInline):
@@ -199,7 +128,9 @@ class InlineState(StateInline):
     def push_text(self, content: str) -> Token:
         """Make this, which is all of the pending text, a token."""
         start = self.mark
-        token = Placed("text", "", 0, level=self.pendingLevel, content=content, start=start)
+        token = PositionedToken(
+            "text", "", 0, level=self.pendingLevel, content=content, start=start
+        )
         token.end = start + len(content)
         self.tokens.append(token)
         self.pending = ""
@@ -214,7 +145,7 @@ class InlineState(StateInline):
         if nesting < 0:
             self.level -= 1
             self.delimiters = self._prev_delimiters.pop()
-        token = Placed(ttype, tag, nesting, level=self.level, start=self.pos)
+        token = PositionedToken(ttype, tag, nesting, level=self.level, start=self.pos)
         if nesting > 0:
             self.level += 1
             self._prev_delimiters.append(self.delimiters)
@@ -226,7 +157,7 @@ class InlineState(StateInline):
         return token
 
 
-def locate(base: Excerpt, rows: Sequence[Row]) -> Excerpt:
+def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
     single = len(base.pieces) == 1
     if single and len(rows) == 1:
@@ -283,32 +214,6 @@ def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
     return excerpt.slice(lead, lead + len(text.rstrip(chars)))
 
 
-class Placer:
-    """Spans of positions in one excerpt; the same as `Excerpt.span`, made for many calls."""
-
-    __slots__ = ("_ats", "_deltas", "_single", "source")
-
-    def __init__(self, excerpt: Excerpt) -> None:
-        self.source: Source = excerpt.source
-        pieces = excerpt.pieces
-        self._single = None
-        if len(pieces) == 1:  # nearly always
-            self._single = pieces[0][1] - pieces[0][0]
-            return
-        self._ats = [at for at, _ in pieces]
-        self._deltas = [to - at for at, to in pieces]
-
-    def span(self, start: int, end: int) -> Span:
-        """The span of the text from `start` to `end`."""
-        if self._single is not None:
-            return Span(self.source, start + self._single, end + self._single)
-        first = start + self._deltas[max(bisect_right(self._ats, start) - 1, 0)]
-        if end <= start:
-            return Span(self.source, first, first)
-        last = end + self._deltas[max(bisect_right(self._ats, end - 1) - 1, 0)]
-        return Span(self.source, first, max(first, last))
-
-
 def whole(source: Source) -> Excerpt:
     """All of a file as Markdown sees it: LF, U+FFFD for NUL, no byte order mark."""
     if "\r" in source.text:
@@ -330,10 +235,10 @@ def normalized(excerpt: Excerpt) -> Excerpt:
 
 
 def _unix(excerpt: Excerpt) -> Excerpt:
-    rows: list[Row] = []
+    rows: list[SourceSlice] = []
     at = 0
     for line in excerpt.text.replace("\r\n", "\r").replace("\n", "\r").split("\r"):
-        rows.append(Row(line + "\n", at))
+        rows.append(SourceSlice(line + "\n", at))
         at += len(line) + (2 if excerpt.text.startswith("\r\n", at + len(line)) else 1)
-    rows[-1] = Row(rows[-1].text[:-1], rows[-1].at)
+    rows[-1] = SourceSlice(rows[-1].text[:-1], rows[-1].at)
     return locate(excerpt, rows)

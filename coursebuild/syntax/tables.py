@@ -10,7 +10,6 @@ before, while `\|` is a `|` in the cell.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import accumulate
 from typing import Literal
 
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -21,7 +20,7 @@ from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.model import Cell, Inline, Table
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt
-from coursebuild.syntax.spans import Placed, Row, locate, trimmed
+from coursebuild.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
 
 Align = Literal["left", "right", "center"]
 
@@ -111,7 +110,7 @@ def _add_row(state: StateBlock, line: int) -> None:
 
 
 def read_table(
-    tokens: Sequence[Placed],
+    tokens: Sequence[PositionedToken],
     at: int,
     base: Excerpt,
     inlines: Callable[[Excerpt], tuple[Inline, ...]],
@@ -148,40 +147,22 @@ def split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
     line = base.text[start:end]
     at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
     text = line.strip(MD_TRIM_CHARS)
-    if len(base.pieces) == 1 and "\\|" not in text:
-        return _split_plain(base, at, text)
-    cells: list[list[Row]] = []
-    rows: list[Row] = []
+    cells: list[list[SourceSlice]] = []
+    rows: list[SourceSlice] = []
     begin = 0
     i = text.find("|")
     while i >= 0:
         if i > 0 and text[i - 1] == "\\":
-            rows.append(Row(text[begin : i - 1], at + begin))
+            rows.append(SourceSlice(text[begin : i - 1], at + begin))
             begin = i
         else:
-            cells.append([*rows, Row(text[begin:i], at + begin)])
+            cells.append([*rows, SourceSlice(text[begin:i], at + begin)])
             rows, begin = [], i + 1
         i = text.find("|", i + 1)
-    cells.append([*rows, Row(text[begin:], at + begin)])
+    cells.append([*rows, SourceSlice(text[begin:], at + begin)])
     found = [locate(base, cell) for cell in cells]
     if found and not found[0].text:
         found.pop(0)
     if found and not found[-1].text:
         found.pop()
     return [trimmed(cell) for cell in found]
-
-
-def _split_plain(base: Excerpt, at: int, text: str) -> list[Excerpt]:
-    """The same for a row without escapes in a text that is in one piece."""
-    shift = at + base.pieces[0][1] - base.pieces[0][0]
-    parts = text.split("|")
-    starts = list(accumulate([len(part) + 1 for part in parts], initial=shift))
-    first, last = not parts[0], len(parts)
-    if last > first and not parts[-1]:
-        last -= 1
-    found: list[Excerpt] = []
-    for part, start in zip(parts[first:last], starts[first:], strict=False):
-        cell = part.lstrip(MD_TRIM_CHARS)
-        place = start + len(part) - len(cell)
-        found.append(Excerpt(base.source, cell.rstrip(MD_TRIM_CHARS), ((0, place),)))
-    return found

@@ -57,8 +57,7 @@ from coursebuild.syntax.recording import (
     record_table,
 )
 from coursebuild.syntax.session import Session
-from coursebuild.syntax.simple import simple_inlines
-from coursebuild.syntax.spans import Placed, Placer, Row, locate, normalized, trimmed
+from coursebuild.syntax.spans import PositionedToken, SourceSlice, locate, normalized, trimmed
 from coursebuild.syntax.tables import read_table
 
 
@@ -69,7 +68,6 @@ class TextReader:
         self, base: Excerpt, session: Session, definitions: Definitions, *, nested: bool
     ) -> None:
         self.base, self.session, self.nested = base, session, nested
-        self.placer = Placer(base)
         self.balance = Balance(session.report)
         self.texts = Texts(session)
         self.tokens = block_tokens(base, definitions)
@@ -85,7 +83,7 @@ class TextReader:
                     self.session.anchors.reserve(name)
             elif token.type == "footnote_reference_open":
                 label, at = token.content, token.start + 2
-                label_span = self.placer.span(at, at + len(label))
+                label_span = self.base.span(at, at + len(label))
                 read = self._later(i + 1)
                 self.session.notes.write(Written(label, label_span, self._span(token), read))
 
@@ -121,16 +119,16 @@ class TextReader:
         self.balance.leave()
         return tuple(out)
 
-    def _span(self, token: Placed) -> Span:
-        return self.placer.span(token.start, token.end)
+    def _span(self, token: PositionedToken) -> Span:
+        return self.base.span(token.start, token.end)
 
-    def _content(self, token: Placed) -> Excerpt:
+    def _content(self, token: PositionedToken) -> Excerpt:
         """The content of a block, without white space at its ends."""
         return trimmed(locate(self.base, token.rows))
 
     # -- leaves
 
-    def _paragraph(self, token: Placed) -> Block:
+    def _paragraph(self, token: PositionedToken) -> Block:
         self.at += 2
         content = self._content(token)
         children = self.inlines.read(content)
@@ -148,7 +146,7 @@ class TextReader:
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
         return token is not None and token.type == "fence" and token.info.split()[:1] == ["text"]
 
-    def _heading(self, token: Placed) -> Heading:
+    def _heading(self, token: PositionedToken) -> Heading:
         self.at += 2
         span = self._span(token)
         attributes = read_attributes(self._content(token))
@@ -174,7 +172,7 @@ class TextReader:
             return attributes.id, True
         return anchors.make(plain_text(children)), False
 
-    def _fence(self, token: Placed) -> Block:
+    def _fence(self, token: PositionedToken) -> Block:
         fence = read_fence(token, self.base, nested=self.nested)
         block = fence_block(fence, self.session, self.texts)
         if isinstance(block, Script) and not block.norun and self._before_text():
@@ -183,13 +181,13 @@ class TextReader:
                 self.session.report(no_caption(self._span(below)))
         return block
 
-    def _code(self, token: Placed) -> CodeBlock:
+    def _code(self, token: PositionedToken) -> CodeBlock:
         code = locate(self.base, token.rows)
         return CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
 
-    def _html(self, token: Placed) -> HtmlBlock | HtmlFlow:
+    def _html(self, token: PositionedToken) -> HtmlBlock | HtmlFlow:
         """Raw HTML, kept as it is unless it holds formulas."""
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
@@ -207,10 +205,10 @@ class TextReader:
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return HtmlBlock(self._span(token), text)
 
-    def _rule(self, token: Placed) -> ThematicBreak:
+    def _rule(self, token: PositionedToken) -> ThematicBreak:
         return ThematicBreak(self._span(token))
 
-    def _math(self, token: Placed) -> MathBlock:
+    def _math(self, token: PositionedToken) -> MathBlock:
         text = locate(self.base, token.rows)
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
@@ -239,7 +237,7 @@ class TextReader:
 
     # -- containers
 
-    def _quote(self, token: Placed) -> BlockQuote | Callout:
+    def _quote(self, token: PositionedToken) -> BlockQuote | Callout:
         span, opened = self._span(token), self.tokens[self.at]
         head = read_head(self._content(opened)) if opened.type == "paragraph_open" else None
         if head is None:
@@ -257,7 +255,7 @@ class TextReader:
         blocks = (*first, *self._blocks("blockquote_close"))
         return Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
 
-    def _list(self, token: Placed) -> ListBlock:
+    def _list(self, token: PositionedToken) -> ListBlock:
         ordered = token.type == "ordered_list_open"
         items: list[ListItem] = []
         while (item := self.tokens[self.at]).type == "list_item_open":
@@ -268,20 +266,20 @@ class TextReader:
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
-    def _item(self, token: Placed) -> ListItem:
+    def _item(self, token: PositionedToken) -> ListItem:
         blocks = self._blocks("list_item_close")
-        marker = self.placer.span(token.start, token.start + len(token.info) + 1)
+        marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
         return ListItem(span, blocks, token.meta.get("checked"))
 
-    def _table(self, token: Placed) -> Table:
+    def _table(self, token: PositionedToken) -> Table:
         table, self.at = self._read_table(self.at - 1)
         return table
 
     def _read_table(self, at: int) -> tuple[Table, int]:
         return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
 
-    def _footnote(self, token: Placed) -> None:
+    def _footnote(self, token: PositionedToken) -> None:
         """Pass over a footnote: it is read later."""
         depth = 1
         while depth:
@@ -310,7 +308,7 @@ class TextReader:
         return None
 
 
-_READERS: dict[str, Callable[[TextReader, Placed], Block | None]] = {
+_READERS: dict[str, Callable[[TextReader, PositionedToken], Block | None]] = {
     "paragraph_open": TextReader._paragraph,
     "heading_open": TextReader._heading,
     "fence": TextReader._fence,
@@ -343,7 +341,7 @@ class Texts:
         if not _is_line(base.text):
             return self._session.apart(lambda: self._text(base))
         # A line that can only be a paragraph: nothing else is looked for.
-        content = trimmed(locate(base, [Row(base.text, 0)]))
+        content = trimmed(locate(base, [SourceSlice(base.text, 0)]))
         inlines = self._inlines(base, content)
         paragraph = Paragraph(content.span(), inlines.value)
         return Parsed((paragraph,), inlines.diagnostics)
@@ -357,9 +355,6 @@ class Texts:
         return TextReader(base, self._session, self._definitions(), nested=True).read()
 
     def _inlines(self, base: Excerpt, content: Excerpt) -> Parsed[tuple[Inline, ...]]:
-        found = simple_inlines(content)
-        if found is not None:
-            return Parsed(found)
         return self._session.apart(lambda: self._marked(base, content))
 
     def _marked(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:

@@ -1,4 +1,4 @@
-"""What is done faster here than in markdown-it gives the same as there: lines, rows, tables."""
+"""Lines that are cut out, and tables, are those that markdown-it finds; each has its place."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
-from markdown_it.token import Token
 
 from coursebuild.model import Table
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax import tables
-from coursebuild.syntax.block_parser import Blocks, Definitions
+from coursebuild.syntax.block_parser import Definitions, block_parser
 from coursebuild.syntax.document import parse_document
 from coursebuild.syntax.markdown import block_tokens
-from coursebuild.syntax.spans import BlockState, Row, locate, trimmed
+from coursebuild.syntax.spans import BlockState, locate
 
 _MARKDOWN = MarkdownIt("gfm-like", {"linkify": False})
 _OURS = MarkdownIt("zero")
-_OURS.block = Blocks()
+_OURS.block = block_parser()
 
 texts = st.text(st.sampled_from("ab \t\t\n\n>-|\\é\x0b\xa0\u2028"), max_size=60)
 rows = st.lists(
@@ -39,13 +38,6 @@ tables_within = st.builds(
 )
 
 
-@given(texts)
-def test_the_lines_of_a_text_are_those_that_markdown_it_finds(text: str) -> None:
-    theirs, ours = StateBlock(text, _OURS, {}, []), BlockState(text, _OURS, {})
-    own = ("rows", "count")
-    assert {k: v for k, v in vars(ours).items() if k not in own} == vars(theirs)
-
-
 @given(texts, st.data())
 def test_the_lines_that_are_cut_out_are_those_that_markdown_it_cuts(
     text: str, data: st.DataObject
@@ -57,11 +49,7 @@ def test_the_lines_that_are_cut_out_are_those_that_markdown_it_cuts(
     assert ours.getLines(*arguments) == theirs.getLines(*arguments)
     assert ours.count == end - begin
     base = Excerpt(Source("a.md", text), text, ((0, 0),))
-    cut = locate(base, ours.rows)
-    one_by_one = [
-        ours._row(line, arguments[2], arguments[3] or line + 1 < end) for line in range(begin, end)
-    ]
-    assert cut == locate(base, one_by_one)
+    assert locate(base, ours.rows).text == ours.getLines(*arguments)
 
 
 def _their_tables(text: str) -> list[tuple[list[int] | None, list[list[str]], list[str]]]:
@@ -102,30 +90,6 @@ def test_tables_are_those_that_markdown_it_finds(text: str) -> None:
     assert _our_tables(text) == _their_tables(text)
 
 
-@given(st.text(st.sampled_from("||a \\\t\xa0é"), max_size=20))
-def test_a_row_in_one_piece_is_split_like_any_other(row: str) -> None:
-    source = Source("a.md", "xx" + row + "\n")
-    whole = Excerpt(source, source.text, ((0, 0),))
-    pieced = Excerpt(source, source.text, ((0, 0), (1, 1)))
-    cells = tables.split_row(whole, 2, 2 + len(row))
-    again = tables.split_row(pieced, 2, 2 + len(row))
-    assert [(cell.text, cell.span()) for cell in cells] == [
-        (cell.text, cell.span()) for cell in again
-    ]
-    assert all(trimmed(cell) is cell for cell in cells)
-
-
-def test_a_token_has_attributes_when_it_is_asked_for_them() -> None:
-    base = Excerpt(Source("a.md", "a"), "a", ((0, 0),))
-    token = block_tokens(base, Definitions())[0]
-    assert token == token
-    plain = Token("paragraph_open", "p", 1)
-    assert token.attrs == plain.attrs == {}
-    token.attrSet("start", 3)
-    token.meta["checked"] = True
-    assert (token.attrs, token.meta) == ({"start": 3}, {"checked": True})
-
-
 def test_a_table_in_a_lesson_has_cells_where_they_stand() -> None:
     source = Source("a.md", "> | a | b \\| c |\n> |:-:|---|\n> | 1 |\n")
     quote = parse_document(source, frozenset(), lesson=True).value.blocks[0]
@@ -135,7 +99,3 @@ def test_a_table_in_a_lesson_has_cells_where_they_stand() -> None:
     assert [cell.text.text for cell in table.header] == ["a", "b | c"]
     assert [cell.span.text for cell in table.header] == ["a", "b \\| c"]
     assert [cell.span.text for cell in table.rows[0]] == ["1", ""]
-
-
-def test_rows_say_where_their_text_begins() -> None:
-    assert Row("a", 3) == ("a", 3, 0)
