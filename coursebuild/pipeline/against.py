@@ -6,7 +6,7 @@ Entry point: `against(options, names, version)`.
 2. They run in an environment with the other version and otherwise the same packages (see
    `effects.environments`). Results are remembered by the versions, like those of here.
 3. Those that do something else run once more there, and in a fresh environment with the version of
-   here: what this shows is told (see `scripts.elsewhere`).
+   here: what this shows is told (see `scripts.against`).
 4. The models and MJCF blocks are compiled there.
 """
 
@@ -31,8 +31,8 @@ from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import compile_models, extract_scripts, run
 from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
 from coursebuild.results import ScriptRun
+from coursebuild.scripts.against import RunStanding, is_comparable, judgement, run_standings
 from coursebuild.scripts.dependencies import Kind
-from coursebuild.scripts.elsewhere import Standing, is_comparable, judged, standings
 from coursebuild.scripts.extract import Extraction, extract
 from coursebuild.scripts.failures import failure
 
@@ -84,7 +84,7 @@ class _Work(Struct):
         runs = run(self.chosen, self.options, self.progress)
         self.here = {one.path: one for one in runs}
         place = self._place(self.other)
-        here = standings(self.course, self.here, runs)
+        here = run_standings(self.course, self.here, runs)
         kept = {path: is_comparable(standing) for path, standing in here.items()}
         compared = [e for e in self.chosen if kept[e.path] is None]
         there = self._run(compared, place, f"running scripts with MuJoCo {self.other}")
@@ -99,7 +99,7 @@ class _Work(Struct):
             elif there[path].holds:
                 lines.append(ScriptAgainst(path, extraction.owner, "same"))
             else:
-                found = judged(there[path], control.get(path), again[path], engine_version())
+                found = judgement(there[path], control.get(path), again[path], engine_version())
                 why = found.why + (f": {trouble}" if trouble and path not in control else "")
                 lines.append(self._line(extraction, there[path], found.status, why))
         return AgainstReport(
@@ -111,7 +111,7 @@ class _Work(Struct):
         )
 
     def _line(
-        self, extraction: Extraction, there: Standing, status: str, why: str
+        self, extraction: Extraction, there: RunStanding, status: str, why: str
     ) -> ScriptAgainst:
         everything = extract(self.course).value
         return ScriptAgainst(
@@ -132,7 +132,7 @@ class _Work(Struct):
         states = [d.state for d in dependencies if d.kind is Kind.MODULE]
         return environment(self.options.root, engine, needed(states), self.progress.say)
 
-    def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, Standing], str]:
+    def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:
         """What they do in a fresh environment with the version of here; why there is none."""
         if not scripts:
             return {}, ""
@@ -145,7 +145,7 @@ class _Work(Struct):
 
     def _run(
         self, scripts: Sequence[Extraction], place: Place, stage: str, *, fresh: bool = False
-    ) -> dict[str, Standing]:
+    ) -> dict[str, RunStanding]:
         """How the scripts do there, by path."""
         from coursebuild.effects.runner import ScriptServer
 
@@ -153,7 +153,7 @@ class _Work(Struct):
         memory = Memory(options.root, options.store, fresh=fresh, place=place)
         with ScriptServer(place=place) as server:
             runs = run(scripts, options, self.progress, stage, memory, server.run)
-        return standings(self.course, self.here, runs)
+        return run_standings(self.course, self.here, runs)
 
     def _models(self, place: Place) -> tuple[ModelLine, ...]:
         """Of each model and MJCF block that compiles here, whether it does there."""

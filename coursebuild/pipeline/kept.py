@@ -16,7 +16,7 @@ from coursebuild.effects.prepared import prepared_cut, prepared_source
 
 if TYPE_CHECKING:
     from coursebuild.render.fonts import FontJob
-    from coursebuild.scripts.held import Asked, Borne
+    from coursebuild.scripts.binding_memory import BindingEvidence, LazyInputs
 
 _FONTS, _BINDINGS = "fonts", "bindings"
 
@@ -48,22 +48,22 @@ class KeptBindings:
         self._before = frozenset(known or ())
         self._now: set[str] = set()
 
-    def holds(self, key: str, leans: Asked) -> bool:
+    def holds(self, key: str, inputs: LazyInputs) -> bool:
         """Whether nothing was wrong in the last run."""
         if key in self._before:
             self._now.add(key)
             return True
         return False
 
-    def add(self, key: str, leans: Asked, borne: Borne) -> None:
+    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
         """That nothing is wrong."""
         self._now.add(key)
 
-    def before(self, leans: Asked) -> Borne:
+    def before(self, inputs: LazyInputs) -> BindingEvidence:
         """Not kept: what is said of a course does not depend on what was said of it before."""
-        from coursebuild.scripts.held import Borne  # fonts need it not
+        from coursebuild.scripts.binding_memory import BindingEvidence  # fonts need it not
 
-        return Borne()
+        return BindingEvidence()
 
     def save(self) -> None:
         """Keep what was found."""

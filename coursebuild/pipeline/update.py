@@ -40,7 +40,7 @@ from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.edit import apply_edits, updated_body
 from coursebuild.scripts.extract import Extraction, extract
-from coursebuild.scripts.findings import bearings, script_findings
+from coursebuild.scripts.findings import binding_history, script_findings
 from coursebuild.source import Source
 
 
@@ -250,7 +250,7 @@ def _afterwards(
 
     # What was written above a script moved it, so that its place is another than before.
     placed = [extraction for extraction in extract(now).value if extraction.path in ran]
-    held = bearings(before, runs, verdicts(before)) if now is not before else None
+    held = binding_history(before, runs, verdicts(before)) if now is not before else None
     found = script_findings(now, placed, runs, verdicts(now), held)
     # What update just refused is told by the refusal; a dry run leaves the drift as it is.
     return [d for d in found if d.rule != "output-drift"]

@@ -24,8 +24,8 @@ from msgspec import Struct
 from coursebuild.model import Comparison, Mode
 from coursebuild.patterns import pattern
 from coursebuild.scripts.lines import LineMatcher
+from coursebuild.scripts.mapped_text import Side
 from coursebuild.scripts.pairing import MATCH, Keys, pair
-from coursebuild.scripts.traced import Side
 
 
 class _Block(Struct, frozen=True):

@@ -26,7 +26,7 @@ from msgspec import Struct
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.results import Change, DriftKind, Outcome, ScriptRun, Verdict
-from coursebuild.scripts.held import Borne, Held, Leans
+from coursebuild.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
 from coursebuild.source import Span
 
 if TYPE_CHECKING:
@@ -97,16 +97,16 @@ class Printed:
         )
         return found[after - 1 : after] if after else []
 
-    def leans(self, binding: NumberBinding) -> Leans:
+    def inputs(self, binding: NumberBinding) -> BindingInputs:
         """What a binding shows, and on which outputs it leans."""
         recorded = self.recorded(binding)
         if binding.script is not None or not recorded:
-            return Leans(binding.text, binding.script or "", "", 0, len(recorded))
+            return BindingInputs(binding.text, binding.script or "", "", 0, len(recorded))
         (verdict,) = recorded
         path, script = binding.span.path, verdict.recording.script or ""
         same = [v for v in self._by_document[path] if v.recording.script == script]
         nth = next(nth for nth, one in enumerate(same) if one is verdict)
-        return Leans(binding.text, script, path, nth, len(same))
+        return BindingInputs(binding.text, script, path, nth, len(same))
 
     def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
         """The lines of a recorded output."""
@@ -126,31 +126,31 @@ def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
 
 
 def check_bindings(
-    document: Document, printed: Printed, held: Held | None = None
+    document: Document, printed: Printed, memory: BindingMemory | None = None
 ) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
-    Nothing is said of bindings that lean on a script that failed: its failure is reported. `held`
+    Nothing is said of bindings that lean on a script that failed: its failure is reported. `memory`
     remembers what was looked at before.
     """
     found: list[Diagnostic] = []
     for binding in document_bindings(document):
-        checked: Diagnostic | Borne
-        if held is None:
-            checked = _check(binding, printed, Borne())
+        checked: Diagnostic | BindingEvidence
+        if memory is None:
+            checked = _check(binding, printed, BindingEvidence())
         else:
-            key, leans = _leans_on(binding, printed), partial(printed.leans, binding)
-            if held.holds(key, leans):
+            key, inputs = _fingerprint(binding, printed), partial(printed.inputs, binding)
+            if memory.holds(key, inputs):
                 continue
-            checked = _check(binding, printed, held.before(leans))
-            if isinstance(checked, Borne):
-                held.add(key, leans, checked)
+            checked = _check(binding, printed, memory.before(inputs))
+            if isinstance(checked, BindingEvidence):
+                memory.add(key, inputs, checked)
         if isinstance(checked, Diagnostic):
             found.append(checked)
     return tuple(found)
 
 
-def _leans_on(binding: NumberBinding, printed: Printed) -> str:
+def _fingerprint(binding: NumberBinding, printed: Printed) -> str:
     """A hash of everything that decides whether a binding holds."""
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
@@ -170,7 +170,9 @@ def _leans_on(binding: NumberBinding, printed: Printed) -> str:
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnostic | Borne:
+def _check(
+    binding: NumberBinding, printed: Printed, before: BindingEvidence
+) -> Diagnostic | BindingEvidence:
     """What is wrong with a binding, or the lines by which it holds, as far as it was looked at.
 
     `before` are those by which it held before, if that is known.
@@ -183,7 +185,7 @@ def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnosti
     if path is None or path not in printed:
         return _orphan(binding, printed)
     if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
-        return Borne()
+        return BindingEvidence()
     if not verdicts:
         return _unrecorded(binding, path, run, before)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
@@ -196,7 +198,7 @@ def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnosti
         )
     lines = [line for verdict in steady for line in printed.lines(verdict)]
     if _holds(binding, lines):
-        return _borne(lines)
+        return _evidence(lines)
     counted, now = lines, lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
@@ -204,15 +206,15 @@ def _check(binding: NumberBinding, printed: Printed, before: Borne) -> Diagnosti
         ran = list(lines_of_run(run.stdout))
         counted = ([] if drifted else lines) + ran
         if _holds(binding, counted):
-            return _borne(ran, ran=True)
+            return _evidence(ran, ran=True)
         now = ran if drifted or before.ran else lines
     from coursebuild.scripts.mismatch import mismatch  # in most courses nobody asks for it
 
     return mismatch(binding, path, counted, before.lines, now)
 
 
-def _borne(lines: Sequence[PrintedLine], *, ran: bool = False) -> Borne:
-    return Borne(tuple(line.text for line in lines), ran)
+def _evidence(lines: Sequence[PrintedLine], *, ran: bool = False) -> BindingEvidence:
+    return BindingEvidence(tuple(line.text for line in lines), ran)
 
 
 def _silent(run: ScriptRun) -> bool:
@@ -220,11 +222,11 @@ def _silent(run: ScriptRun) -> bool:
 
 
 def _unrecorded(
-    binding: NumberBinding, path: str, run: ScriptRun | None, before: Borne
-) -> Diagnostic | Borne:
+    binding: NumberBinding, path: str, run: ScriptRun | None, before: BindingEvidence
+) -> Diagnostic | BindingEvidence:
     """A binding to a script without a recorded output: what it printed in this run counts."""
     if run is None:
-        return Borne()
+        return BindingEvidence()
     if run.outcome is Outcome.NORUN:
         return diagnose(
             "binding-orphan",
@@ -233,12 +235,12 @@ def _unrecorded(
             help="record its output below it",
         )
     if run.outcome is not Outcome.OK:
-        return Borne()
+        return BindingEvidence()
     from coursebuild.scripts.bound_numbers import lines_of_run
 
     lines = lines_of_run(run.stdout)
     if _holds(binding, lines):
-        return _borne(lines, ran=True)
+        return _evidence(lines, ran=True)
     from coursebuild.scripts.mismatch import mismatch
 
     return mismatch(binding, path, lines, before.lines, lines)

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from coursebuild.model import Recording, Table
 from coursebuild.scripts.celltext import plain
+from coursebuild.scripts.mapped_text import Side
 from coursebuild.scripts.numbers import (
     Number,
     round_like,
@@ -23,7 +24,6 @@ from coursebuild.scripts.numbers import (
     within_half_unit,
 )
 from coursebuild.scripts.tables import RowCell, table_rows
-from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
 
 Locate = Callable[[int, int], Span]
@@ -72,14 +72,14 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
     at = 0
     for cell in row:
         starts.append(at)
-        at += len(cell.traced.text) + 1
-    text = " ".join(cell.traced.text for cell in row)
+        at += len(cell.mapped.text) + 1
+    text = " ".join(cell.mapped.text for cell in row)
 
     def locate(start: int, end: int) -> Span:
         first = bisect_right(starts, start) - 1
         last = max(first, bisect_right(starts, max(start, end - 1)) - 1)
-        low, _ = row[first].traced.origin(start - starts[first], start - starts[first])
-        _, high = row[last].traced.origin(0, min(end - starts[last], len(row[last].traced.text)))
+        low, _ = row[first].mapped.origin(start - starts[first], start - starts[first])
+        _, high = row[last].mapped.origin(0, min(end - starts[last], len(row[last].mapped.text)))
         return Span(row[first].cell.span.source, low, max(low, high))
 
     return PrintedLine(text, locate)

@@ -29,7 +29,7 @@ from coursebuild.model import (
     Text,
 )
 from coursebuild.patterns import pattern
-from coursebuild.scripts.traced import Piece, Traced, filtered
+from coursebuild.scripts.mapped_text import MappedText, MappingSegment, filtered
 from coursebuild.source import Span
 
 _RUN = pattern(r"\s{2,}|[^\S ]")
@@ -41,21 +41,21 @@ def plain(text: str) -> str:
     return " ".join(text.replace("\u2212", "-").split())
 
 
-def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> Traced:
+def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> MappedText:
     """The plain text of a cell, filtered; origins are offsets in the lesson's source."""
     texts: list[str] = []
-    pieces: list[Piece] = []
+    pieces: list[MappingSegment] = []
     at = 0
     for text, span in _stretches(cell.children):
         if text:
-            pieces.append(Piece(at, span.start, span.end, span.text == text))
+            pieces.append(MappingSegment(at, span.start, span.end, span.text == text))
             texts.append(text)
             at += len(text)
     if not pieces:
-        pieces.append(Piece(0, cell.span.start, cell.span.end, False))
-    traced = filtered(Traced("".join(texts), tuple(pieces)), filters)
-    folded = traced.substituted(_RUN, " ").substituted(_ENDS, "")
-    return Traced(folded.text.replace("\u2212", "-"), folded.pieces)
+        pieces.append(MappingSegment(0, cell.span.start, cell.span.end, False))
+    mapped = filtered(MappedText("".join(texts), tuple(pieces)), filters)
+    folded = mapped.substituted(_RUN, " ").substituted(_ENDS, "")
+    return MappedText(folded.text.replace("\u2212", "-"), folded.pieces)
 
 
 def _stretches(inlines: Iterable[Inline]) -> Iterator[tuple[str, Span]]:

@@ -33,8 +33,8 @@ from coursebuild.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.scripts.changes import differences, number_change
 from coursebuild.scripts.diff import diff_text
 from coursebuild.scripts.lines import LineMatcher
+from coursebuild.scripts.mapped_text import Side
 from coursebuild.scripts.tables import compare_table
-from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
 
 

@@ -23,7 +23,7 @@ from msgspec import Struct
 from coursebuild.patterns import pattern
 from coursebuild.results import Outcome, ScriptJob, ScriptRun, Trace
 
-VERSION = "2"
+VERSION = "3"
 """To be changed with how scripts are run and watched: older results then count no more."""
 
 ABSENT = "absent"

@@ -20,7 +20,7 @@ from coursebuild.results import Verdict
 from coursebuild.scripts.align import Step, StepKind, align
 from coursebuild.scripts.changes import differences
 from coursebuild.scripts.lines import LineMatcher
-from coursebuild.scripts.traced import Side
+from coursebuild.scripts.mapped_text import Side
 
 Mark: TypeAlias = Literal[" ", "-", "+"]
 _CONTEXT = 2

@@ -22,9 +22,9 @@ from coursebuild.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.model import Comparison, Filter, Mode, Recording, Table
 from coursebuild.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.scripts.lines import ELLIPSIS, LineMatcher
+from coursebuild.scripts.mapped_text import Side
 from coursebuild.scripts.repeat import unstable
 from coursebuild.scripts.tableedit import updated_table
-from coursebuild.scripts.traced import Side
 from coursebuild.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")

@@ -1,7 +1,7 @@
 """Everything that running the scripts of a course shows to be wrong.
 
 Entry points: `script_findings`: each script that failed, each recorded output that is not what was
-printed, each bound number that no output bears out; `bearings`, by what those hold that do.
+printed, each bound number that no output bears out; `binding_history`, by what those hold that do.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.model import Course
 from coursebuild.results import Outcome, ScriptRun, Verdict
+from coursebuild.scripts.binding_memory import BindingHistory, BindingMemory
 from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import is_silent
 from coursebuild.scripts.divergence import divergence
 from coursebuild.scripts.extract import Extraction, extract, owners
-from coursebuild.scripts.held import Bearings, Held
 
 _ENDED_WELL = (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN)
 """Or was not to be made: nothing is to be said of such a run itself."""
@@ -26,13 +26,13 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
-    held: Held | None = None,
+    memory: BindingMemory | None = None,
     everything: Sequence[Extraction] | None = None,
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
     `extractions` are those that were run, maybe not all of the course; `everything` is what
-    `extract` gives for it, where that is known. `held` are bindings that were looked at before.
+    `extract` gives for it, where that is known. `memory` are bindings that were looked at before.
     """
     by_path = {run.path: run for run in runs}
     everything = extract(course).value if everything is None else everything
@@ -62,14 +62,16 @@ def script_findings(
             leaning = leaning_on(verdict, course.documents, printed)
             found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
     for document in course.documents:
-        found += check_bindings(document, printed, held)
+        found += check_bindings(document, printed, memory)
     return tuple(found)
 
 
-def bearings(course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]) -> Bearings:
+def binding_history(
+    course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
+) -> BindingHistory:
     """By which lines the bindings of a course hold."""
-    held = Bearings()
+    memory = BindingHistory()
     printed = Printed(verdicts, runs)
     for document in course.documents:
-        check_bindings(document, printed, held)
-    return held
+        check_bindings(document, printed, memory)
+    return memory

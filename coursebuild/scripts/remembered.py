@@ -14,8 +14,9 @@ from collections.abc import Iterable
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.results import Divergence, Outcome, ScriptRun, Sign, Trace
+from coursebuild.results import Divergence, Outcome, ScriptRun, Trace
 from coursebuild.scripts.dependencies import Dependency, Inputs, Kind, sought_files
 
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
@@ -71,84 +72,21 @@ class Record(Struct, frozen=True):
 
 def to_bytes(record: Record, places: Iterable[tuple[str, str]]) -> bytes:
     """As JSON; `places` are folders of this machine, each with a name, the longer ones first."""
-    inputs = record.inputs
-    value = {
-        "path": inputs.path,
-        "text": inputs.text,
-        "args": inputs.args,
-        "timeout": inputs.timeout,
-        "requires": inputs.requires,
-        "around": inputs.around,
-        "version": inputs.version,
-        "dependencies": [(d.kind.value, d.name, d.state) for d in record.dependencies],
-        "outcome": record.outcome.value,
-        "status": record.status,
-        "seconds": round(record.seconds, 4),
-        "made": record.made,
-        "forgotten": record.forgotten,
-        "stdout": record.stdout,
-        "stderr": _take_out(record.stderr, places),
-        "divergences": [
-            (d.sign.value, d.time, d.model, d.path, d.line, d.depth, d.geoms)
-            for d in record.divergences
-        ],
-        "moved": record.moved,
-        "states": record.states,
-    }
+    stderr = _take_out(record.stderr, places)
+    kept = replace(record, seconds=round(record.seconds, 4), stderr=stderr)
     # Names of files may hold bytes that are no text; only escapes can carry them.
-    return json.dumps(value, ensure_ascii=True).encode()
-
-
-class _Stored(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What JSON must hold to be a record."""
-
-    path: str
-    text: str
-    args: tuple[str, ...]
-    timeout: float
-    requires: tuple[str, ...]
-    around: tuple[tuple[str, str], ...]
-    version: str
-    dependencies: tuple[tuple[Kind, str, str], ...]
-    outcome: Outcome
-    status: int
-    seconds: float
-    made: int
-    forgotten: str
-    stdout: str
-    stderr: str
-    divergences: tuple[tuple[Sign, str, str, str, int, str, tuple[str, ...]], ...]
-    moved: bool
-    states: tuple[str, ...]
+    return json.dumps(msgspec.to_builtins(kept), ensure_ascii=True).encode()
 
 
 def from_bytes(data: bytes) -> Record | None:
     """The record that JSON holds; `None` where it holds none."""
     try:
-        s = _decoded(data)
+        try:
+            return msgspec.json.decode(data, type=Record)
+        except msgspec.DecodeError:  # perhaps for an escape that is half a letter
+            return msgspec.convert(json.loads(data), Record)
     except (ValueError, RecursionError):
         return None
-    return Record(
-        Inputs(s.path, s.text, s.args, s.timeout, s.requires, s.around, s.version),
-        tuple(Dependency(*parts) for parts in s.dependencies),
-        s.outcome,
-        s.status,
-        s.seconds,
-        s.made,
-        s.forgotten,
-        s.stdout,
-        s.stderr,
-        tuple(Divergence(*parts) for parts in s.divergences),
-        s.moved,
-        s.states,
-    )
-
-
-def _decoded(data: bytes) -> _Stored:
-    try:
-        return msgspec.json.decode(data, type=_Stored)
-    except msgspec.DecodeError:  # perhaps for an escape that is half a letter
-        return msgspec.convert(json.loads(data), _Stored, strict=True)
 
 
 def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:

@@ -19,7 +19,7 @@ from coursebuild.scripts.compare import compare
 from coursebuild.scripts.diff import shortened
 from coursebuild.scripts.extract import Extraction
 from coursebuild.scripts.lines import LineMatcher
-from coursebuild.scripts.traced import Side
+from coursebuild.scripts.mapped_text import Side
 
 _LINES = 12
 _WIDTH = 120

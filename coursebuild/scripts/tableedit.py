@@ -17,10 +17,10 @@ from msgspec.structs import replace
 from coursebuild.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.model import Comparison, Filter, Mode, Recording, Table
 from coursebuild.scripts.lines import canonical, same_number
+from coursebuild.scripts.mapped_text import Side
 from coursebuild.scripts.numbers import Number, round_like
 from coursebuild.scripts.repeat import unstable
 from coursebuild.scripts.tables import RowCell, RowMatch, match_rows, rows_match, table_rows
-from coursebuild.scripts.traced import Side
 from coursebuild.source import Span
 
 MINUS = "\u2212"
@@ -65,7 +65,7 @@ def _updated_row(
         span = found.row[0].cell.span.to(found.row[-1].cell.span)
         return _refused(span, "no line of this run has the cells of this row in order")
     edits: list[Edit] = []
-    texts = {id(cell): cell.traced.text for cell in found.row}
+    texts = {id(cell): cell.mapped.text for cell in found.row}
     # From the last number to the first, so that the offsets before it stay right.
     for cell, recorded, printed in reversed(found.pairs):
         if same_number(recorded, printed, comparison):

@@ -30,9 +30,9 @@ from coursebuild.scripts.lines import (
     numbers_at,
     same_number,
 )
+from coursebuild.scripts.mapped_text import MappedText, Side
 from coursebuild.scripts.numbers import Number, relative_error
 from coursebuild.scripts.pairing import MATCH, Keys, pair
-from coursebuild.scripts.traced import Side, Traced
 from coursebuild.source import Span
 
 _ALIKE = 6
@@ -47,12 +47,12 @@ class RowCell(Struct, frozen=True):
     """A cell of a recorded table."""
 
     cell: Cell
-    traced: Traced
+    mapped: MappedText
     canon: Canon
 
     def span(self, number: Number) -> Span:
         """Where a number of the cell stands in the lesson."""
-        return Span(self.cell.span.source, *self.traced.origin(number.start, number.end))
+        return Span(self.cell.span.source, *self.mapped.origin(number.start, number.end))
 
 
 class RowMatch(Struct, frozen=True):
@@ -73,9 +73,9 @@ def table_rows(table: Table, filters: Iterable[Filter] = ()) -> tuple[tuple[RowC
     for row in table.rows:
         cells = []
         for cell in row:
-            traced = cell_text(cell, rules)
-            if traced.text:
-                cells.append(RowCell(cell, traced, canonical(traced.text)))
+            mapped = cell_text(cell, rules)
+            if mapped.text:
+                cells.append(RowCell(cell, mapped, canonical(mapped.text)))
         rows.append(tuple(cells))
     return tuple(rows)
 
@@ -120,7 +120,7 @@ def compare_table(
 
 
 def _row_text(row: Sequence[RowCell]) -> str:
-    return "  ".join(cell.traced.text for cell in row)
+    return "  ".join(cell.mapped.text for cell in row)
 
 
 def _row_changes(

@@ -16,9 +16,9 @@ from coursebuild.model import (
     document_blocks,
 )
 from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.binding_memory import BindingHistory
 from coursebuild.scripts.bindings import Printed, check_bindings, leaning_on
 from coursebuild.scripts.compare import verify
-from coursebuild.scripts.held import Bearings
 from support.sample_lessons import course, document, ran, told
 
 PRINTED = """\
@@ -59,7 +59,7 @@ def check(
     verdicts = verify(course(lesson, *others), runs)
     printed = Printed(verdicts, runs, [*known, *scripts])
     found = check_bindings(lesson, printed)
-    held = Bearings()
+    held = BindingHistory()
     for _ in range(2):  # what is remembered of the same outputs changes nothing
         assert check_bindings(lesson, printed, held) == found
     return found

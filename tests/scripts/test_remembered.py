@@ -72,8 +72,9 @@ def test_json_that_is_no_record(data: st.DataObject) -> None:
     wrong = st.sampled_from([None, {}, [[]], {"a": 1}, [1]])
     value[name] = data.draw(wrong)
     assert from_bytes(json.dumps(value).encode()) is None
-    del value[name]
-    assert from_bytes(json.dumps(value).encode()) is None
+    if name not in ("stdout", "stderr", "divergences", "moved", "states"):
+        del value[name]
+        assert from_bytes(json.dumps(value).encode()) is None
 
 
 def test_deep_json() -> None:

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.binding_memory import BindingHistory
 from coursebuild.scripts.bindings import Printed, check_bindings
 from coursebuild.scripts.compare import verify
-from coursebuild.scripts.held import Bearings
 from support.sample_lessons import course, document, ran, told
 
 PENDULUM = "period   2.006 s\nhalf     1.003 s\n"
@@ -21,7 +21,7 @@ def lesson(prose: str, output: str, fence: str = "text") -> str:
     return f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{body}\n{prose}\n"
 
 
-def look(held: Bearings, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
+def look(held: BindingHistory, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
     here = document(text)
     verdicts = verify(course(here), runs)
     return check_bindings(here, Printed(verdicts, runs, ["examples/a.py"]), held)
@@ -32,7 +32,7 @@ def anew(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic
 
     In between the old one stands beside the new run, as it does before it is accepted.
     """
-    prose, held = f"`{binding}`{{out}}", Bearings()
+    prose, held = f"`{binding}`{{out}}", BindingHistory()
     assert look(held, lesson(prose, before, fence), ran(before)) == ()
     assert look(held, lesson(prose, before, fence), ran(now)) == ()
     (found,) = look(held, lesson(prose, now, fence), ran(now))
@@ -190,7 +190,7 @@ def test_recorded_tables() -> None:
     before = "| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n| RK4 | 2.0 |\n"
     now = before.replace("+6.641", "+9.5").replace("2.0", "6.7")
     runs = "Euler +6.641 %\nRK4 2.0\n", "Euler +9.5 %\nRK4 6.7\n"
-    held, prose = Bearings(), "| the error | `6.6`{out} |"
+    held, prose = BindingHistory(), "| the error | `6.6`{out} |"
     assert look(held, lesson(prose, before), ran(runs[0])) == ()
     assert look(held, lesson(prose, before), ran(runs[1])) == ()
     (found,) = look(held, lesson(prose, now), ran(runs[1]))
@@ -198,7 +198,7 @@ def test_recorded_tables() -> None:
 
 
 def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
-    held, prose = Bearings(), "`7.5`{out}"
+    held, prose = BindingHistory(), "`7.5`{out}"
     recorded = "start\n...\nend 1.5\n"
     text = lesson(prose, recorded, "text ellipsis")
     assert look(held, text, ran("start\nx 7.52\nend 1.5\n")) == ()
@@ -207,14 +207,14 @@ def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
 
 
 def test_an_output_that_is_not_recorded_has_places_too() -> None:
-    held, text = Bearings(), "`7.5`{out=examples/a.py}\n"
+    held, text = BindingHistory(), "`7.5`{out=examples/a.py}\n"
     assert look(held, text, ran("x 7.52\ny 1\n")) == ()
     (found,) = look(held, text, ran("x 9.52\ny 7.6\n"))
     assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
 
 
 def test_a_script_that_fails_in_between_takes_nothing_away() -> None:
-    held, now = Bearings(), "period 2.950 s\nhalf 1.975 s\n"
+    held, now = BindingHistory(), "period 2.950 s\nhalf 1.975 s\n"
     assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
     failed = ran(outcome=Outcome.FAILED, status=1)
     assert look(held, lesson("`2.006`{out}", PENDULUM), failed) == ()
@@ -232,7 +232,7 @@ def test_a_script_that_fails_in_between_takes_nothing_away() -> None:
 
 
 def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
-    held, now = Bearings(), "period 2.950 s\nhalf 1.975 s\n"
+    held, now = BindingHistory(), "period 2.950 s\nhalf 1.975 s\n"
     assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
     twice = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
     (found,) = look(held, twice, ran(now))
@@ -254,7 +254,7 @@ def test_where_nothing_is_known_of_before(
     binding: str, printed: str, help_text: str, offered: bool
 ) -> None:
     text = lesson(f"`{binding}`{{out}}", printed + "\n")
-    (found,) = look(Bearings(), text, ran(printed + "\n"))
+    (found,) = look(BindingHistory(), text, ran(printed + "\n"))
     assert found.help == help_text
     assert bool(found.edits) is offered
 

@@ -21,9 +21,9 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import extract_scripts, run
 from coursebuild.results import Outcome, ScriptRun
+from coursebuild.scripts.binding_memory import BindingHistory
 from coursebuild.scripts.extract import Extraction, jobs
 from coursebuild.scripts.findings import script_findings
-from coursebuild.scripts.held import Bearings
 
 _BATCH = 16
 """Scripts whose results are waited for before they are shown."""
@@ -54,7 +54,7 @@ class Scripts:
         self._runnable: set[str] = set()
         self._others = False
         """Whether scripts that did not change lean on something that did."""
-        self._held = Bearings()
+        self._held = BindingHistory()
         """Bindings that held, also before an output was accepted; see `check_bindings`."""
         self._server = ScriptServer()
 

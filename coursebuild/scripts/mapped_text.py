@@ -1,9 +1,9 @@
 """Texts to compare: filtered, split into lines, every part with the place that it came from.
 
-Entry points: `Traced.of_text`, `filtered`, `Side.of`.
+Entry points: `MappedText.of_text`, `filtered`, `Side.of`.
 
-1. `Traced` is a text with its origin: stretches that are copies know it character by character, a
-   stretch that a filter wrote stands for all that it replaced.
+1. `MappedText` is a text with its origin: stretches that are copies know it character by character,
+   a stretch that a filter wrote stands for all that it replaced.
 2. `filtered` applies the course's filters, one after the other, each to the whole text (`^` and `$`
    match at lines), after white space that does not count has gone.
 3. A `Side` is what one side of a comparison has: the lines without trailing white space and without
@@ -25,8 +25,8 @@ from coursebuild.patterns import pattern
 _LINE_END = pattern(r"\r\n?|\n")
 
 
-class Piece(Struct, frozen=True):
-    """A stretch of a traced text, up to the next piece."""
+class MappingSegment(Struct, frozen=True):
+    """A stretch of a mapped text, up to the next piece."""
 
     at: int
     """Offset in the text."""
@@ -38,26 +38,26 @@ class Piece(Struct, frozen=True):
     """Copied character by character; otherwise all of the stretch stands for `[start, end)`."""
 
 
-class Traced(Struct, frozen=True):
+class MappedText(Struct, frozen=True):
     """A text whose characters know where they came from; pieces are in order, without gaps."""
 
     text: str
-    pieces: tuple[Piece, ...]
+    pieces: tuple[MappingSegment, ...]
 
     @classmethod
-    def of_text(cls, text: str) -> Traced:
+    def of_text(cls, text: str) -> MappedText:
         """A text that is its own origin."""
-        return cls(text, (Piece(0, 0, len(text), True),))
+        return cls(text, (MappingSegment(0, 0, len(text), True),))
 
     @classmethod
-    def of_output(cls, text: str) -> Traced:
+    def of_output(cls, text: str) -> MappedText:
         """An output without what does not count.
 
         Line ends are LF, the last line has one too, no line ends in white space, no empty lines
         stand at the end.
         """
         lines = _bare_lines(text)
-        pieces: list[Piece] = []
+        pieces: list[MappingSegment] = []
         at = copied = copied_from = 0
         for line, start, end in lines:
             stop = start + len(line)
@@ -66,15 +66,15 @@ class Traced(Struct, frozen=True):
                 continue
             # The copy that began at `copied` ends before this line's end, which is made anew.
             if at - 1 > copied:
-                pieces.append(Piece(copied, copied_from, stop, True))
-            pieces.append(Piece(at - 1, stop, end, False))
+                pieces.append(MappingSegment(copied, copied_from, stop, True))
+            pieces.append(MappingSegment(at - 1, stop, end, False))
             copied, copied_from = at, end
         if at > copied:
-            pieces.append(Piece(copied, copied_from, copied_from + at - copied, True))
+            pieces.append(MappingSegment(copied, copied_from, copied_from + at - copied, True))
         joined = "".join(line + "\n" for line, _, _ in lines)
-        return cls(joined, tuple(pieces) or (Piece(0, 0, 0, False),))
+        return cls(joined, tuple(pieces) or (MappingSegment(0, 0, 0, False),))
 
-    def _piece(self, at: int) -> Piece:
+    def _piece(self, at: int) -> MappingSegment:
         return self.pieces[max(0, bisect_right(self.pieces, at, key=lambda piece: piece.at) - 1)]
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
@@ -84,10 +84,10 @@ class Traced(Struct, frozen=True):
         high = last.start + end - last.at if last.verbatim else last.end
         return low, low if start == end else max(low, high)
 
-    def substituted(self, pattern: re.Pattern[str], replacement: str) -> Traced:
-        """`pattern.sub(replacement, text)`, traced."""
+    def substituted(self, pattern: re.Pattern[str], replacement: str) -> MappedText:
+        """`pattern.sub(replacement, text)`, mapped."""
         parts: list[str] = []
-        pieces: list[Piece] = []
+        pieces: list[MappingSegment] = []
         length = copied = 0
         for found in pattern.finditer(self.text):
             self._copy(copied, found.start(), length, pieces)
@@ -96,12 +96,16 @@ class Traced(Struct, frozen=True):
             copied = found.end()
             written = found.expand(replacement)
             if written:
-                pieces.append(Piece(length, *self._replaced(found.start(), found.end()), False))
+                pieces.append(
+                    MappingSegment(length, *self._replaced(found.start(), found.end()), False)
+                )
                 parts.append(written)
                 length += len(written)
         self._copy(copied, len(self.text), length, pieces)
         parts.append(self.text[copied:])
-        return Traced("".join(parts), tuple(pieces) or (Piece(0, 0, self.pieces[-1].end, False),))
+        return MappedText(
+            "".join(parts), tuple(pieces) or (MappingSegment(0, 0, self.pieces[-1].end, False),)
+        )
 
     def _replaced(self, start: int, end: int) -> tuple[int, int]:
         """What a replacement of `text[start:end]` stands for.
@@ -114,7 +118,7 @@ class Traced(Struct, frozen=True):
             return piece.start, piece.end
         return self.origin(start, end)
 
-    def _copy(self, start: int, end: int, at: int, into: list[Piece]) -> None:
+    def _copy(self, start: int, end: int, at: int, into: list[MappingSegment]) -> None:
         """Append the pieces of `text[start:end]`, which will stand at offset `at`."""
         if start == end:
             return
@@ -126,9 +130,9 @@ class Traced(Struct, frozen=True):
             new_at = at + max(piece.at, start) - start
             if piece.verbatim:
                 stop = min(piece.end, piece.start + end - piece.at)
-                into.append(Piece(new_at, piece.start + skipped, stop, True))
+                into.append(MappingSegment(new_at, piece.start + skipped, stop, True))
             else:
-                into.append(Piece(new_at, piece.start, piece.end, False))
+                into.append(MappingSegment(new_at, piece.start, piece.end, False))
 
 
 def _bare_lines(text: str) -> list[tuple[str, int, int]]:
@@ -149,13 +153,13 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern, re.MULTILINE)
 
 
-def filtered(traced: Traced, filters: Iterable[Filter]) -> Traced:
+def filtered(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
     """The text after the filters."""
     for rule in filters:
         pattern = _compiled(rule.pattern)
-        if pattern.search(traced.text):
-            traced = traced.substituted(pattern, rule.replacement)
-    return traced
+        if pattern.search(mapped.text):
+            mapped = mapped.substituted(pattern, rule.replacement)
+    return mapped
 
 
 class Line(Struct, frozen=True):
@@ -170,21 +174,21 @@ class Side(Struct, frozen=True):
 
     raw: str
     """Before the filters, its line ends as they came."""
-    traced: Traced
+    mapped: MappedText
     lines: tuple[Line, ...]
 
     @classmethod
     def of(cls, text: str, filters: Iterable[Filter] = ()) -> Side:
         """The lines of a text after the filters."""
-        traced = filtered(Traced.of_output(text), filters)
+        mapped = filtered(MappedText.of_output(text), filters)
         lines: list[Line] = []
         at = 0
-        for line in traced.text.split("\n"):
+        for line in mapped.text.split("\n"):
             lines.append(Line(at, line.rstrip()))
             at += len(line) + 1
         while lines and not lines[-1].text:
             lines.pop()
-        return cls(text, traced, tuple(lines))
+        return cls(text, mapped, tuple(lines))
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -194,7 +198,7 @@ class Side(Struct, frozen=True):
     def origin(self, line: int, start: int, end: int) -> tuple[int, int]:
         """Where `lines[line].text[start:end]` stands in the raw text."""
         at = self.lines[line].at
-        return self.traced.origin(at + start, at + end)
+        return self.mapped.origin(at + start, at + end)
 
     def line_starts(self) -> list[int]:
         """Offsets in the raw text at which its lines begin."""

@@ -1,6 +1,7 @@
 """What a script does with another version of MuJoCo, and whether that is MuJoCo's doing.
 
-Entry points: `standings`, how runs stand to what is recorded; `judged`, what follows from four.
+Entry points: `run_standings`, how runs stand to what is recorded; `judgement`, what follows from
+four.
 
 A difference is MuJoCo's only if nothing else can be its cause: the script prints here what is
 recorded, so does a second run, in a fresh environment that differs from the other one in nothing
@@ -20,13 +21,13 @@ from coursebuild.scripts.align import StepKind, align
 from coursebuild.scripts.compare import verify
 from coursebuild.scripts.diff import diff_text
 from coursebuild.scripts.lines import LineMatcher
-from coursebuild.scripts.traced import Side
+from coursebuild.scripts.mapped_text import Side
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
 """`changed` and `fails` are MuJoCo's doing; of what is `unclear` that cannot be said."""
 
 
-class Standing(Struct, frozen=True):
+class RunStanding(Struct, frozen=True):
     """How a run stands to what is recorded; where nothing is, to what the script prints here."""
 
     run: ScriptRun
@@ -42,7 +43,7 @@ class Standing(Struct, frozen=True):
         return self.run.outcome is Outcome.OK and not self.diffs
 
 
-class Judged(Struct, frozen=True):
+class Judgement(Struct, frozen=True):
     """What became of a script with another version of MuJoCo."""
 
     status: Status
@@ -50,9 +51,9 @@ class Judged(Struct, frozen=True):
     """Where that needs to be said, a clause."""
 
 
-def standings(
+def run_standings(
     course: Course, here: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
-) -> dict[str, Standing]:
+) -> dict[str, RunStanding]:
     """How runs stand, by the path of the script; `here` are those of this environment."""
     runs = tuple(runs)
     verdicts: dict[str, list[Verdict]] = {}
@@ -66,39 +67,41 @@ def standings(
     }
 
 
-def _of_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> Standing:
+def _of_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
     told = [verdict for verdict in verdicts if verdict.status != "volatile"]
     changes = tuple(change for verdict in told for change in verdict.changes)
     diffs = tuple(verdict.diff for verdict in told if verdict.status == "drift")
-    return Standing(run, bool(told), changes, diffs)
+    return RunStanding(run, bool(told), changes, diffs)
 
 
-def _of_print(course: Course, here: ScriptRun, run: ScriptRun) -> Standing:
+def _of_print(course: Course, here: ScriptRun, run: ScriptRun) -> RunStanding:
     one, two = (Side.of(each.stdout, course.filters) for each in (here, run))
     steps = align(one, two, LineMatcher(course.comparison))
     same = all(step.kind is StepKind.SAME for step in steps)
-    return Standing(run, True, (), () if same else (diff_text(steps, one, two),))
+    return RunStanding(run, True, (), () if same else (diff_text(steps, one, two),))
 
 
-def is_comparable(here: Standing) -> Judged | None:
+def is_comparable(here: RunStanding) -> Judgement | None:
     """What keeps a script from being compared; `None` where nothing does."""
     match here.run.outcome:
         case Outcome.NORUN:
-            return Judged("uncompared", "its lesson says `norun`")
+            return Judgement("uncompared", "its lesson says `norun`")
         case Outcome.SKIPPED:
-            return Judged("uncompared", f"it needs {', '.join(here.run.missing)}")
+            return Judgement("uncompared", f"it needs {', '.join(here.run.missing)}")
         case Outcome.OK:
             pass
         case _:
-            return Judged("uncompared", "it does not run to its end here")
+            return Judgement("uncompared", "it does not run to its end here")
     if not here.compared:
-        return Judged("uncompared", "its output is volatile")
+        return Judgement("uncompared", "its output is volatile")
     if not here.holds:
-        return Judged("drifted", "what is recorded is not what it prints here")
+        return Judgement("drifted", "what is recorded is not what it prints here")
     return None
 
 
-def judged(there: Standing, control: Standing | None, again: Standing, engine: str) -> Judged:
+def judgement(
+    there: RunStanding, control: RunStanding | None, again: RunStanding, engine: str
+) -> Judgement:
     """What follows for a script that prints here what is recorded, and there does not.
 
     Args:
@@ -108,10 +111,10 @@ def judged(there: Standing, control: Standing | None, again: Standing, engine: s
         engine: the version of here.
     """
     if (there.run.outcome, there.run.stdout) != (again.run.outcome, again.run.stdout):
-        return Judged("unclear", "two runs of it there did not do the same")
+        return Judgement("unclear", "two runs of it there did not do the same")
     if control is None:
-        return Judged("unclear", f"no fresh environment with MuJoCo {engine} could be made")
+        return Judgement("unclear", f"no fresh environment with MuJoCo {engine} could be made")
     if not control.holds:
         fresh = f"a fresh environment with MuJoCo {engine}"
-        return Judged("unclear", f"it does not do in {fresh} what it does here either")
-    return Judged("changed" if there.run.outcome is Outcome.OK else "fails")
+        return Judgement("unclear", f"it does not do in {fresh} what it does here either")
+    return Judgement("changed" if there.run.outcome is Outcome.OK else "fails")

@@ -1,7 +1,8 @@
 """The bindings that were found to hold, and by which lines.
 
-Entry points: `Held`, which a check asks; `Bearings`, a memory that follows a course from one check
-to the next. When an output is another, it knows where the number of a binding was printed before.
+Entry points: `BindingMemory`, which a check asks; `BindingHistory`, one that follows a course from
+check to check. When an output is another, it knows where the number of a binding was printed
+before.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Protocol, TypeAlias
 from msgspec import Struct
 
 
-class Leans(Struct, frozen=True):
+class BindingInputs(Struct, frozen=True):
     """What a binding shows, and on which outputs it leans, whatever they are now."""
 
     text: str
@@ -25,7 +26,7 @@ class Leans(Struct, frozen=True):
     """Of these outputs: with another one, it is not known any more which is which."""
 
 
-class Borne(Struct, frozen=True):
+class BindingEvidence(Struct, frozen=True):
     """The lines by which a binding held."""
 
     lines: tuple[str, ...] = ()
@@ -33,29 +34,29 @@ class Borne(Struct, frozen=True):
     """They were those of a run, and not recorded."""
 
 
-Asked: TypeAlias = Callable[[], Leans]
+LazyInputs: TypeAlias = Callable[[], BindingInputs]
 """Gives what a binding leans on: not every memory asks for it."""
 
 
-class Held(Protocol):
+class BindingMemory(Protocol):
     """Remembers bindings in which nothing is wrong."""
 
-    def holds(self, key: str, leans: Asked) -> bool:
+    def holds(self, key: str, inputs: LazyInputs) -> bool:
         """Whether nothing is wrong with a binding, by a hash of all that this depends on."""
 
-    def add(self, key: str, leans: Asked, borne: Borne) -> None:
+    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
         """That nothing is wrong; there are no lines where nothing could be looked at."""
 
-    def before(self, leans: Asked) -> Borne:
+    def before(self, inputs: LazyInputs) -> BindingEvidence:
         """By what a binding held when it was last looked at and held, if that is known."""
 
 
-class Bearings:
+class BindingHistory:
     """See the module."""
 
     def __init__(self) -> None:
-        self._by: dict[str, Borne] = {}
-        self._last: dict[Leans, Borne] = {}
+        self._by: dict[str, BindingEvidence] = {}
+        self._last: dict[BindingInputs, BindingEvidence] = {}
         self._lines: dict[tuple[str, ...], tuple[str, ...]] = {}
         """Each once: many bindings hold by the same."""
 
@@ -68,20 +69,20 @@ class Bearings:
         for remembered in (self._by, self._last, self._lines):
             remembered.clear()
 
-    def holds(self, key: str, leans: Asked) -> bool:
-        """See `Held`."""
-        borne = self._by.get(key)
-        if borne is not None and borne.lines:
-            self._last[leans()] = borne
-        return borne is not None
+    def holds(self, key: str, inputs: LazyInputs) -> bool:
+        """See `BindingMemory`."""
+        evidence = self._by.get(key)
+        if evidence is not None and evidence.lines:
+            self._last[inputs()] = evidence
+        return evidence is not None
 
-    def add(self, key: str, leans: Asked, borne: Borne) -> None:
-        """See `Held`."""
-        lines = self._lines.setdefault(borne.lines, borne.lines)
-        self._by[key] = borne = Borne(lines, borne.ran)
+    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
+        """See `BindingMemory`."""
+        lines = self._lines.setdefault(evidence.lines, evidence.lines)
+        self._by[key] = evidence = BindingEvidence(lines, evidence.ran)
         if lines:
-            self._last[leans()] = borne
+            self._last[inputs()] = evidence
 
-    def before(self, leans: Asked) -> Borne:
-        """See `Held`."""
-        return self._last.get(leans(), Borne())
+    def before(self, inputs: LazyInputs) -> BindingEvidence:
+        """See `BindingMemory`."""
+        return self._last.get(inputs(), BindingEvidence())

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.model import Filter
-from coursebuild.scripts.traced import Side, Traced, filtered
+from coursebuild.scripts.mapped_text import MappedText, Side, filtered
 
 TEXTS = st.text(alphabet="ab1 \n-x", max_size=30)
 PATTERNS = st.sampled_from(
@@ -27,34 +27,34 @@ def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> N
     expected = text
     for pattern, replacement in rules:
         expected = re.sub(pattern, replacement, expected, flags=re.MULTILINE)
-    traced = filtered(Traced.of_text(text), [Filter(*rule) for rule in rules])
-    assert traced.text == expected
+    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    assert mapped.text == expected
 
 
 @given(TEXTS, st.lists(PATTERNS, max_size=4), st.data())
 def test_origins_lie_in_the_text_and_grow(
     text: str, rules: list[tuple[str, str]], data: st.DataObject
 ) -> None:
-    traced = filtered(Traced.of_text(text), [Filter(*rule) for rule in rules])
-    start = data.draw(st.integers(0, len(traced.text)))
-    end = data.draw(st.integers(start, len(traced.text)))
-    low, high = traced.origin(start, end)
+    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    start = data.draw(st.integers(0, len(mapped.text)))
+    end = data.draw(st.integers(start, len(mapped.text)))
+    low, high = mapped.origin(start, end)
     assert 0 <= low <= high <= len(text)
-    if start < end < len(traced.text):
-        later = traced.origin(end, len(traced.text))
+    if start < end < len(mapped.text):
+        later = mapped.origin(end, len(mapped.text))
         assert later[0] >= low and later[1] >= high
-    copies = [p for p in traced.pieces if p.verbatim]
+    copies = [p for p in mapped.pieces if p.verbatim]
     for piece in copies:
         length = piece.end - piece.start
-        assert traced.text[piece.at : piece.at + length] == text[piece.start : piece.end]
+        assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]
 
 
 def test_a_copied_character_is_traced_to_itself() -> None:
-    traced = filtered(Traced.of_text("aa 17 bb 25 cc"), [Filter("a+", "<A>"), Filter("b", "")])
-    at = traced.text.index("25")
-    assert traced.origin(at, at + 2) == (9, 11)
-    assert traced.origin(0, 1) == (0, 2)
-    assert traced.origin(1, 8) == (0, 9)
+    mapped = filtered(MappedText.of_text("aa 17 bb 25 cc"), [Filter("a+", "<A>"), Filter("b", "")])
+    at = mapped.text.index("25")
+    assert mapped.origin(at, at + 2) == (9, 11)
+    assert mapped.origin(0, 1) == (0, 2)
+    assert mapped.origin(1, 8) == (0, 9)
 
 
 OUTPUTS = st.text(alphabet="ab \t\r\n", max_size=20)
@@ -65,10 +65,10 @@ def test_an_output_loses_what_does_not_count(text: str) -> None:
     lines = [line.rstrip() for line in re.split(r"\r\n?|\n", text)]
     while lines and not lines[-1]:
         lines.pop()
-    traced = Traced.of_output(text)
-    assert traced.text == "".join(line + "\n" for line in lines)
-    for at, character in enumerate(traced.text):
-        low, high = traced.origin(at, at + 1)
+    mapped = MappedText.of_output(text)
+    assert mapped.text == "".join(line + "\n" for line in lines)
+    for at, character in enumerate(mapped.text):
+        low, high = mapped.origin(at, at + 1)
         if character != "\n":
             assert text[low:high] == character
         else:
@@ -76,9 +76,9 @@ def test_an_output_loses_what_does_not_count(text: str) -> None:
 
 
 def test_windows_line_ends_are_traced() -> None:
-    traced = Traced.of_output("a\r\nb \rc\n\n")
-    assert traced.text == "a\nb\nc\n"
-    assert traced.origin(4, 5) == (6, 7)
+    mapped = MappedText.of_output("a\r\nb \rc\n\n")
+    assert mapped.text == "a\nb\nc\n"
+    assert mapped.origin(4, 5) == (6, 7)
 
 
 def test_lines_know_their_raw_text() -> None:
