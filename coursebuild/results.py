@@ -251,20 +251,20 @@ class LabResult(Struct, frozen=True):
     title: str
     status: str
     """`ok`, or `failed`."""
-    seconds: float
-    """Wall time of the trial."""
-    steps_per_second: int | None
-    """Of the main run, in V8; `None` where it did not come to its end."""
-    tried: tuple[str, ...]
-    parity: str
-    """How the run compares with native MuJoCo, in words; empty where it was not compared."""
     module: str
     """The lab's code as an ES module."""
     config: str
     """The lab's data as JSON."""
-    mjb: bytes
+    mjb: bytes = b""
     """Its model."""
-    static: StaticForm | None
+    seconds: float = 0.0
+    """Wall time of the trial."""
+    steps_per_second: int | None = None
+    """Of the main run, in V8; `None` where it did not come to its end."""
+    tried: tuple[str, ...] = ()
+    parity: str = ""
+    """How the run compares with native MuJoCo, in words; empty where it was not compared."""
+    static: StaticForm | None = None
     cached: bool = False
     export: tuple[str, str] | None = None
     """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the

@@ -32,13 +32,16 @@ class JsonChild:
     """The child and its folder."""
 
     def __init__(
-        self, script: str, seconds: float, python: str | None = None, margin: float = 10.0
+        self, script: str, seconds: float, python: str | None = None, patience: float = 10.0
     ) -> None:
-        """A child ends itself when it works for more than `seconds`; `margin`: where it cannot."""
+        """A child ends itself, by SIGPROF, after so many seconds of processor time for a request.
+
+        One that does not compute is waited for `patience` times as long.
+        """
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
-        self._margin = margin
+        self._patience = patience
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
@@ -66,7 +69,7 @@ class JsonChild:
         with contextlib.suppress(BrokenPipeError):  # it died; reading tells
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
-        line = self._read_line(self._seconds + self._margin)
+        line = self._read_line(self._seconds * self._patience)
         return None if line is None else json.loads(line)
 
     def stop(self) -> None:
@@ -94,7 +97,7 @@ class JsonChild:
             self._process.wait(1.0)
         status = self._process.returncode
         self.stop()
-        if status is None or status == -signal.SIGALRM:
+        if status is None or status == -signal.SIGPROF:
             return f"took longer than {self._seconds:g} s"
         if status < 0:
             return f"crashed ({signal.Signals(-status).name})"

@@ -3,8 +3,8 @@
 Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
 
 The protocol: JSON lines. First this process says that it is ready; then, for each `Request` on
-standard input, it writes one `Reply`. A request that takes longer than its limit ends this process
-by SIGALRM.
+standard input, it writes one `Reply`. A request that takes more processor time than its limit ends
+this process by SIGPROF.
 """
 
 from __future__ import annotations
@@ -64,13 +64,13 @@ def main() -> None:
     _limit_memory()
     import mujoco
 
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         request: Request = json.loads(line)
-        signal.setitimer(signal.ITIMER_REAL, request["limit"])
+        signal.setitimer(signal.ITIMER_PROF, request["limit"])
         reply = _compile(mujoco, request)
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)
 
 

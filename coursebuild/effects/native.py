@@ -42,7 +42,7 @@ class NativeEngine(JsonChild):
             EffectError: MuJoCo cannot be loaded.
         """
         request = {"task": "save", "path": str(self._root / path), "text": text}
-        return base64.b64decode(self._told(request)["mjb"])
+        return base64.b64decode(self._request(request)["mjb"])
 
     def parity(self, mjb: bytes, run: dict[str, Any], horizon: int) -> dict[str, Any]:
         """A recorded run of the browser's engine, repeated: where and by how much it differs.
@@ -55,7 +55,7 @@ class NativeEngine(JsonChild):
             EffectError: MuJoCo cannot be loaded.
         """
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
-        return self._told({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
+        return self._request({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
 
     def script(self, request: dict[str, Any]) -> dict[str, Any]:
         """What running an exported script natively gives, or its `failure` in words.
@@ -68,9 +68,9 @@ class NativeEngine(JsonChild):
             EffectError: MuJoCo cannot be loaded.
         """
         library = str(Path(__file__).resolve().parents[2])
-        return self._told({"task": "script", "library": library, **request})
+        return self._request({"task": "script", "library": library, **request})
 
-    def _told(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _request(self, request: dict[str, Any]) -> dict[str, Any]:
         reply: dict[str, Any] | None = self.ask({**request, "limit": self._limit})
         if reply is None:
             raise NativeError(self.death())

@@ -3,8 +3,8 @@
 Entry point: run as a file by `native`, in a temporary folder, where MuJoCo may leave its log.
 
 The protocol: JSON lines, binary data in base64. First this process says that it is ready; then it
-answers each request with one line. A request that takes longer than its limit ends this process by
-SIGALRM.
+answers each request with one line. A request that takes more processor time than its limit ends
+this process by SIGPROF.
 
 - `save`: compile a text (as if it stood at a path) and give the model as an MJB file.
 - `script`: run an exported script as its user would, and observe it.
@@ -35,17 +35,17 @@ def main() -> None:
     import mujoco
     import numpy
 
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
     tasks = {"save": _save, "parity": _parity, "script": _script}
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         request = json.loads(line)
-        signal.setitimer(signal.ITIMER_REAL, request["limit"])
+        signal.setitimer(signal.ITIMER_PROF, request["limit"])
         try:
             reply = {"error": "", **tasks[request["task"]](mujoco, numpy, request)}
         except (ValueError, mujoco.FatalError, MemoryError) as error:
             reply = {"error": str(error) or type(error).__name__}
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)
 
 

@@ -8,8 +8,8 @@ a `Report`.
 2. `load`: disk → course, by `documents` (with `reading`, `tasks`), which
    parses only what nobody has parsed
 3. `verify`: course → results, by `remember` and `remember_models`, which give what is known;
-   `shards` leaves out the parts of other machines. `labs` (with `beside`, `lab_inputs`,
-   `lab_export`, `custom_labs`) tries labs
+   `shards` leaves out the parts of other machines. `labs` (with
+   `lab_inputs`, `lab_models`, `lab_export`, `custom_labs`) tries labs
 4. `judge`: findings → report; `depends`: the files that it depends on
 5. `site` (with `pages`): course and results → the files of a site; `kept`: what is made of the
    tool's own files for that

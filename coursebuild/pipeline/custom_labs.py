@@ -7,28 +7,29 @@ a lab does only its code knows, so it is not tried; that its model exists and co
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.effects.native import NativeEngine
 from coursebuild.effects.read import read_bytes
 from coursebuild.model import Course, Lab
+from coursebuild.pipeline.lab_models import model_of_course, saved_model
+from coursebuild.pipeline.remember import Memory
 from coursebuild.results import CompileResult, LabResult
 
 
 def custom_lab(
     root: Path,
+    memory: Memory,
+    native: NativeEngine,
     course: Course,
     models: Mapping[str, CompileResult],
     owner: str,
     name: str,
     lab: Lab,
-    save: Callable[[str, str], bytes],
 ) -> tuple[LabResult | None, list[Diagnostic]]:
-    """A lab with its code, its data and, where its JSON has a `model`, that as an MJB file.
-
-    `save` compiles the text of a path.
-    """
+    """A lab with its code, its data and, where its JSON has a `model`, that as an MJB file."""
     code = f"content/labs/{lab.kind}.js"
     if code not in course.files:
         return None, []  # which is told at the kind
@@ -36,15 +37,14 @@ def custom_lab(
     model = data.get("model")
     mjb = b""
     if isinstance(model, str):
-        source = next((m.source for m in course.models if m.name == model), None)
+        source = model_of_course(root, course, model)
         if source is None:
-            known = [m.name for m in course.models]
             message = f"no model `{model}` in models/"
-            help = did_you_mean(model, known)
+            help = did_you_mean(model, [m.name for m in course.models])
             return None, [diagnose("lab-model", lab.span.first_line(), message, help=help)]
         if models[model].error:
             return None, []  # which is told at the model
-        mjb = save(source.path, source.text)
+        mjb = saved_model(memory, native, source)
     config = {"id": name, "kind": lab.kind, "title": lab.title, "data": data}
     result = LabResult(
         span=lab.span,
@@ -52,13 +52,8 @@ def custom_lab(
         lesson=owner,
         title=lab.title,
         status="ok",
-        seconds=0.0,
-        steps_per_second=None,
-        tried=(),
-        parity="",
         module=read_bytes(root, code).decode("utf-8", "replace"),
         config=json.dumps(config, ensure_ascii=False, separators=(",", ":")),
         mjb=mjb,
-        static=None,
     )
     return result, []

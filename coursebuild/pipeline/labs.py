@@ -1,6 +1,6 @@
 """Trying every lab of a course: models → V8 and native MuJoCo → results and diagnostics.
 
-Entry point: `try_labs(course, models, options, engines)`.
+Entry points: `try_labs(course, models, options, engines)`; `run_scripts_and_labs`.
 
 1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
 2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
@@ -20,16 +20,16 @@ import hashlib
 import json
 import time
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeAlias, TypeVar
 
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, diagnose
 from coursebuild.effects.lab_engine import LabEngine
 from coursebuild.effects.lab_files import engine_digest
-from coursebuild.effects.mjcf import model_files
 from coursebuild.effects.native import NativeEngine, NativeError, native_digest
 from coursebuild.effects.versions import engine_version
 from coursebuild.labs import export_check
@@ -50,16 +50,20 @@ from coursebuild.pipeline.custom_labs import custom_lab
 from coursebuild.pipeline.lab_export import Offer, exported
 from coursebuild.pipeline.lab_inputs import SECONDS, SIMULATED, lab_inputs, tried_data
 from coursebuild.pipeline.lab_inputs import labs_of as labs_of
+from coursebuild.pipeline.lab_models import LabModel, model_of_lab, saved_model
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import LabTrial, Memory
-from coursebuild.pipeline.remember_models import need_of
 from coursebuild.results import CompileResult, LabResult, StaticForm
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
-_PASSING = ("timeout", "engine")
-"""Kinds of failure that may not happen again, so that they are not kept."""
+_TRANSIENT = ("timeout", "engine")
+"""Kinds of failure that may not happen again: a trial that ends in one is not kept."""
+T = TypeVar("T")
+Tried: TypeAlias = tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]
+"""What became of the labs, and what is wrong."""
 
 
 class Engines:
@@ -94,15 +98,15 @@ def try_labs(
     *,
     static: bool = False,
     only: frozenset[str] | None = None,
-) -> tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]:
+) -> Tried:
     """Try the labs, of all documents or of some, whose models compile; `engines` end with it.
 
     A lab of which something is in `wrong` already, such as a keyframe that is not there, is left.
     `static` forms are made when they are asked for; `only` names the labs to try.
     """
-    results: list[LabResult] = []
+    results: list[LabResult | None] = []
     found: list[Diagnostic] = []
-    memory = Memory(options.root, options.store)
+    root, memory = options.root, Memory(options.root, options.store)
     with engines:
         for owner, name, lab in labs_of(course):
             if documents is not None and lab.span.path not in documents:
@@ -112,66 +116,33 @@ def try_labs(
             if any(lab.span.contains(diagnostic.span) for diagnostic in wrong):
                 continue
             if lab.kind != SIMULATED:
-                save = functools.partial(_saved_model, memory, engines)
                 result, diagnostics = custom_lab(
-                    options.root, course, models, owner, name, lab, save
+                    root, memory, engines.native, course, models, owner, name, lab
                 )
-                found += diagnostics
-                results += [result] if result is not None else []
+            elif model := model_of_lab(root, course, models, lab):
+                attempt = _Attempt(root, memory, engines, course, owner, name, lab, model)
+                result, diagnostics = attempt.run(static)
+            else:
                 continue
-            source = _source(course, models, memory, lab)
-            if source is None:
-                continue
-            attempt = _Attempt(options.root, memory, engines, course, owner, name, lab, source)
-            result, diagnostics = attempt.run(static)
-            found += diagnostics
             results.append(result)
-    return tuple(results), tuple(found)
+            found += diagnostics
+    return tuple(result for result in results if result is not None), tuple(found)
 
 
-class _Source(Struct, frozen=True):
-    """A lab's model as text."""
-
-    path: str
-    """Where it stands, or would."""
-    text: str
-    files: tuple[str, ...]
-    """Other files that it may consist of."""
-
-
-def _source(
-    course: Course, models: Mapping[str, CompileResult], memory: Memory, lab: Lab
-) -> _Source | None:
-    """A lab's model; `None` for one that does not compile, as is told already."""
-    if lab.xml is not None:
-        text = lab.xml.text
-        path = "models/.lab.xml"
-        return _Source(path, text, model_files(memory.states.root, path, text))
-    compiled = models.get(lab.model or "")
-    if compiled is None or compiled.facts is None:
-        return None
-    source = next(model.source for model in course.models if model.name == lab.model)
-    files = model_files(memory.states.root, source.path, source.text)
-    return _Source(source.path, source.text, files)
-
-
-def _saved_model(memory: Memory, engines: Engines, path: str, text: str) -> bytes:
-    files = model_files(memory.states.root, path, text)
-    return _saved(memory, engines, _Source(path, text, files))
-
-
-def _saved(memory: Memory, engines: Engines, source: _Source) -> bytes:
-    """A model as an MJB file, from the store where nothing that it is made of has changed."""
-    needed = [need_of(file) for file in source.files]
-    states = [memory.states(need) for need in needed]
-    parts = json.dumps([engine_version(), source.path, source.text, source.files, states])
-    key = hashlib.sha256(parts.encode()).hexdigest()
-    made = memory.store.get("mjb", key)
-    if made is None:
-        made = engines.native.save(source.path, source.text)
-        if states == [memory.states.now(need) for need in needed]:  # nobody saved one meanwhile
-            memory.store.put("mjb", key, made)
-    return made
+def run_scripts_and_labs(
+    scripts: Callable[[], T], labs: Callable[[Engines], Tried], root: Path, progress: Progress
+) -> tuple[T, Tried]:
+    """What the scripts gave, and what the labs gave that were tried in a thread meanwhile."""
+    engines = Engines(root)
+    with ThreadPoolExecutor(1, "labs") as thread:
+        trying = thread.submit(labs, engines)
+        try:
+            ran = scripts()
+            with progress.stage("trying labs"):
+                return ran, trying.result()
+        except BaseException:  # Ctrl-C does not wait for a lab
+            engines.stop()
+            raise
 
 
 class _Attempt(Struct, frozen=True):
@@ -184,17 +155,17 @@ class _Attempt(Struct, frozen=True):
     owner: str
     name: str
     lab: Lab
-    source: _Source
+    model: LabModel
 
-    def run(self, static: bool) -> tuple[LabResult, list[Diagnostic]]:
+    def run(self, static: bool) -> tuple[LabResult | None, list[Diagnostic]]:
         """What became of it, and what is wrong."""
         began = time.monotonic()
         lab = self.lab
         module = compile_lab(lab, self.name)
         try:
-            mjb = self._model()
+            mjb = saved_model(self.memory, self.engines.native, self.model)
             key = _key(lab, module, mjb)
-            reply = self._stored(key)
+            reply = self._load(key)
             cached = reply is not None
             if reply is None:
                 mistakes = self._mistakes()
@@ -202,19 +173,19 @@ class _Attempt(Struct, frozen=True):
                     return self._failed(module, began), mistakes
                 reply = self._try(module, mjb, key)
         except NativeError as error:
-            told = diagnose("lab-engine", entry_span(lab, ()), f"native MuJoCo {error}")
-            return self._failed(module, began), [told]
+            wrong = diagnose("lab-engine", entry_span(lab, ()), f"native MuJoCo {error}")
+            return self._failed(module, began), [wrong]
         trial, parity = read_trial(reply), _parity(reply)
-        seconds, made = _lasted(reply)
+        seconds, made = float(reply["seconds"]), int(reply["made"])
         found = [*trial_diagnostics(lab, trial), *self._version(trial)]
         found += shallow_diagnostics(lab, trial)
         if parity is not None:
             found += parity_diagnostics(lab, parity)
         form = self._static(key, trial) if static and not found else None
         offer = Offer(None) if found else self._export(trial, parity)
-        own = () if self.lab.xml is not None else (self.source.path,)
-        tried = LabTrial(not found, _is_kept(reply), seconds, made)
-        self.memory.note_lab(lab_inputs(lab, self.name), (*own, *self.source.files), tried)
+        own = () if lab.xml is not None else (self.model.path,)
+        tried = LabTrial(not found, _is_lasting(reply), seconds, made)
+        self.memory.note_lab(lab_inputs(lab, self.name), (*own, *self.model.files), tried)
         result = LabResult(
             span=lab.span,
             name=module.name,
@@ -243,19 +214,10 @@ class _Attempt(Struct, frozen=True):
             lesson=self.owner,
             title=self.lab.title,
             status="failed",
-            seconds=time.monotonic() - began,
-            steps_per_second=None,
-            tried=(),
-            parity="",
             module=module.code,
             config=module.config,
-            mjb=b"",
-            static=None,
+            seconds=time.monotonic() - began,
         )
-
-    def _model(self) -> bytes:
-        """The model as an MJB file."""
-        return _saved(self.memory, self.engines, self.source)
 
     def _mistakes(self) -> list[Diagnostic]:
         """What no engine could run."""
@@ -267,7 +229,8 @@ class _Attempt(Struct, frozen=True):
             if text is not None
         ]
 
-    def _stored(self, key: str) -> dict[str, Any] | None:
+    def _load(self, key: str) -> dict[str, Any] | None:
+        """The reply of an earlier trial."""
         found = self.memory.store.get("labs", key)
         try:
             return None if found is None else json.loads(zlib.decompress(found))
@@ -289,7 +252,7 @@ class _Attempt(Struct, frozen=True):
             main["parity"] = self._compared(main, mjb)
         reply["seconds"] = round(time.monotonic() - began, 4)
         reply["made"] = int(time.time())
-        if _is_kept(reply):
+        if _is_lasting(reply):
             self.memory.store.put("labs", key, zlib.compress(json.dumps(reply).encode()))
         return reply
 
@@ -342,14 +305,9 @@ class _Attempt(Struct, frozen=True):
         )
 
 
-def _lasted(reply: dict[str, Any]) -> tuple[float, int]:
-    """How long a trial took, s, and when it was, in seconds since 1970."""
-    return float(reply["seconds"]), int(reply["made"])
-
-
-def _is_kept(reply: dict[str, Any]) -> bool:
+def _is_lasting(reply: dict[str, Any]) -> bool:
     """Whether the same trial would have the same result another time."""
-    return all(failure["kind"] not in _PASSING for failure in reply["failures"])
+    return all(failure["kind"] not in _TRANSIENT for failure in reply["failures"])
 
 
 def _to_parse(piece: LabCode) -> tuple[str, str, str, bool]:
@@ -381,18 +339,18 @@ def _drawing_digest() -> str:
 
 def _parity(reply: dict[str, Any]) -> Parity | None:
     main = reply["main"]
-    told = main["parity"] if main is not None else None
-    if told is None or "unrepeated" in told:
+    run = main["parity"] if main is not None else None
+    if run is None or "unrepeated" in run:
         return None
-    return Parity(told["steps"], told["timestep"], told["first"], told["relative"], told["exact"])
+    return Parity(run["steps"], run["timestep"], run["first"], run["relative"], run["exact"])
 
 
 def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: Offer) -> str:
     if parity is not None:
         return parity.describe()
-    told = reply["main"]["parity"] if reply["main"] is not None else None
-    if told is None:
+    run = reply["main"]["parity"] if reply["main"] is not None else None
+    if run is None:
         return ""
     if offer.script is not None:
         return "compared with native MuJoCo as its Python export"
-    return f"not compared with native MuJoCo: {told['unrepeated']}"
+    return f"not compared with native MuJoCo: {run['unrepeated']}"

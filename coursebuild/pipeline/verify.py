@@ -105,10 +105,16 @@ def verify(
     labs: tuple[LabResult, ...] = ()
     lab_findings: tuple[Diagnostic, ...] = ()
     if _has_labs(course):
-        from coursebuild.pipeline.beside import Trials, run_beside
+        from coursebuild.pipeline.labs import Engines, Tried, run_scripts_and_labs, try_labs
 
-        trials = Trials(course, dict(models), options, documents, compiled, only, static)
-        runs, (labs, lab_findings) = run_beside(scripts, trials, progress)
+        known = dict(models)
+
+        def trials(engines: Engines) -> Tried:
+            return try_labs(
+                course, known, options, engines, documents, compiled, static=static, only=only
+            )
+
+        runs, (labs, lab_findings) = run_scripts_and_labs(scripts, trials, options.root, progress)
     else:
         runs = scripts()
     verdicts = compare_all(course, runs)
