@@ -62,7 +62,7 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 1$.\n")
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
-        "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'html.parser', 'asyncio',"
+        "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'asyncio',"
         " 'subprocess', 'coursebuild.effects.v8', 'coursebuild.numerics.reports.bench',"
         " 'coursebuild.numerics.reports.points', 'coursebuild.render.cutting',"
         " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"
