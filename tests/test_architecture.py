@@ -29,6 +29,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     ),
     frozenset({"features"}),
     frozenset({"pipeline"}),
+    frozenset({"preview"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
 )

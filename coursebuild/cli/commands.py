@@ -161,7 +161,7 @@ def export_command(arguments: argparse.Namespace) -> int:
 
 def serve_command(arguments: argparse.Namespace) -> int:
     """Preview."""
-    from coursebuild.pipeline.serve import serve
+    from coursebuild.preview.serve import serve
 
     serve(options_of(arguments), arguments.port)
     return CLEAN

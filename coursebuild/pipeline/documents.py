@@ -37,6 +37,7 @@ from coursebuild.source import Source
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
     from coursebuild.pipeline.reading import Reader
+    from coursebuild.render.record import PageRecord
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
@@ -65,11 +66,15 @@ class Documents:
         jobs: int,
         stage: Stage = _silent,
         following: Sequence[str] = (),
+        *,
+        warm: bool = False,
     ) -> None:
         """`jobs` copies of this process at most; `stage` is told when long work begins.
 
         `following` are modules that will be needed later, and are imported while copies read.
+        `warm`: this process lives long, and what typesets formulas stays.
         """
+        self._warm = warm
         self._store = store
         self._stage = stage
         self._jobs = jobs
@@ -118,8 +123,8 @@ class Documents:
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the summaries of sources, of which it is said which are lessons."""
         tasks = [Task.of(source, callouts, lesson) for source, lesson in sources]
-        self._tasks.update((task.source.path, task) for task in tasks)
         missing = [task for task in tasks if not self._has(task)]
+        self._tasks.update((task.source.path, task) for task in tasks)
         if len(missing) >= _MANY:
             from coursebuild.pipeline.reading import prepare_to_read
 
@@ -129,11 +134,14 @@ class Documents:
             self._read(at_once)
 
     def _has(self, task: Task) -> bool:
-        """Whether the summary of a text is in the store."""
+        """Whether the summary of a text is known, or in the store."""
+        path = task.source.path
+        if path in self._summaries and self._tasks[path].key == task.key:
+            return True
         data = self._store.get(SUMMARIES, task.key, local=True)
         summary = decode(data, DocumentSummary, task.source)
         if summary is not None:
-            self._summaries[task.source.path] = summary
+            self._summaries[path] = summary
         return summary is not None
 
     def _read(self, tasks: Sequence[Task]) -> None:
@@ -214,6 +222,10 @@ class Documents:
         """A page, its body, and what it is found by, drawn here and now."""
         return self._here().draw(page)
 
+    def page(self, page: Draw) -> tuple[PageRecord, str]:
+        """A page and its body alone, drawn here and now."""
+        return self._here().page(page)
+
     def _work(
         self, name: str, requests: Iterator[tuple[int | None, Request]]
     ) -> tuple[list[Answer], list[int | None]]:
@@ -248,5 +260,5 @@ class Documents:
         if self._reader is None:
             from coursebuild.pipeline.reading import Reader
 
-            self._reader = Reader(self._store)
+            self._reader = Reader(self._store, warm=self._warm)
         return self._reader

@@ -216,7 +216,7 @@ class _Items:
             document = page.document(library)
             if document is not None and any(map(_is_quiz, document_blocks(document))):
                 inputs = encode(page.inputs(library))
-                key = page_key(library.course, self._documents, document.source.path, inputs)
+                key = page_key(library.course, self._documents.task(document.source.path), inputs)
                 yield _Asked(document.source, key, page)
 
     def _made(self, asked: list[_Asked]) -> dict[str, bytes]:

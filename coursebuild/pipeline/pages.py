@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import itertools
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -51,8 +51,8 @@ class _Wanted(Struct, frozen=True):
 
     page: PageEntry
     key: str
-    document: str | None
-    """The path of its document."""
+    task: Task | None
+    """The text of its document."""
 
     @property
     def path(self) -> str:
@@ -72,7 +72,18 @@ class _Page(Struct, frozen=True):
 class Pages:
     """The pages of a course, drawn."""
 
-    def __init__(self, library: Library, documents: Documents, store: Memo) -> None:
+    def __init__(
+        self,
+        library: Library,
+        documents: Documents,
+        store: Memo,
+        entries: Iterable[PageEntry] | None = None,
+        last_good: Mapping[str, str] | None = None,
+    ) -> None:
+        """`entries` are those to draw, all where nothing is said.
+
+        `last_good`: keys, by site path, of pages that stay as they were.
+        """
         self._library = library
         self._documents = documents
         self._store = store
@@ -83,9 +94,11 @@ class Pages:
         self._inputs: dict[str, bytes] = {}
         """Of the pages without a known key, by site path, until these are drawn."""
         keys = PageKeys(store, self._around())
-        self._pages = self._made(page_list(library), keys)
+        self._last_good = last_good or {}
+        self._pages = self._made(page_list(library) if entries is None else entries, keys)
         self._inputs.clear()
-        keys.save()
+        if entries is None:
+            keys.save()
 
     @property
     def facts(self) -> PageFacts:
@@ -140,6 +153,11 @@ class Pages:
         """The site paths of all pages."""
         return tuple(page.wanted.path for page in self._pages)
 
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of all pages, by site path."""
+        return {page.wanted.path: page.wanted.key for page in self._pages}
+
     def key(self, path: str) -> str:
         """The key of a page."""
         return self._at(path).key
@@ -173,27 +191,24 @@ class Pages:
         return key_of(course, results)
 
     def _wanted(self, page: PageEntry, keys: PageKeys) -> _Wanted:
-        document = page.document(self._library)
-        path = None if document is None else document.source.path
-        task = "" if path is None else self._documents.task(path).key
-        key = keys.get(page.path, task)
+        task = text_of(page, self._library)
+        if page.path in self._last_good:
+            return _Wanted(page, self._last_good[page.path], task)
+        text = "" if task is None else task.key
+        key = keys.get(page.path, text)
         if key is None:
-            inputs = page.inputs(self._library)
-            assert inputs.document == path
-            data = encode(inputs)
-            key = page_key(self._library.course, self._documents, path, data)
-            keys.add(page.path, task, key)
+            data = encode(page.inputs(self._library))
+            key = page_key(self._library.course, task, data)
+            keys.add(page.path, text, key)
             self._inputs[page.path] = data
-        return _Wanted(page, key, path)
+        return _Wanted(page, key, task)
 
     def _request(self, wanted: _Wanted) -> Draw:
         course = self._library.course
-        path = wanted.document
-        task = self._documents.task(path) if path is not None else None
         inputs = self._inputs.pop(wanted.path, None)
         if inputs is None:
             inputs = encode(wanted.page.inputs(self._library))
-        return Draw(inputs, task, course.language, course.base_url, wanted.key)
+        return Draw(inputs, wanted.task, course.language, course.base_url, wanted.key)
 
     def _frame(self, names: Names) -> str:
         """The key of all that a frame shows besides its page."""
@@ -224,8 +239,10 @@ class Pages:
         def missing() -> Iterator[Later]:  # inputs are made while pages are drawn
             for entry in entries:
                 page = self._wanted(entry, keys)
-                pages.append(page)
                 record = self._known(page.key)
+                if record is None and page.path in self._last_good:
+                    continue  # what it was is gone
+                pages.append(page)
                 if record is None:
                     new.append(page)
                     yield self._later(page)
@@ -242,7 +259,8 @@ class Pages:
         return [self._noted(page, records[page.path]) for page in pages]
 
     def _later(self, page: _Wanted) -> Later:
-        return Later(page.document, functools.partial(self._request, page))
+        path = None if page.task is None else page.task.source.path
+        return Later(path, functools.partial(self._request, page))
 
     def _noted(self, page: _Wanted, record: PageRecord) -> _Page:
         """A page, now that it is known what it says."""
@@ -269,12 +287,48 @@ class Pages:
         return before.encode() + body + after.encode()
 
 
-def page_key(course: Course, documents: Documents, document: str | None, inputs: bytes) -> str:
-    """A hash of all that a page depends on: its document's path and its inputs' bytes."""
-    return text_page_key(course, documents.task(document) if document is not None else None, inputs)
+class DemandedPage(Struct, frozen=True):
+    """A page without its frame."""
+
+    key: str
+    record: PageRecord
+    body: str
 
 
-def text_page_key(course: Course, text: Task | None, inputs: bytes) -> str:
-    """The same, by the text of its document."""
+def demanded_page(
+    entry: PageEntry,
+    library: Library,
+    documents: Documents,
+    store: Memo,
+    known: DemandedPage | None = None,
+) -> DemandedPage:
+    """One page: as it is known, as it was drawn before, or drawn now and not kept."""
+    course, task = library.course, text_of(entry, library)
+    inputs = encode(entry.inputs(library))
+    key = page_key(course, task, inputs)
+    if known is not None and known.key == key:
+        return known
+    kept = KeptPage.read(store.get(PAGES, key, local=True))
+    record = None if kept is None else kept.record
+    if kept is not None and record is not None:
+        return DemandedPage(key, record, kept.body.decode())
+    request = Draw(inputs, task, course.language, course.base_url, key)
+    record, text = documents.page(request)
+    return DemandedPage(key, record, text)
+
+
+def text_of(page: PageEntry, library: Library) -> Task | None:
+    """The text of the document that a page shows, if it shows one."""
+    document = page.document(library)
+    if document is None:
+        return None
+    callouts = frozenset(kind.name for kind in library.course.callouts)
+    lesson = library.lessons.get(page.id)
+    is_lesson = lesson is not None and lesson.document is document
+    return Task.of(document.source, callouts, is_lesson)
+
+
+def page_key(course: Course, text: Task | None, inputs: bytes) -> str:
+    """A hash of all that a page depends on: its document's text and its inputs' bytes."""
     key = text.key if text is not None else ""
     return step_key("page", course.language, course.base_url, inputs, key)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self, assert_never
 
@@ -51,7 +52,7 @@ from coursebuild.pipeline.tasks import (
 )
 from coursebuild.render.assets import strings_for
 from coursebuild.render.lookup.lexicon import lexicon, misdeclared
-from coursebuild.render.record import record
+from coursebuild.render.record import PageRecord, record
 from coursebuild.render.templates import templates_of
 from coursebuild.render.tools import Tools, mark_now
 from coursebuild.render.zips import imports
@@ -114,11 +115,14 @@ def prepare_to_read(sample: Task) -> None:
 class Reader:
     """Reads and draws; a context manager, since formulas are typeset by an engine."""
 
-    def __init__(self, store: Memo) -> None:
+    def __init__(self, store: Memo, *, warm: bool = False) -> None:
+        """`warm`: formulas are typeset again after pages were drawn."""
         self._store = store
+        self._warm = warm
+        self._lock = threading.RLock()
         self._engine: MathEngine | None = None
-        self._waiting: dict[str, _Whole] = {}
-        """Documents that were read and not drawn yet, by the key of their text."""
+        self._waiting: dict[str, tuple[Task, _Whole]] = {}
+        """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
         self._read_texts = 0
         self._tools: dict[str, Tools] = {}
@@ -136,18 +140,22 @@ class Reader:
             self._engine = None
 
     def answer(self, request: Request) -> Answer:
-        """Do what is asked."""
+        """Do what is asked; one thing at a time, whichever thread asks."""
+        if isinstance(request, Later):
+            return self.answer(request.make())
+        with self._lock:
+            return self._answer(request)
+
+    def _answer(self, request: Task | Draw | Ask) -> Answer:
+        if not isinstance(request, Task) and not self._warm:
+            self._rest()
         match request:
             case Task():
                 return self._read(request)
             case Draw():
-                self._rest()
                 return self._draw(request)
             case Ask():
-                self._rest()
                 return self._ask(request.page)
-            case Later():
-                return self.answer(request.make())
             case _:
                 assert_never(request)
 
@@ -177,10 +185,7 @@ class Reader:
         data = encode(summary)
         if summary.lasting:  # that a formula took too long may not happen again
             self._store.put(SUMMARIES, task.key, data, local=True)
-        size = len(task.source.text)
-        if size <= self._room:
-            self._waiting[task.key] = whole
-            self._room -= size
+        self._keep(task, whole)
         self._read_texts += 1
         if self._read_texts % _RENEW == 0:
             self._rest()
@@ -188,12 +193,20 @@ class Reader:
             gc.collect()
         return data
 
+    def _keep(self, task: Task, whole: _Whole) -> None:
+        """Keep a document until it is drawn, as far as there is room."""
+        size = len(task.source.text)
+        if size <= self._room:
+            self._waiting[task.source.path] = task, whole
+            self._room -= size
+
     def _whole(self, task: Task) -> _Whole:
         """A document with its formulas."""
-        known = self._waiting.pop(task.key, None)
+        known = self._waiting.pop(task.source.path, None)
         if known is not None:
-            self._room += len(task.source.text)
-            return known
+            self._room += len(known[0].source.text)
+            if known[0].key == task.key:
+                return known[1]
         from coursebuild.syntax.document import parse_document
 
         parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
@@ -226,6 +239,22 @@ class Reader:
 
     def draw(self, request: Draw) -> Drawn:
         """A page, its body, and what it is found by."""
+        with self._lock:
+            return self._drawn(request)
+
+    def page(self, request: Draw) -> tuple[PageRecord, str]:
+        """A page and its body, of which neither the search nor other files are to know yet."""
+        from coursebuild.render.draw import draw
+
+        with self._lock:
+            document, tools = None, self._tools_for(request.language)
+            if request.task is not None:
+                whole = self._whole(request.task)
+                self._keep(request.task, whole)
+                document, tools = whole.document, replace(tools, formulas=whole.formulas)
+            return record(draw(request.inputs, document, tools), request.base_url)
+
+    def _drawn(self, request: Draw) -> Drawn:
         from coursebuild.render.draw import draw_whole
         from coursebuild.render.exports.files import page_byproducts
         from coursebuild.render.search.page import searched
@@ -245,7 +274,7 @@ class Reader:
         return Drawn(found, body, by, made)
 
     def _draw(self, request: Draw) -> bytes:
-        drawn = self.draw(request)
+        drawn = self._drawn(request)
         page = KeptPage.of(drawn.record, drawn.body, drawn.searched)
         self._store.put(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
         # At last, since a page that is there is not drawn again.

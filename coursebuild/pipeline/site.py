@@ -12,11 +12,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import msgspec
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
@@ -40,11 +40,15 @@ from coursebuild.render.compressed import COPIES, compressed_files, kept_copy
 from coursebuild.render.frame import Names
 from coursebuild.render.library import Library
 from coursebuild.render.offline import file_list, offline_files
+from coursebuild.render.page_list import PageEntry
 from coursebuild.render.search.files import SearchFiles
 from coursebuild.render.search.page_inputs import search_words
 from coursebuild.render.shared import PageFacts, common_characters
 from coursebuild.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.source import Excerpt, Source, key_of, text_digest
+
+if TYPE_CHECKING:
+    from coursebuild.render.fonts import FontJob
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
@@ -63,40 +67,65 @@ class Site(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
     drawn: tuple[str, ...]
     """The pages that were drawn just now, and not before."""
+    names: Names | None = None
+    """Of what all pages share."""
+    keys: Mapping[str, str] = field(default_factory=dict)
+    """The keys of pages, by site path."""
 
 
 def site_files(
     course: Course, results: Results, documents: Documents, options: Options, reports: Reports
 ) -> Site:
     """The site of a course whose documents are summaries; `reports` are those that it shows."""
-    return _Site(course, results, documents, options, reports).made()
+    assets = Assets(template_texts(), Bundle(), prepared_folder())
+    library = Library.of(course, results, assets, reports)
+    return SiteMaker(library, assets, documents, options).made()
 
 
-class _Site:
+_ANYTHING = PageFacts(
+    frozenset(map(chr, range(0x20, 0x3000))),
+    frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
+    frozenset(),
+)
+"""What pages may need that nobody has looked at."""
+
+
+def _whole(job: FontJob) -> bytes:
+    return job.data
+
+
+class SiteMaker:
+    """Puts the files of a site together."""
+
     def __init__(
-        self,
-        course: Course,
-        results: Results,
-        documents: Documents,
-        options: Options,
-        reports: Reports,
+        self, library: Library, assets: Assets, documents: Documents, options: Options
     ) -> None:
-        self.course = course
+        self.library = library
+        self.course = library.course
+        self.assets = assets
         self.options = options
         self.store = options.store
         self.documents = documents
-        self.assets = Assets(template_texts(), Bundle(), prepared_folder())
-        self.library = Library.of(course, results, self.assets, reports)
         self._packed: dict[str, tuple[str, Callable[[], zips.Archive | None]]] = {}
         """The archives, with their keys."""
         self._imports: Callable[[str], frozenset[str]] = zips.imports
         self._files: dict[str, tuple[str, Callable[[], bytes]]] = {}
         """Files of the course, with their keys."""
 
-    def made(self) -> Site:
-        pages = Pages(self.library, self.documents, self.store)
+    def made(
+        self,
+        entries: Iterable[PageEntry] | None = None,
+        last_good: Mapping[str, str] | None = None,
+        *,
+        whole_fonts: bool = False,
+    ) -> Site:
+        """The site, or some pages of it with all other files: these are not checked for links.
+
+        For the arguments see `Pages`. `whole_fonts` serve pages that are drawn later.
+        """
+        pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.rest()
-        names, shared = self._shared(pages.facts)
+        names, shared = self._shared(None if whole_fonts else pages.facts)
         files = [*self._labs(), *self._downloads()]
         files += offline_files(self.course, self.assets)
         files += self._search(pages)
@@ -108,19 +137,26 @@ class _Site:
         files += self._exports(pages, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
-        if not pages.are_sound({file.path for file in files}):
+        if entries is None and not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
         listed = file_list(names, step_key("list of files", names))
-        return Site(everything, listed, found, pages.drawn)
+        return Site(everything, listed, found, pages.drawn, names, pages.keys)
 
     # --- what all pages share
 
-    def _shared(self, facts: PageFacts) -> tuple[Names, list[SiteFile]]:
-        """The shared files, made only for characters and styles for which they were not made."""
-        facts = replace(facts, text=facts.text | common_characters(self.library))
-        key = step_key("shared files", facts)
-        data = _Data(self.store, key, functools.partial(self._make_shared, facts))
+    def _shared(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
+        """The shared files, made only for characters and styles for which they were not made.
+
+        With whole fonts where there are no facts.
+        """
+        if facts is None:
+            facts, cut = _ANYTHING, _whole
+        else:
+            facts = replace(facts, text=facts.text | common_characters(self.library))
+            cut = functools.partial(kept_font, self.store)
+        key = step_key("shared files", facts, cut is _whole)
+        data = _Data(self.store, key, functools.partial(self._make_shared, facts, cut))
         names, paths = data.listing()
         files = [CachedFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
         # Those of the style sheet, which is another in every course, are made where files are made
@@ -131,10 +167,12 @@ class _Site:
             files.append(CachedFile(path, key_of(data.key, path), make))
         return names, [*files]
 
-    def _make_shared(self, facts: PageFacts) -> tuple[Names, dict[str, bytes]]:
+    def _make_shared(
+        self, facts: PageFacts, cut: Callable[[FontJob], bytes]
+    ) -> tuple[Names, dict[str, bytes]]:
         from coursebuild.render.shared import shared_files
 
-        made, names = shared_files(self.assets, functools.partial(kept_font, self.store), facts)
+        made, names = shared_files(self.assets, cut, facts)
         copies = self._copies(file for file in made if file.path != names.style)
         return names, {file.path: file.data for file in (*made, *copies)}
 

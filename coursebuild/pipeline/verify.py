@@ -41,6 +41,7 @@ from coursebuild.results import (
     ScriptRun,
     Verdict,
 )
+from coursebuild.scripts.binding_memory import BindingMemory
 from coursebuild.scripts.bindings import document_bindings
 from coursebuild.scripts.compare import verify as compare_all
 from coursebuild.scripts.dependencies import Inputs
@@ -72,11 +73,15 @@ def verify(
     static: bool = False,
     shard: Shard | None = None,
     run_all: RunAll | None = None,
+    held: BindingMemory | None = None,
+    known: Mapping[str, ScriptRun] | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`.
+    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `held`:
+    bound numbers that held before; what the store has, where nothing is said. `known`: what scripts
+    do, by path, that need not be looked at.
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
@@ -101,6 +106,7 @@ def verify(
         memory=memory,
         run_all=run_all,
         digests=extracted.digests,
+        known=known,
     )
     labs: tuple[LabResult, ...] = ()
     lab_findings: tuple[Diagnostic, ...] = ()
@@ -119,9 +125,11 @@ def verify(
         runs = scripts()
     verdicts = compare_all(course, runs)
     found = [*extracted.diagnostics, *compiled, *lab_findings]
-    held = KeptBindings(options.store)
-    found += script_findings(course, chosen, runs, verdicts, held, extracted.all)
-    held.save()
+    kept = KeptBindings(options.store) if held is None else None
+    bindings = held if kept is None else kept
+    found += script_findings(course, chosen, runs, verdicts, bindings, extracted.all)
+    if kept is not None:
+        kept.save()
     if memory.differing:
         from coursebuild.scripts.repeat import repeat_findings
 
@@ -251,6 +259,7 @@ def run(
     run_all: RunAll | None = None,
     perturbation: int = 0,
     digests: Mapping[str, str] | None = None,
+    known: Mapping[str, ScriptRun] | None = None,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
@@ -258,17 +267,19 @@ def run(
     options where everything is to run. `run_all` is what runs them, where it
     is not `run_scripts`.
     `perturbation`: with initial states moved, in the direction that has this number. `digests`:
-    of files, by path, as far as they are known.
+    of files, by path, as far as they are known. `known`: results, by path, that hold.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
     todo = jobs(chosen, perturbation)
+    done = dict(known or {})
     inputs = {
         job.path: _inputs(memory, job, extraction, digests or {})
         for job, extraction in zip(todo, chosen, strict=True)
-        if not job.norun
+        if not job.norun and job.path not in done
     }
-    done = memory.recall(tuple(inputs.values()))
+    if inputs:
+        done |= memory.recall(tuple(inputs.values()))
     left = [job for job in todo if job.path not in done]
     for finished in _run(left, inputs, options, progress, stage, memory, run_all):
         done[finished.path] = finished

@@ -99,50 +99,23 @@ class Library(Struct, frozen=True):
         results: Results,
         assets: Assets,
         reports: Reports | None = None,
-    ) -> Library:
-        """Look everything over once."""
-        formulas = dict(results.formulas)
-
-        def said(document: Document) -> Mentions:
-            return mentions(document, course, lexicon_of(document, formulas))
-
-        return cls.made(
-            course,
-            results,
-            assets,
-            scripts_of=document_scripts,
-            models_of=named_models,
-            mentions_of=said,
-            labs=lab_files(results.labs, assets),
-            formulas=formulas,
-            verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
-            reports=reports,
-        )
-
-    @classmethod
-    def made(
-        cls,
-        course: Course,
-        results: Results,
-        assets: Assets,
         *,
-        scripts_of: Callable[[Document], tuple[Script, ...]],
-        models_of: Callable[[Document], NamedModels],
-        mentions_of: Callable[[Document], Mentions],
-        labs: PublishedLabs,
-        formulas: Mapping[Formula, str | MathError],
-        verdicts: Mapping[tuple[str, int], Verdict],
-        asked_of: Callable[[Document], str] = asked_in,
-        reports: Reports | None = None,
+        labs: PublishedLabs | None = None,
+        models_of: Callable[[Document], NamedModels] | None = None,
     ) -> Library:
-        """The same from parts that whoever calls remembers; they are not copied."""
+        """Look everything over once.
+
+        `labs` are the files of labs, where these are known. `models_of` is `named_models`, or what
+        remembers its results.
+        """
+        formulas = dict(results.formulas)
         questions: dict[str, str] = {}
 
         def said(document: Document) -> Mentions:
-            text = asked_of(document)  # while its blocks are at hand
+            text = asked_in(document)  # while its blocks are at hand
             if text:
                 questions[document.source.path] = text
-            return mentions_of(document)
+            return mentions(document, course, lexicon_of(document, formulas))
 
         references = references_of(course, said)
         return cls(
@@ -155,17 +128,17 @@ class Library(Struct, frozen=True):
             pages={page.id: page for page in course.pages},
             callouts={kind.name: kind for kind in course.callouts},
             models=dict(results.models),
-            scripts=course_scripts(course, scripts_of),
+            scripts=course_scripts(course),
             runs={run.path: run for run in results.runs},
             order=course.lessons,
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
-            uses=uses_of(course, models_of),
+            uses=uses_of(course, models_of or named_models),
             references=references,
             asked=questions,
-            labs=labs,
+            labs=lab_files(results.labs, assets) if labs is None else labs,
             _formulas=formulas,
-            verdicts=verdicts,
+            verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
             reports=reports or Reports(),
         )
 
@@ -229,7 +202,7 @@ def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -
 
 
 _MODEL_NAMED = pattern(
-    r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?P<file>[\w./-]+)\.xml\b"""
+    r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?<![\w./-])(?P<file>[\w./-]+)\.xml\b"""
     r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
 )
 
@@ -266,14 +239,12 @@ def named_models(document: Document) -> NamedModels:
     return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
 
 
-def course_scripts(
-    course: Course, scripts_of: Callable[[Document], tuple[Script, ...]] = document_scripts
-) -> dict[str, tuple[Script, Owner]]:
+def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
     """The scripts of a course by path, in order; of two with one path, the first."""
     found: dict[str, tuple[Script, Owner]] = {}
     for owner in owners(course):
         if owner.document is not None:
-            for script in scripts_of(owner.document):
+            for script in document_scripts(owner.document):
                 found.setdefault(script.path, (script, owner))
     return found
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -13,7 +12,9 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from coursebuild.effects.resources import bundled_files
-from coursebuild.effects.server import PreviewServer
+from coursebuild.pipeline.options import Options
+from coursebuild.preview.server import PreviewServer
+from coursebuild.preview.session import Session
 from coursebuild.render.assets import page_script
 from support.lab_course import PAGE
 from support.lab_page import comes, lab, until, watched
@@ -347,30 +348,12 @@ def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
         host.stop()
 
 
-class Previewed:
+class Previewed(Session):
     """What a preview serves: the files of a folder."""
 
-    version = 0
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.changed = threading.Condition()
-
     def find(self, path: str) -> bytes | None:
-        file = self.folder / path
+        file = self.root / path
         return file.read_bytes() if file.is_file() else None
-
-    def base(self) -> str:
-        return "/"
-
-    def expected(self, path: str) -> bool:
-        return False
-
-    def news(self, path: str) -> str:
-        return "{}"
-
-    def accept(self, path: str, id: str) -> str:
-        return "no"
 
 
 @pytest.mark.parametrize("script", ["preview.js", "worker.js"])
@@ -388,7 +371,8 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
         "preview.js": bundled["js/preview.js"] if script == "preview.js" else b"",
         "worker.js": page_script(bundled["js/preview-worker.js"]) if script == "worker.js" else b"",
     }
-    preview = PreviewServer(int(host.url.split(":")[2].strip("/")), Previewed(host.folder), own)
+    session = Previewed(Options(host.folder, 1, True))
+    preview = PreviewServer(int(host.url.split(":")[2].strip("/")), session, own)
     preview.start()
     try:
         page.goto(host.url + FIRST)

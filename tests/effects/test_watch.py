@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import watchfiles
 
-from coursebuild.effects.watch import Watcher
+from coursebuild.preview.watcher import Watcher
 from support.runners import wait_until
 
 pytestmark = pytest.mark.site

@@ -81,5 +81,5 @@ def test_a_preview_tells_it_too(make: Make, live: Callable[[Folder], Live]) -> N
         folder.write(folder.lesson(2), text)
         one.save(folder.lesson(2))
         assert one.wrong() == wrong
-        one.course.reread()
+        one.session.read()
         assert one.wrong() == wrong

@@ -55,12 +55,12 @@ def test_a_page_is_new_before_anything_else_is_done(
     folder = make(GOOD, GOOD.replace("hello.py", "other.py"))
     running = live(folder)
     page = "lessons/1.1-one.html"
-    assert b"Hello" in (running.course.find(page) or b"")
-    other = running.course.find("lessons/1.2-two.html")
+    assert b"Hello" in (running.find(page) or b"")
+    other = running.find("lessons/1.2-two.html")
     folder.replace(folder.lesson(), "## Hello", "## Good morning")
     assert running.save(folder.lesson())
-    assert b"Good morning" in (running.course.find(page) or b"")
-    assert running.course.find("lessons/1.2-two.html") == other
+    assert b"Good morning" in (running.find(page) or b"")
+    assert running.find("lessons/1.2-two.html") == other
 
 
 def test_lists_of_lessons_follow_their_questions(
@@ -79,17 +79,17 @@ def test_lists_of_lessons_follow_their_questions(
     def same() -> bool:
         built = builds(folder)
         assert built is not None
-        return [running.course.find(p) for p in lists] == [built.get(p) for p in lists]
+        return [running.find(p) for p in lists] == [built.get(p) for p in lists]
 
     for text in (one, f"{one}, {other}", other):
         folder.write(path, GOOD.replace("hello.py", "other.py") + "\n" + asking % text)
         assert running.save(path)
-        running.behind.once()
+        running.rebuild.once()
         assert same()
     folder.write(path, GOOD.replace("hello.py", "other.py"))
     assert running.save(path)
-    running.behind.once()
-    assert running.course.find("review/index.html") is None
+    running.rebuild.once()
+    assert running.find("review/index.html") is None
     assert same()
 
 
@@ -97,13 +97,11 @@ def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]
     folder = make(GOOD)
     running = live(folder)
     running.site()
-    version = running.course.version
+    version = running.session.version
     folder.write(folder.lesson(), folder.read(folder.lesson()))
-    plan = running.course.plan([folder.lesson()])
-    assert plan is not None and not plan.found
-    assert running.course.commit(plan)
-    assert running.course.reread() is False
-    assert running.course.version == version
+    assert running.session.edit([folder.lesson()]) is False
+    assert running.session.read() is False
+    assert running.session.version == version
 
 
 def test_rereading_finds_nothing_new_where_a_page_lies_outside_of_content(
@@ -116,22 +114,7 @@ def test_rereading_finds_nothing_new_where_a_page_lies_outside_of_content(
     running = live(folder)
     running.site()
     for _ in range(2):
-        assert running.course.reread() is False
-
-
-def test_a_plan_is_not_taken_over_when_something_else_came_first(
-    make: Make, live: Callable[[Folder], Live]
-) -> None:
-    folder = make(GOOD)
-    running = live(folder)
-    folder.replace(folder.lesson(), "## Hello", "## First")
-    first = running.course.plan([folder.lesson()])
-    folder.replace(folder.lesson(), "## First", "## Second")
-    second = running.course.plan([folder.lesson()])
-    assert first is not None and second is not None
-    assert running.course.commit(second)
-    assert not running.course.commit(first)
-    assert b"Second" in (running.course.find("lessons/1.1-one.html") or b"")
+        assert running.session.read() is False
 
 
 def test_the_last_good_page_stays_and_the_others_go_on(
@@ -147,21 +130,21 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         ("```quiz\n{\n```\n", "json-syntax"),
     ):
         good = folder.text(folder.lesson())
-        before = running.course.find(one)
+        before = running.find(one)
         folder.write(folder.lesson(), good.replace("## Hello", "## Never seen") + mistake)
         assert running.save(folder.lesson())
         assert rule in running.wrong()
-        assert running.course.is_kept(one)
-        assert running.course.find(one) == before
+        assert running.session.files.is_kept(one)
+        assert running.find(one) == before
         folder.write(folder.lesson(2), f"## Two after {rule}\n")
         assert running.save(folder.lesson(2))
-        assert f"Two after {rule}".encode() in (running.course.find(two) or b"")
+        assert f"Two after {rule}".encode() in (running.find(two) or b"")
         running.site()
-        assert running.course.find(one) == before
+        assert running.find(one) == before
         folder.write(folder.lesson(), good.replace("## Hello", f"## Hello {rule}"))
         assert running.save(folder.lesson())
         assert running.wrong() == []
-        assert f"Hello {rule}".encode() in (running.course.find(one) or b"")
+        assert f"Hello {rule}".encode() in (running.find(one) or b"")
         folder.write(folder.lesson(), good)
         running.save(folder.lesson())
 
@@ -172,11 +155,11 @@ def test_page_that_was_never_good_appears_when_mended(
     folder = make(GOOD + "[gone](lesson:9.9)\n")
     running = live(folder)
     page = "lessons/1.1-one.html"
-    assert running.course.find(page) is None
-    assert running.course.pages.has_page(page)
+    assert running.find(page) is None
+    assert running.session.files.has_page(page)
     folder.write(folder.lesson(), GOOD)
     running.save(folder.lesson())
-    assert b"Hello" in (running.course.find(page) or b"")
+    assert b"Hello" in (running.find(page) or b"")
 
 
 def test_a_broken_map_changes_nothing_that_is_shown(
@@ -189,7 +172,7 @@ def test_a_broken_map_changes_nothing_that_is_shown(
     folder.write("content/course.toml", b"[course\n")
     running.save("content/course.toml")
     assert running.wrong() == ["map-syntax"]
-    assert {path: running.course.find(path) for path in before} == before
+    assert {path: running.find(path) for path in before} == before
     folder.write("content/course.toml", good)
     running.save("content/course.toml")
     assert running.wrong() == []

@@ -150,7 +150,7 @@ def test_after_any_edits_it_is_what_a_clean_build_gives(
             for name, lesson in data.draw(edits, label="edits"):
                 running.save(*getattr(author, name)(lesson))
                 if data.draw(st.booleans(), label="all of it"):
-                    running.behind.once()
+                    running.rebuild.once()
             built = builds(folder)
             site = running.site()
             if built is None:

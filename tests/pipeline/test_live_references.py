@@ -25,15 +25,15 @@ def test_terms_symbols_links_and_numbers_follow_the_text(
     def same(fast: bool, *paths: str) -> dict[str, bytes]:
         """Save; the pages are those of a build, and the fast way was taken if it could be."""
         assert running.save(*paths) is fast
-        running.behind.once()
+        running.rebuild.once()
         built = builds(folder)
         assert built is not None
         pages = [path for path in built if path.startswith(("glossary/", "symbols/", "lessons/1."))]
         pages = [path for path in pages if path.endswith(".html")]
         for path in pages:
-            assert running.course.find(path) == built[path], path
+            assert running.find(path) == built[path], path
         for path in ("glossary/index.html", "symbols/index.html"):
-            assert running.course.pages.has_page(path) is (path in built)
+            assert running.session.files.has_page(path) is (path in built)
         return {path: built[path] for path in pages}
 
     folder.replace(ONE, "Text", "A [thing]{term} is $q$. Text")
@@ -61,12 +61,12 @@ def test_a_term_that_goes_makes_a_mistake_elsewhere_until_it_comes_back(
     assert running.wrong() == []
     folder.replace(ONE, "[thing]{term}", "thing")
     running.save(ONE)
-    running.course.reread()
+    running.session.read()
     assert running.wrong() == ["link-term"]
     folder.replace(TWO, "See [it](term:thing)", "A [Thing]{term} is")
     running.save(TWO)
     assert running.wrong() == []
     folder.replace(ONE, "thing", "[thing]{term}")
     running.save(ONE)
-    running.course.reread()
+    running.session.read()
     assert running.wrong() == ["term-repeated"]

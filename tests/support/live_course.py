@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.preview.behind import Behind
-from coursebuild.pipeline.preview.live import LiveCourse
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.serve import live_course
+from coursebuild.preview.rebuild import BackgroundRebuild
+from coursebuild.preview.session import Session
 from support.scratch_course import Folder
 
 COPIES = (".br", ".gz")
@@ -24,36 +23,37 @@ TRIALS = ("labs", "mjb", "pictures")
 
 
 class Live:
-    """A live course without the threads of a preview."""
+    """A preview without its server and threads."""
 
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
-        options = Options(folder.root.resolve(), 2, True)
-        self.course: LiveCourse = live_course(options)
-        self.behind = Behind(self.course, options, Progress(quiet=True))
-        self.course.reread()
+        options, quiet = Options(folder.root.resolve(), 2, True), Progress(quiet=True)
+        self.session = Session(options)
+        self.rebuild = BackgroundRebuild(self.session, options, quiet)
+        self.session.start(options, quiet)
 
     def save(self, *paths: str) -> bool:
-        """What `follow` does with a save; whether the fast way was taken."""
-        plan = self.course.plan(paths)
-        if plan is not None and self.course.commit(plan):
+        """Take a save; whether the fast way was taken."""
+        if self.session.edit(paths) is not None:
             return True
-        self.behind.notice()
-        self.course.reread()
+        self.session.take_others()
         return False
+
+    def find(self, path: str) -> bytes | None:
+        return self.session.find(path)
 
     def site(self) -> dict[str, bytes]:
         """Everything, once all is known."""
-        self.behind.once()
-        found = {path: self.course.find(path) for path in self.course.pages.paths()}
-        return {path: data for path, data in found.items() if data is not None}
+        self.rebuild.once()
+        found = {path: self.find(path) for path in self.session.files.paths}
+        return {p: d for p, d in found.items() if d is not None and _is_compared(p)}
 
     def close(self) -> None:
-        self.behind.close()
-        self.course.close()
+        self.rebuild.close()
+        self.session.close()
 
     def wrong(self) -> list[str]:
-        return sorted(d.rule for d in self.course.diagnostics() if d.severity.value == "error")
+        return sorted(d.rule for d in self.session.diagnostics() if d.severity.value == "error")
 
 
 @pytest.fixture
@@ -94,12 +94,16 @@ class Builds:
         if done.status != 0:
             return None
         site = fresh.tree("public")
-        return {p: d for p, d in site.items() if not p.endswith(COPIES) and p not in OURS}
+        return {path: data for path, data in site.items() if _is_compared(path)}
 
 
 @pytest.fixture
 def builds(tmp_path: Path, stores: Path) -> Builds:
     return Builds(tmp_path, stores)
+
+
+def _is_compared(path: str) -> bool:
+    return not path.endswith(COPIES) and path not in OURS
 
 
 def differences(a: dict[str, bytes], b: dict[str, bytes]) -> list[str]:

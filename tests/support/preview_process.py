@@ -13,15 +13,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from coursebuild.effects.server import PREFIX
+from coursebuild.preview.server import PREFIX
 from support.scratch_course import Folder, ended, wait_until_alone
 
 PATIENT = """
 import sys
 from coursebuild.cli import main
-from coursebuild.pipeline.preview import follow
-follow.QUIET_MANY = follow.QUIET_GONE = 3.0
-follow.LONGEST = 120.0
+from coursebuild.preview import saves
+saves.QUIET_MANY = saves.QUIET_GONE = 3.0
+saves.LONGEST = 120.0
 sys.exit(main(sys.argv[1:]))
 """
 """The command, which waits so long for the rest of a save that this comes in time on any machine.

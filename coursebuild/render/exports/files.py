@@ -106,14 +106,15 @@ class Exports:
         self._context = context
 
     def files(self) -> Iterator[SiteFile]:
-        """All of them."""
+        """All of them; the pages may be only some of the course."""
+        pages = frozenset(self._source.paths)
         for page in self._source.paths:
             path = urls.markdown_path(page)
             if path is not None and path not in self._context.taken:
                 yield CachedFile(path, self._source.key(page), partial(self._markdown, page))
         yield OutputFile(LLMS, llms(self._library))
         for lesson in self._library.order:
-            if lesson.document is not None:
+            if lesson.document is not None and urls.lesson_path(lesson) in pages:
                 yield self._notebook(lesson)
 
     def _markdown(self, page: str) -> bytes:

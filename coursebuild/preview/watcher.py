@@ -18,8 +18,10 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from coursebuild.effects.errors import EffectError, reason
-from coursebuild.effects.watch_paths import FOLDERS, LOOK, is_source
 
+FOLDERS = ("content", "features", "models", "mjcourse")
+LOOK = 0.200
+"""Seconds from one look for new and removed folders to the next."""
 _STEP = 2
 """Milliseconds from one look for events to the next: a save is told of within two of them."""
 
@@ -169,3 +171,12 @@ class Watcher:
             return is_source(Path(path).relative_to(self._root).as_posix())
         except ValueError:
             return False
+
+
+def is_source(path: str) -> bool:
+    """Whether a path, POSIX and relative to the course, is none of an editor's or of Python's."""
+    return bool(path) and not any(map(_is_dropping, path.split("/")))
+
+
+def _is_dropping(name: str) -> bool:
+    return name.startswith((".", "#")) or name.endswith("~") or name in ("4913", "__pycache__")

@@ -1,6 +1,6 @@
 """What an open page is told beside its text, and what its author may accept there.
 
-Entry points: `page_news(live, path)`, as JSON; `accept(live, path, id)`.
+Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
 
 1. Every mistake of the course, those of the page's own document first; each says whether the page
    shows it in its place.
@@ -33,7 +33,7 @@ from coursebuild.model import (
     document_blocks,
 )
 from coursebuild.pipeline.judge import judge
-from coursebuild.pipeline.preview.live import LiveCourse
+from coursebuild.preview.session import Session
 from coursebuild.report import Report
 from coursebuild.results import Outcome, ScriptRun, Verdict
 from coursebuild.scripts.bindings import document_bindings
@@ -62,31 +62,31 @@ class Offer(Struct, frozen=True):
         return digest.hexdigest()[:24]
 
 
-def report_now(live: LiveCourse) -> Report:
+def report_now(session: Session) -> Report:
     """Everything that is wrong, as a report."""
-    course = live.course
+    course = session.course
     written = [] if course is None else [x for x in course.lessons if x.document is not None]
-    return judge(course, live.diagnostics(), (), 0.0, lessons=len(written))
+    return judge(course, session.diagnostics(), (), 0.0, lessons=len(written))
 
 
-def page_news(live: LiveCourse, path: str) -> str:
+def page_news(session: Session, path: str) -> str:
     """What the page at a site path is told."""
-    with live.changed:
-        document = live.pages.document(path)
-        report = report_now(live)
+    with session.changed:
+        document = session.files.document(path)
+        report = report_now(session)
         news: dict[str, Any] = {
             "problems": [_problem(d, document) for d in _sorted(report.diagnostics, document)],
             "more": max(0, len(report.diagnostics) - _MOST),
-            "kept": live.is_kept(path),
-            "busy": live.busy,
-            "trouble": live.trouble,
+            "kept": session.files.is_kept(path),
+            "busy": session.busy,
+            "trouble": session.trouble,
             "scripts": [],
             "outputs": [],
             "numbers": [],
         }
-        if document is not None and live.course is not None:
-            news["scripts"] = list(_scripts(live, document))
-            news["outputs"] = list(_outputs(live, live.course, document))
+        if document is not None and session.course is not None:
+            news["scripts"] = list(_scripts(session, document))
+            news["outputs"] = list(_outputs(session, session.course, document))
             news["numbers"] = list(_numbers(document, report.diagnostics))
         return json.dumps(news, ensure_ascii=False, separators=(",", ":"))
 
@@ -130,10 +130,10 @@ def _note(message: str, span: Any) -> str:
 # --- scripts and outputs
 
 
-def _scripts(live: LiveCourse, document: Document) -> Iterator[dict[str, str]]:
-    assert live.library is not None
+def _scripts(session: Session, document: Document) -> Iterator[dict[str, str]]:
+    assert session.library is not None
     for script in (b for b in document_blocks(document) if isinstance(b, Script)):
-        run = live.library.runs.get(script.path)
+        run = session.library.runs.get(script.path)
         yield {"path": script.path, "state": _state(run)}
 
 
@@ -141,17 +141,17 @@ def _state(run: ScriptRun | None) -> str:
     return "running" if run is None else run.outcome.value
 
 
-def _outputs(live: LiveCourse, course: Course, document: Document) -> Iterator[dict[str, Any]]:
+def _outputs(session: Session, course: Course, document: Document) -> Iterator[dict[str, Any]]:
     """The recorded outputs, each with its number among those of its script on the page."""
-    assert live.library is not None
+    assert session.library is not None
     numbers: Counter[str] = Counter()
     for recording in (b for b in document_blocks(document) if isinstance(b, Recording)):
         if recording.script is None:
             continue
         nth = numbers[recording.script]
         numbers[recording.script] += 1
-        verdict = live.library.verdict(recording)
-        run = live.library.runs.get(recording.script)
+        verdict = session.library.verdict(recording)
+        run = session.library.runs.get(recording.script)
         told: dict[str, Any] = {"script": recording.script, "nth": nth, "state": "unchecked"}
         if run is None:
             told["state"] = "running"
@@ -160,13 +160,13 @@ def _outputs(live: LiveCourse, course: Course, document: Document) -> Iterator[d
         elif verdict is not None:
             told["state"] = verdict.status
             if verdict.status == "drift":
-                told |= _drift(live, course, verdict, run)
+                told |= _drift(session, course, verdict, run)
         yield told
 
 
-def _drift(live: LiveCourse, course: Course, verdict: Verdict, run: ScriptRun) -> dict[str, Any]:
+def _drift(session: Session, course: Course, verdict: Verdict, run: ScriptRun) -> dict[str, Any]:
     rows = diff_rows(verdict.recording, verdict, course.filters, run.stdout)
-    offered = _update(live, course, verdict, run)
+    offered = _update(session, course, verdict, run)
     told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
     if isinstance(offered, Edit):
         told["offer"] = Offer(offered).id
@@ -180,14 +180,14 @@ def _row(row: DiffRow) -> list[Any]:
 
 
 def _update(
-    live: LiveCourse, course: Course, verdict: Verdict, run: ScriptRun
+    session: Session, course: Course, verdict: Verdict, run: ScriptRun
 ) -> Edit | Diagnostic | None:
     """What `coursebuild update` would write; nothing as long as the script was run only once."""
-    ran = live.parts.runs.get(run.path)
-    if ran is None or ran.run is not run or ran.again is None:
+    again = session.printed_again(run.path)
+    if again is None:
         return None
     filters = course.filters
-    return updated_body(verdict.recording, verdict.comparison, filters, run.stdout, ran.again)
+    return updated_body(verdict.recording, verdict.comparison, filters, run.stdout, again)
 
 
 # --- bound numbers
@@ -224,34 +224,34 @@ def _number(binding: NumberBinding, nth: int, told: Diagnostic) -> dict[str, Any
 # --- accepting
 
 
-def accept(live: LiveCourse, path: str, id: str) -> str:
+def accept(session: Session, path: str, id: str) -> str:
     """Write what is offered on a page under this id; gives why not, or nothing.
 
     The lock is held, so that two browsers cannot accept the same at once.
     """
-    with live.changed:
-        edit = next((offer.edit for offer in _offers(live, path) if offer.id == id), None)
+    with session.changed:
+        edit = next((offer.edit for offer in _offers(session, path) if offer.id == id), None)
         if edit is None:
             return "this is no longer what the page offers; look at it again"
         source = edit.span.source
         try:
             new = apply_edits(source.text, [edit]).encode()
-            write_atomic(live.root, source.path, new, expected=source.text.encode())
+            write_atomic(session.root, source.path, new, expected=source.text.encode())
         except EffectError as error:
             return error.message
         return ""
 
 
-def _offers(live: LiveCourse, path: str) -> Iterator[Offer]:
-    document, course, library = live.pages.document(path), live.course, live.library
+def _offers(session: Session, path: str) -> Iterator[Offer]:
+    document, course, library = session.files.document(path), session.course, session.library
     if document is None or course is None or library is None:
         return
     for recording in (b for b in document_blocks(document) if isinstance(b, Recording)):
         verdict, run = library.verdict(recording), library.runs.get(recording.script or "")
         if verdict is not None and verdict.status == "drift" and run is not None:
-            edit = _update(live, course, verdict, run)
+            edit = _update(session, course, verdict, run)
             if isinstance(edit, Edit):
                 yield Offer(edit)
-    for diagnostic in live.diagnostics():
+    for diagnostic in session.diagnostics():
         if diagnostic.rule == "binding-mismatch" and diagnostic.span.path == document.source.path:
             yield from (Offer(edit) for edit in diagnostic.edits)

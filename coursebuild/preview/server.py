@@ -4,7 +4,7 @@ Entry point: `PreviewServer`.
 
 1. It listens on the loopback interface only and answers only requests that name it as their host,
    so that a page elsewhere cannot read the preview through a name that it points here.
-2. Files come from a `PreviewSite`, which decides what there is; nothing is read from disk here.
+2. Files come from a `Session`, which decides what there is; nothing is read from disk here.
 3. Pages get one script and one style sheet more. The script listens to `/.coursebuild/events`:
    `page` says which state of the page there is now, `news` what is to be said beside its text.
    A listener is told how things stand when it begins, so that nothing is lost by one that was away.
@@ -26,8 +26,11 @@ from collections.abc import Mapping
 from html import escape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, Protocol
+from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
+
+from coursebuild.preview.messages import accept, page_news
+from coursebuild.preview.session import Session
 
 PREFIX = "/.coursebuild/"
 _TYPES = {
@@ -63,38 +66,12 @@ _LARGEST = 1 << 16
 _NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
 
 
-class PreviewSite(Protocol):
-    """What is served."""
-
-    changed: threading.Condition
-    """Notified when `version` grows."""
-
-    @property
-    def version(self) -> int:
-        """Grows with everything that a page may be told."""
-
-    def find(self, path: str) -> bytes | None:
-        """A file, by its path in the site."""
-
-    def base(self) -> str:
-        """The path under which the published site will be, with a slash at both ends."""
-
-    def expected(self, path: str) -> bool:
-        """Whether there is a page that cannot be shown yet."""
-
-    def news(self, path: str) -> str:
-        """What a page is told, as JSON in one line."""
-
-    def accept(self, path: str, id: str) -> str:
-        """Write what a page offers under an id; gives why not, or nothing."""
-
-
 class PreviewServer:
     """Serves a site on `127.0.0.1:port`; port 0 takes any free one."""
 
-    def __init__(self, port: int, site: PreviewSite, own: Mapping[str, bytes]) -> None:
+    def __init__(self, port: int, session: Session, own: Mapping[str, bytes]) -> None:
         """`own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`."""
-        self.site = site
+        self.session = session
         self.own = own
         self.tool = digest(b"".join(own.values()))
         self.token = secrets.token_urlsafe(18)
@@ -123,9 +100,10 @@ class PreviewServer:
     def stop(self) -> None:
         """End all event streams and stop answering."""
         self.ended = True
-        if self.site.changed.acquire(timeout=1.0):  # whoever holds it longer is no reason to wait
-            self.site.changed.notify_all()
-            self.site.changed.release()
+        changed = self.session.changed
+        if changed.acquire(timeout=1.0):  # whoever holds it longer is no reason to wait
+            changed.notify_all()
+            changed.release()
         if self._thread.ident is not None:  # otherwise nobody would hear of it
             self._server.shutdown()
         self._server.server_close()
@@ -144,10 +122,10 @@ class PreviewServer:
             return HTTPStatus.OK, _type_of(name), data
         if data is not None:
             return HTTPStatus.OK, _type_of(name), _tagged(data, name, digest(data))
-        if self.site.expected(name):
+        if self.session.files.has_page(name):
             text = b"This page cannot be shown before its mistakes are mended."
             return HTTPStatus.OK, _TYPES[".html"], _tagged(_NOTHING % text, name, "")
-        missing = self.site.find("404.html")
+        missing = self.session.find("404.html")
         if missing is None:
             missing = _NOTHING % b"Nothing is built yet."
         return HTTPStatus.NOT_FOUND, _TYPES[".html"], _tagged(missing, name, "")
@@ -158,7 +136,7 @@ class PreviewServer:
         The page for missing addresses names everything from the root of the host, where the
         published site may lie in a folder.
         """
-        base = self.site.base()
+        base = self.session.base()
         names = [path.lstrip("/")]
         if path.startswith(base):
             names.append(path.removeprefix(base))
@@ -167,7 +145,7 @@ class PreviewServer:
             for name in names
         ]
         for name in found:
-            data = self.site.find(name)
+            data = self.session.find(name)
             if data is not None:
                 return name, data
         return found[0], None
@@ -243,7 +221,7 @@ class _Handler(BaseHTTPRequestHandler):
             if wanted is None:
                 self._say(HTTPStatus.BAD_REQUEST, "the request cannot be read")
             else:
-                why = preview.site.accept(*wanted)
+                why = accept(preview.session, *wanted)
                 self._say(HTTPStatus.CONFLICT if why else HTTPStatus.OK, why)
 
     def log_message(self, format: str, *args: Any) -> None:
@@ -304,24 +282,24 @@ class _Handler(BaseHTTPRequestHandler):
             return
 
     def _follow(self, page: str) -> None:
-        preview, site = self.server.preview, self.server.preview.site
+        preview, session = self.server.preview, self.server.preview.session
         self._tell("hello", json.dumps({"tool": preview.tool, "token": preview.token}))
         seen, state, news = -1, None, None
 
         def stir() -> bool:
-            return preview.ended or site.version != seen
+            return preview.ended or session.version != seen
 
         while True:
-            with site.changed:
-                stirred = site.changed.wait_for(stir, _HEARTBEAT)
-                seen = site.version
+            with session.changed:
+                stirred = session.changed.wait_for(stir, _HEARTBEAT)
+                seen = session.version
             if preview.ended:
                 return
-            now = digest(site.find(page))
+            now = digest(session.find(page))
             if now != state:
                 state, news = now, None  # whoever takes the page is told again what belongs to it
                 self._tell("page", json.dumps(now))
-            latest = site.news(page)
+            latest = page_news(session, page)
             if latest != news:
                 news = latest
                 self._tell("news", latest)

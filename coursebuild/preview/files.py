@@ -1,0 +1,170 @@
+"""The files of the site of a course as it is now; pages are drawn when they are asked for.
+
+Entry point: `Files`.
+
+1. `make` puts all files together as a build does, of pages and of what they share. Most are made
+   when they are asked for.
+2. A page that shows something else since is drawn when it is asked for. One whose document has a
+   mistake stays as it was.
+
+Nothing here is locked, but for `make`: whoever calls sees to that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.effects.errors import EffectError
+from coursebuild.model import Document
+from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.pages import DemandedPage, demanded_page
+from coursebuild.pipeline.site import Site, SiteMaker
+from coursebuild.render.assets import Assets
+from coursebuild.render.frame import Frames
+from coursebuild.render.library import Library
+from coursebuild.render.page_list import PageEntry, page_list
+from coursebuild.results import OutputFile, SiteFile
+
+_DRAWN = 64
+"""Pages whose text is kept in memory."""
+_SITES = 3
+"""Sites whose shared files stay available: a browser may still ask for those of an older page."""
+
+
+class DrawnPage(Struct, frozen=True):
+    """The text of a page, and what it was made from."""
+
+    frames: Frames
+    """Others where the course or what pages share is another."""
+    page: DemandedPage
+    text: bytes
+
+
+class Files:
+    """See the module."""
+
+    def __init__(
+        self,
+        options: Options,
+        assets: Assets,
+        documents: Documents,
+        is_sound: Callable[[Document], bool],
+    ) -> None:
+        """`is_sound` says whether a document can be drawn."""
+        self._options = replace(options, jobs=1)  # no copies are made of a process with threads
+        self._assets = assets
+        self._documents = documents
+        self._is_sound = is_sound
+        self._library: Library | None = None
+        self._entries: dict[str, PageEntry] = {}
+        self._pages: dict[str, DrawnPage] = {}
+        self._last_good: dict[str, str] = {}
+        """Keys of pages as they are in the site that was made last, by site path."""
+        self._frames: Frames | None = None
+        self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
+
+    def show(self, library: Library) -> None:
+        """Draw pages of this course from now on."""
+        self._library = library
+        self._entries = {entry.path: entry for entry in page_list(library)}
+        self._pages = {path: one for path, one in self._pages.items() if path in self._entries}
+        self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
+        if not self._sites:  # whatever characters pages will have
+            self._serve(self._maker(library).made((), whole_fonts=True))
+        self._frame(library)
+
+    def make(
+        self, library: Library, broken: Collection[str], pause: Callable[[], None]
+    ) -> Callable[[], None]:
+        """All files of a site, and gives what serves them.
+
+        `broken` are paths of pages whose documents have mistakes. `pause` is called between pages.
+        """
+        last_good = {path: key for path, key in self._last_good.items() if path in broken}
+
+        def entries() -> Iterator[PageEntry]:
+            for entry in page_list(library):
+                if entry.path not in broken or entry.path in last_good:
+                    pause()
+                    yield entry
+
+        site = self._maker(library).made(entries(), last_good)
+        return lambda: self._serve(site)
+
+    def _maker(self, library: Library) -> SiteMaker:
+        return SiteMaker(library, self._assets, self._documents, self._options)
+
+    def _serve(self, site: Site) -> None:
+        files = {file.path: file for file in site.files}
+        self._sites = [*self._sites[1 - _SITES :], (site, files)]
+        self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
+        if self._library is not None:
+            self._frame(self._library)
+
+    def _frame(self, library: Library) -> None:
+        names = self._sites[-1][0].names
+        assert names is not None
+        self._frames = Frames(library, names)
+
+    # --- what may be asked
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of all files of the site that was made last."""
+        return tuple(self._sites[-1][1]) if self._sites else ()
+
+    def has_page(self, path: str) -> bool:
+        """Whether there is a page, or would be but for its mistakes."""
+        return path in self._entries
+
+    def is_kept(self, path: str) -> bool:
+        """Whether a page is older than its document, which has mistakes."""
+        document = self.document(path)
+        drawn = path in self._pages or path in self._last_good
+        return document is not None and drawn and not self._is_sound(document)
+
+    def document(self, path: str) -> Document | None:
+        """The document that a page shows, as it was last read."""
+        entry = self._entries.get(path)
+        return None if entry is None or self._library is None else entry.document(self._library)
+
+    def find(self, path: str) -> bytes | None:
+        """A file of the site, if there is one and it can be had."""
+        if path in self._entries:
+            return self._page(path)
+        for site, files in reversed(self._sites):
+            # A browser may ask for what an older page shares with others.
+            newest = site is self._sites[-1][0]
+            if path in files and (newest or path.startswith("assets/")):
+                return _data(files[path])
+        return None
+
+    def _page(self, path: str) -> bytes | None:
+        """A page as it is now, or as it was when it had no mistake."""
+        library, frames, known = self._library, self._frames, self._pages.pop(path, None)
+        assert library is not None and frames is not None
+        if known is None or known.frames is not frames:
+            document, page = self.document(path), None if known is None else known.page
+            if document is None or self._is_sound(document):
+                entry, store = self._entries[path], self._options.store
+                page = demanded_page(entry, library, self._documents, store, page)
+            elif page is None:
+                files = self._sites[-1][1]
+                return _data(files[path]) if path in files else None
+            before, after = frames.around(page.record.draft, page.record.parts)
+            known = DrawnPage(frames, page, f"{before}{page.body}{after}".encode())
+        self._pages[path] = known  # as the one that was asked for last
+        if len(self._pages) > _DRAWN:
+            del self._pages[next(iter(self._pages))]
+        return known.text
+
+
+def _data(file: SiteFile) -> bytes | None:
+    try:
+        return file.data if isinstance(file, OutputFile) else file.make()
+    except EffectError:
+        return None  # gone since the course was read

@@ -1,0 +1,214 @@
+"""What follows a save, in its own time: what a build does, as far as a page need not wait for it.
+
+Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that Ctrl-C ends whatever
+is running as it ends any other command.
+
+1. When nothing was saved for a moment, everything is read.
+2. Scripts and labs that have no remembered result run, and models are compiled (`verify`). Scripts
+   that print something else than is recorded run once more, so that it is known whether their new
+   output can be offered.
+3. The files of the site are put together: pages that show something else now, fonts, the search.
+4. What is wrong is printed, where it is something else than before.
+
+A save in between begins this anew. A script that runs is ended only where it is another by now.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+from coursebuild.effects.errors import EffectError
+from coursebuild.effects.locks import project_lock
+from coursebuild.effects.runner import RunStoppedError, ScriptServer
+from coursebuild.model import Course
+from coursebuild.pipeline.check import no_lessons
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory
+from coursebuild.pipeline.verify import run, verify
+from coursebuild.preview.messages import report_now
+from coursebuild.preview.session import Session, is_same_script
+from coursebuild.report import Style, render_report
+from coursebuild.results import ScriptRun, Verdict
+from coursebuild.scripts.binding_memory import BindingHistory
+from coursebuild.scripts.extract import Extraction, extract
+
+QUIET = 0.15
+"""Seconds without a save after which the work begins."""
+LONGEST = 2.0
+"""Seconds after which it begins all the same."""
+RETRY = 2.0
+"""Seconds after which what could not be done is tried again, though nothing was saved."""
+_REMEMBERED = 500_000
+"""Bindings that held, and lines by which they did, that are remembered: some 50 MB at most."""
+
+
+class SupersededError(Exception):
+    """Something was saved in the meantime."""
+
+
+class BackgroundRebuild:
+    """See the module."""
+
+    def __init__(self, session: Session, options: Options, progress: Progress) -> None:
+        self._session = session
+        self._options = options
+        self._said = progress
+        # Which scripts run is said on a terminal, where it is gone again when they are done.
+        self._progress = progress if progress.live else Progress(quiet=True)
+        self._seen = -1
+        """The number of the state that was looked at last."""
+        self._bindings = BindingHistory()
+        """Bindings that held, also before an output was accepted; see `check_bindings`."""
+        self._server = ScriptServer()
+        self._printed: str | None = None
+        self._failure: BaseException | None = None
+
+    def close(self) -> None:
+        """End the process of scripts."""
+        self._server.close()
+
+    def fail(self, error: BaseException) -> None:
+        """End `follow` by an exception of another thread."""
+        with self._session.changed:
+            self._failure = error
+            self._session.changed.notify_all()
+
+    def follow(self) -> None:
+        """Work as long as the process lives."""
+        while True:
+            self._wait()
+            try:
+                with project_lock(self._options.root, self._said.say):
+                    self.once()
+            except SupersededError:
+                continue
+            except EffectError as error:
+                text = f"coursebuild: {error.message}" + (f"\n{error.help}" if error.help else "")
+                if text != self._session.trouble:
+                    print(text, file=sys.stderr, flush=True)
+                self._done(text)
+
+    def _wait(self) -> None:
+        """Until there is something to do, and nobody is saving."""
+        session = self._session
+        with session.changed:
+            session.changed.wait_for(
+                lambda: session.edits != self._seen or self._failure is not None,
+                RETRY if session.trouble else None,
+            )
+            if self._failure is not None:
+                raise self._failure
+            began = time.monotonic()
+            while time.monotonic() < began + LONGEST:
+                edits = session.edits
+                session.changed.wait_for(lambda edits=edits: session.edits != edits, QUIET)  # type: ignore[misc]
+                if session.edits == edits:
+                    return
+
+    def once(self) -> None:
+        """Everything, now, as far as nothing is saved meanwhile."""
+        session = self._session
+        self._seen = session.edits
+        session.read()
+        with session.changed:
+            self._seen, course = session.edits, session.course
+        if course is not None:
+            self._busy("running scripts and labs")
+            self._verify(course)
+            self._busy("drawing pages")
+            session.make_site(self._pause)
+        self._done()
+
+    def _busy(self, what: str) -> None:
+        self._pause()
+        self._session.busy = what
+        self._session.tell()
+
+    def _pause(self) -> None:
+        """Make room for a save, and begin anew after it."""
+        self._session.calm.wait(LONGEST)
+        if self._session.edits != self._seen:
+            raise SupersededError
+
+    def _done(self, trouble: str = "") -> None:
+        """All is known: say what is wrong, if it is news."""
+        session = self._session
+        with session.changed:
+            if session.edits != self._seen and not trouble:
+                raise SupersededError
+            session.busy = ""
+            session.trouble = trouble
+            session.tell()
+        report = report_now(session)
+        text = render_report(report, "text", Style())
+        if text == self._printed or trouble:
+            return
+        self._printed = text
+        if report.diagnostics:
+            print(text, file=sys.stderr, flush=True)
+        else:
+            self._said.say(f"checked: {text.strip().rpartition(': ')[2]}")
+
+    # --- scripts
+
+    def _verify(self, course: Course) -> None:
+        session = self._session
+        if len(self._bindings) > _REMEMBERED:
+            self._bindings.clear()
+        scripts = extract(course).value
+        with session.changed:
+            everything, session.all_due = session.all_due, False
+        known = {} if everything else session.known_runs(scripts)
+        try:
+            verified = verify(
+                course,
+                self._options,
+                self._progress,
+                static=True,
+                run_all=self._run_all(scripts),
+                held=self._bindings,
+                known=known,
+            )
+        except BaseException as error:
+            session.all_due |= everything
+            if isinstance(error, RunStoppedError):
+                raise SupersededError from None
+            raise
+        self._options.store.fresh = False  # what was made anew once holds from now on
+        session.take_results(course, verified, no_lessons(course))
+        self._run_again(scripts, verified.results.verdicts)
+
+    def _run_all(self, scripts: Sequence[Extraction]) -> Callable[..., tuple[ScriptRun, ...]]:
+        """What runs scripts, until one that runs is another by now: nobody waits for its output."""
+        begun = {extraction.path: extraction for extraction in scripts}
+        session, edits = self._session, self._seen
+
+        def unwanted(running: frozenset[str]) -> bool:
+            nonlocal edits
+            with session.changed:
+                if session.edits == edits or session.course is None:
+                    return False
+                edits = session.edits
+                now = {e.path: e for e in extract(session.course).value}
+            return not all(is_same_script(begun[path], now.get(path)) for path in running)
+
+        return functools.partial(self._server.run, unwanted=unwanted)
+
+    def _run_again(self, scripts: Sequence[Extraction], verdicts: Sequence[Verdict]) -> None:
+        """Run those that drifted once more."""
+        session, options = self._session, self._options
+        drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
+        unsure = [e for e in scripts if e.path in drifted and session.printed_again(e.path) is None]
+        if unsure:
+            self._busy("running scripts again")
+            memory = Memory(options.root, options.store, fresh=True)
+            stage, run_all = "running scripts again", self._run_all(scripts)
+            try:
+                again = run(unsure, options, self._progress, stage, memory, run_all)
+            except RunStoppedError:
+                raise SupersededError from None
+            session.take_second_runs(again)

@@ -1,0 +1,73 @@
+"""From events of the file system to saves, and from saves to pages.
+
+Entry point: `follow(session, watcher, said)`, which a thread of its own runs.
+
+1. What one save of an editor comes to (an empty file that is written next, a new file that takes
+   the place of the old one) counts once: when nothing more happened for some milliseconds.
+2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
+3. So it is for a document that is gone or empty, which it may be only for a moment.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from coursebuild.preview.session import MOST, Session
+from coursebuild.preview.watcher import Watcher
+
+QUIET = 0.008
+"""Seconds without an event after which a save is complete."""
+QUIET_MANY = 0.060
+"""The same where many files change."""
+QUIET_GONE = 0.100
+"""The same where a file is not there or empty."""
+LONGEST = 0.250
+"""Seconds after which what there is counts, whatever still happens; with many files, four times."""
+
+
+def follow(
+    session: Session, watcher: Watcher, said: Callable[[frozenset[str], float], None]
+) -> None:
+    """Take saves until the watcher is stopped.
+
+    `said` is told what was saved, and how many seconds after its first event it was taken.
+    """
+    while not watcher.stopped:
+        watcher.watch_also(session.files_elsewhere())
+        paths = watcher.get(1.0)
+        if not paths:
+            continue
+        began = time.monotonic()
+        session.calm.clear()
+        try:
+            paths = _complete(session.root, watcher, paths)
+            changed = session.edit(paths)
+            if changed is None:  # more than documents changed
+                session.take_others()
+        finally:
+            session.calm.set()
+        if changed is not False:
+            said(paths, time.monotonic() - began)
+
+
+def _complete(root: Path, watcher: Watcher, paths: frozenset[str]) -> frozenset[str]:
+    """All paths of a save, once nothing more happens."""
+    began = now = time.monotonic()
+    while True:
+        many = len(paths) > MOST
+        quiet = QUIET_MANY if many else QUIET_GONE if _is_any_empty(root, paths) else QUIET
+        left = began + LONGEST * (4 if many else 1) - now
+        more = watcher.get(min(quiet, left)) if left > 0 else frozenset()
+        if not more:
+            return paths
+        paths |= more
+        now = time.monotonic()
+
+
+def _is_any_empty(root: Path, paths: Iterable[str]) -> bool:
+    try:
+        return any((root / path).stat().st_size == 0 for path in paths)
+    except OSError:
+        return True

@@ -1,0 +1,90 @@
+"""`coursebuild serve`: the course as a site in memory that follows every save.
+
+Entry point: `serve(options, port)`.
+
+1. The course is read; its pages are drawn when they are asked for.
+2. A thread takes saves (`saves`): the page that was saved is new within milliseconds.
+3. The main thread does the rest behind it (`rebuild`): scripts, labs, fonts, whole checks.
+
+The last good page stays while something is wrong; what is wrong is printed and shown over it.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+
+from coursebuild.effects.exit_immediately import exit_immediately
+from coursebuild.effects.resources import Bundle
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.progress import Progress
+from coursebuild.preview.rebuild import BackgroundRebuild
+from coursebuild.preview.saves import follow
+from coursebuild.preview.server import PreviewServer
+from coursebuild.preview.session import Session
+from coursebuild.preview.watcher import Watcher
+from coursebuild.render.assets import page_script
+
+_GARBAGE = 200_000
+"""Objects after which those in cycles are looked for: a preview lives long."""
+_SWITCH = 0.001
+"""Seconds after which a thread that computes lets another one: a save should not wait for long."""
+
+
+def serve(options: Options, port: int) -> None:
+    """Serve until interrupted, which is how a preview ends, and this process with it."""
+    progress = Progress(quiet=options.quiet)
+    session = Session(options)
+    bundled = Bundle()
+    files = {
+        "preview.js": page_script(bundled["js/preview.js"]),
+        "preview.css": bundled["css/preview.css"],
+        "worker.js": page_script(bundled["js/preview-worker.js"]),
+    }
+    try:
+        server = PreviewServer(port, session, files)
+    except OSError as error:
+        raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
+    watcher = Watcher(options.root)
+    sys.setswitchinterval(_SWITCH)
+    try:
+        print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        session.start(options, progress)
+        gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
+        gc.set_threshold(_GARBAGE, 50, 50)
+        server.start()
+        watcher.start()
+        _work(session, watcher, BackgroundRebuild(session, options, progress), progress, server.url)
+    except KeyboardInterrupt:
+        progress.say("stopped")
+    finally:
+        watcher.stop()
+        server.stop()
+        session.close()
+        options.store.close()
+    exit_immediately(0)
+
+
+def _work(
+    session: Session, watcher: Watcher, rebuild: BackgroundRebuild, progress: Progress, url: str
+) -> None:
+    """Follow a course that was read; ends by an exception only."""
+    progress.say(f"ready: {url}")
+    watcher.wait()
+
+    def saved(paths: frozenset[str], seconds: float) -> None:
+        names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
+        progress.say(f"changed: {names} ({1e3 * seconds:.0f} ms)")
+
+    def take_saves() -> None:
+        try:
+            follow(session, watcher, saved)
+        except BaseException as error:  # told by the main thread
+            rebuild.fail(error)
+
+    threading.Thread(target=take_saves, name="saves", daemon=True).start()
+    try:
+        rebuild.follow()
+    finally:
+        rebuild.close()
