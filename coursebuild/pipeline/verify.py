@@ -113,11 +113,11 @@ def verify(
     if _has_labs(course):
         from coursebuild.pipeline.labs import Engines, Tried, run_scripts_and_labs, try_labs
 
-        known = dict(models)
+        by_name = dict(models)
 
         def trials(engines: Engines) -> Tried:
             return try_labs(
-                course, known, options, engines, documents, compiled, static=static, only=only
+                course, by_name, options, engines, documents, compiled, static=static, only=only
             )
 
         runs, (labs, lab_findings) = run_scripts_and_labs(scripts, trials, options.root, progress)
