@@ -14,7 +14,7 @@ import sys
 
 from coursebuild.cli.output import look
 from coursebuild.core.engine.up_to_date import unchanged
-from coursebuild.effects.place import course_above
+from coursebuild.effects.course_root import find_course_root
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def said_before(given: Sequence[str]) -> str | None:
     if command is None or _ALL_ANEW in given:
         return None
     try:
-        root = (given[1] or ".") if given[0] == "-C" else course_above(".")
+        root = (given[1] or ".") if given[0] == "-C" else find_course_root(".")
         return unchanged(os.path.realpath(root), command) if root else None
     except OSError:  # the working directory is gone, for one
         return None

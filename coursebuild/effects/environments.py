@@ -31,7 +31,7 @@ from pathlib import Path
 from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.effects.errors import EffectError, UsageError, reason
 from coursebuild.effects.locks import make_private_folder
-from coursebuild.effects.surroundings import Place, library_folder
+from coursebuild.effects.surroundings import OtherEnvironment, library_folder
 from coursebuild.effects.versions import engine_version
 
 _FOLDER = "environments"
@@ -85,7 +85,7 @@ def _plain(name: str) -> str:
 
 def environment(
     root: Path, engine: str, wanted: Mapping[str, str], say: Callable[[str], None]
-) -> Place:
+) -> OtherEnvironment:
     """The environment with this version of MuJoCo and these distributions; made if it is not there.
 
     Only one process at a time may do this for a course: see `project_lock`.
@@ -115,7 +115,7 @@ def environment(
         _remove_unused(folder, prefix)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
-    return Place(name, f"{prefix}/bin/python", str(prefix), packages)
+    return OtherEnvironment(name, f"{prefix}/bin/python", str(prefix), packages)
 
 
 def _make(prefix: Path, engine: str, wanted: Mapping[str, str], here: Mapping[str, str]) -> None:

@@ -51,7 +51,7 @@ _NOTES_BYTES = 1 << 20
 """What a script may note of what it looks at, before the rest goes to files."""
 
 
-class Request(TypedDict, total=False):
+class ServerRequest(TypedDict, total=False):
     """What the tool wants: packages, or a supervisor."""
 
     load: list[str]
@@ -59,7 +59,7 @@ class Request(TypedDict, total=False):
     """With two descriptors: where a supervisor reads its jobs, and writes its reports."""
 
 
-class Loaded(TypedDict):
+class LoadReply(TypedDict):
     """The answer to `load`."""
 
     fork: str
@@ -131,7 +131,7 @@ class _Server:
                     break
                 if not data:
                     break
-                request: Request = json.loads(data)
+                request: ServerRequest = json.loads(data)
                 if "load" in request:
                     self._answer(self._load(request["load"]))
                 elif self._slot(request["scratch"], fds):
@@ -158,7 +158,7 @@ class _Server:
                 status = os.waitstatus_to_exitcode(child[1])
                 self._answer({"ended": child[0], "status": status})
 
-    def _load(self, names: Sequence[str]) -> Loaded:
+    def _load(self, names: Sequence[str]) -> LoadReply:
         before = _surroundings()
         had_mujoco = "mujoco" in sys.modules
         for name in names:

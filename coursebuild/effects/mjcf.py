@@ -80,12 +80,12 @@ class _Compiler(JsonChild):
         self.timeout = timeout
 
     def compile(self, path: str, text: str) -> CompileResult:
-        request: mjcf_worker.Request = {
+        request: mjcf_worker.CompileRequest = {
             "path": str(self.root / path),
             "text": text,
             "limit": self.timeout,
         }
-        reply: mjcf_worker.Reply | None = self.ask(request)
+        reply: mjcf_worker.CompileReply | None = self.ask(request)
         if reply is None:
             return CompileResult(f"MuJoCo's compiler {self.death()}")
         facts = reply["facts"]
@@ -100,7 +100,7 @@ class _Compiler(JsonChild):
         return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
 
 
-def _facts(facts: mjcf_worker.Facts, parts: Iterable[str]) -> ModelFacts:
+def _facts(facts: mjcf_worker.CompiledFacts, parts: Iterable[str]) -> ModelFacts:
     return ModelFacts(
         bodies=facts["bodies"],
         geoms=facts["geoms"],

@@ -2,9 +2,9 @@
 
 Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
 
-The protocol: JSON lines. First this process says that it is ready; then, for each `Request` on
-standard input, it writes one `Reply`. A request that takes more processor time than its limit ends
-this process by SIGPROF.
+The protocol: JSON lines. First this process says that it is ready; then, for each `CompileRequest`
+on standard input, it writes one `CompileReply`. A request that takes more processor time than its
+limit ends this process by SIGPROF.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 """In the order of mjtIntegrator, by their names in MJCF."""
 
 
-class Request(TypedDict):
+class CompileRequest(TypedDict):
     """What to compile."""
 
     path: str
@@ -31,7 +31,7 @@ class Request(TypedDict):
     """Seconds."""
 
 
-class Facts(TypedDict):
+class CompiledFacts(TypedDict):
     """What a compiled model holds; see `results.ModelFacts`."""
 
     bodies: int
@@ -49,11 +49,11 @@ class Facts(TypedDict):
     body_names: list[str]
 
 
-class Reply(TypedDict):
+class CompileReply(TypedDict):
     """What became of it: a message, or facts."""
 
     error: str
-    facts: Facts | None
+    facts: CompiledFacts | None
 
 
 def main() -> None:
@@ -67,7 +67,7 @@ def main() -> None:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
-        request: Request = json.loads(line)
+        request: CompileRequest = json.loads(line)
         signal.setitimer(signal.ITIMER_PROF, request["limit"])
         reply = _compile(mujoco, request)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
@@ -83,7 +83,7 @@ def _limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _compile(mujoco: Any, request: Request) -> Reply:
+def _compile(mujoco: Any, request: CompileRequest) -> CompileReply:
     path = request["path"]
     try:
         model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
@@ -92,7 +92,7 @@ def _compile(mujoco: Any, request: Request) -> Reply:
     return {"error": "", "facts": _facts(mujoco, model)}
 
 
-def _facts(mujoco: Any, model: Any) -> Facts:
+def _facts(mujoco: Any, model: Any) -> CompiledFacts:
     def names(addresses: Any) -> list[str]:
         blob: bytes = model.names
         return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]

@@ -23,8 +23,8 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.effects.course_root import MAP, find_course_root
 from coursebuild.effects.errors import EffectError, OutsideProjectError, reason
-from coursebuild.effects.place import MAP, course_above
 from coursebuild.model import MjcfModel
 from coursebuild.source import Source
 
@@ -67,7 +67,7 @@ def find_root(chosen: Path | None, start: Path) -> Path:
                 f"{chosen} is not a folder" if folder.exists() else f"there is no folder {chosen}"
             )
         return folder.resolve()
-    found = course_above(str(start))
+    found = find_course_root(str(start))
     if found is not None:
         return Path(found)
     raise EffectError(

@@ -32,7 +32,7 @@ from msgspec import Struct
 from coursebuild.effects import supervisor
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.notes import Notes
-from coursebuild.effects.surroundings import Place, library_folder, wanted_packages
+from coursebuild.effects.surroundings import OtherEnvironment, library_folder, wanted_packages
 from coursebuild.effects.surroundings import clean_environment as clean_environment
 from coursebuild.effects.watching import STDERR_KEPT
 from coursebuild.effects.workers import ForkServer, ServerLostError, Worker, spawn_worker
@@ -110,7 +110,7 @@ class ScriptServer:
         place: another interpreter that is to run them.
     """
 
-    def __init__(self, *, fork: bool = True, place: Place | None = None) -> None:
+    def __init__(self, *, fork: bool = True, place: OtherEnvironment | None = None) -> None:
         self._place = place
         self._fork = fork and sys.platform == "linux"
         self._server: ForkServer | None = None
@@ -247,7 +247,7 @@ class _Work:
         jobs: Sequence[ScriptJob],
         tell: Callable[[RunEvent], None],
         order: Sequence[int] | None,
-        place: Place | None,
+        place: OtherEnvironment | None,
     ) -> None:
         self.root = root
         self.jobs = jobs
@@ -328,13 +328,13 @@ class _Work:
         self.tell(RunFinished(run, self.done, self.total))
 
 
-def _environment(place: Place | None) -> dict[str, str]:
+def _environment(place: OtherEnvironment | None) -> dict[str, str]:
     clean = clean_environment(os.environ)
     return clean if place is None else place.environment(clean)
 
 
 def _script_run(
-    path: str, report: supervisor.Report, out: bytes, err: bytes, trace: bytes
+    path: str, report: supervisor.ChildReport, out: bytes, err: bytes, trace: bytes
 ) -> ScriptRun:
     stdout, is_text = _decode(out)
     outcome, status = _outcome(report)
@@ -372,7 +372,7 @@ def _divergence(sign: str, detail: str, time: str, model: str, path: str, line: 
     return Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
 
 
-def _outcome(report: supervisor.Report) -> tuple[Outcome, int]:
+def _outcome(report: supervisor.ChildReport) -> tuple[Outcome, int]:
     status = report["status"]
     match report["end"]:
         case "missing":

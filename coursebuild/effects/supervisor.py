@@ -13,8 +13,8 @@ It runs one script after another, each in a session of its own, so that
 It has one thread, so that it may act between fork and exec, and fork without an exec.
 
 The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
-one JSON object (`Report`) after its length, and then the bytes of the script's output, of the end
-of its error output and of its trace.
+one JSON object (`ChildReport`) after its length, and then the bytes of the script's output, of the
+end of its error output and of its trace.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Job(TypedDict):
     """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
 
 
-class Report(TypedDict):
+class ChildReport(TypedDict):
     """What happened."""
 
     end: Literal["exit", "timeout", "output-limit", "missing", "unstartable"]
@@ -131,7 +131,7 @@ class Slot:
             _send(self.reports, json.dumps(answer[0]).encode(), *answer[1:])
         return False
 
-    def _serve(self, job: Job) -> tuple[Report, bytes, bytes, bytes] | None:
+    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | None:
         missing = missing_modules(
             job["requires"], Path(job["root"], job["path"]).parent, job["library"]
         )
@@ -281,11 +281,11 @@ def die_with(parent: int, libc: ctypes.CDLL | None) -> None:
 
 def _finished(
     run: Watched, notes: Callable[[], Notes | None]
-) -> tuple[Report, bytes, bytes, bytes]:
+) -> tuple[ChildReport, bytes, bytes, bytes]:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
     noted = notes()
     trace = b"" if noted is None else json.dumps(noted).encode()
-    report: Report = {
+    report: ChildReport = {
         "end": run.over,
         "status": run.exit_status(),
         "seconds": run.seconds,
@@ -297,7 +297,7 @@ def _finished(
     return report, stdout, stderr, trace
 
 
-def _unstartable(text: str) -> tuple[Report, bytes, bytes, bytes]:
+def _unstartable(text: str) -> tuple[ChildReport, bytes, bytes, bytes]:
     return _report("unstartable", status=2, stderr=text), b"", text.encode(), b""
 
 
@@ -307,7 +307,7 @@ def _report(
     status: int = 0,
     missing: list[str] | None = None,
     stderr: str = "",
-) -> Report:
+) -> ChildReport:
     return {
         "end": end,
         "status": status,

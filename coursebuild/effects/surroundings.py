@@ -1,7 +1,7 @@
 """What a process that runs scripts finds around it.
 
-Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `Place`, another interpreter
-than that of the tool.
+Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `OtherEnvironment`, another
+interpreter than that of the tool.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ before it. None does anything that a script could see."""
 _IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]+([^\n#;]+)", re.MULTILINE)
 
 
-class Place(Struct, frozen=True):
+class OtherEnvironment(Struct, frozen=True):
     """An interpreter and what is installed for it, where scripts run that do not run here."""
 
     name: str

@@ -81,7 +81,7 @@ class Worker(abc.ABC):
         self._buffer += data
         return bool(data)
 
-    def take_report(self) -> tuple[supervisor.Report, bytes, bytes, bytes] | None:
+    def take_report(self) -> tuple[supervisor.ChildReport, bytes, bytes, bytes] | None:
         """A whole report with the script's output, error output and trace, if it is here."""
         size = supervisor.LENGTH.size
         if len(self._buffer) < size:
@@ -90,7 +90,7 @@ class Worker(abc.ABC):
         at = size + length
         if len(self._buffer) < at:
             return None
-        report: supervisor.Report = json.loads(self._buffer[size:at])
+        report: supervisor.ChildReport = json.loads(self._buffer[size:at])
         ends = [at + report["stdout"]]
         ends += [ends[-1] + report["stderr"]]
         ends += [ends[-1] + report["trace"]]
@@ -293,7 +293,7 @@ class ForkServer:
             self._process.kill()
             self._process.wait()
 
-    def _send(self, request: forkserver.Request, fds: list[int]) -> None:
+    def _send(self, request: forkserver.ServerRequest, fds: list[int]) -> None:
         try:
             socket.send_fds(self._control, [json.dumps(request).encode()], fds)
         except OSError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 
-class Piece(Struct, frozen=True):
+class DefinitionPart(Struct, frozen=True):
     """A part of a definition, as HTML; `display`: a formula on a line of its own."""
 
     html: str
@@ -23,7 +23,7 @@ class DefinedTerm(Struct, frozen=True):
     name: str
     title: str
     """The name as HTML."""
-    definition: tuple[Piece, ...]
+    definition: tuple[DefinitionPart, ...]
 
 
 class SymbolUse(Struct, frozen=True):

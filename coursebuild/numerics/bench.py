@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.model.scenarios import Declarations
 from coursebuild.numerics.engine import refsafe_from
-from coursebuild.numerics.front import Placed, Point, front, verdict, words
+from coursebuild.numerics.front import FrontPoint, PlacedPoint, front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
 from coursebuild.numerics.observe import quantity_name
 from coursebuild.numerics.pilot import pilot
@@ -27,12 +27,12 @@ from coursebuild.numerics.problem import STANDARD
 from coursebuild.numerics.references import conserved, energy_beyond, references
 from coursebuild.numerics.reports.bench import (
     OrderRow,
+    RowVerdict,
     ScenarioReport,
     StableRow,
-    Verdict,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.rows import Basis, Measured, measured
+from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene, scenes
 from coursebuild.numerics.settings import own_setting, settings, stable
 from coursebuild.numerics.timing import Clock, Cost, costs, subnormal
@@ -143,10 +143,10 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
 
 def _verdict(
     basis: Basis,
-    found: Sequence[Measured],
-    points: Sequence[Point | None],
-    placed: Sequence[Placed],
-) -> Verdict:
+    found: Sequence[MeasuredRow],
+    points: Sequence[FrontPoint | None],
+    placed: Sequence[PlacedPoint],
+) -> RowVerdict:
     """On the scene's own setting."""
     own = next(number for number, one in enumerate(found) if one.row.own)
     mine, cone = found[own], basis.cones[basis.own.cone]
@@ -171,7 +171,9 @@ def _verdict(
 # ------------------------------------------------------------------------------------------- rows
 
 
-def _times(basis: Basis, found: Sequence[Measured], clock: Clock, quick: bool) -> list[Cost | None]:
+def _times(
+    basis: Basis, found: Sequence[MeasuredRow], clock: Clock, quick: bool
+) -> list[Cost | None]:
     """What the usable settings cost; where the scene's own is not, relative to the first."""
     usable = [index for index, one in enumerate(found) if one.ok]
     taken: list[Cost | None] = [None] * len(found)
@@ -185,14 +187,19 @@ def _times(basis: Basis, found: Sequence[Measured], clock: Clock, quick: bool) -
     return taken
 
 
-def _point(row: WorkPrecisionRow, cost: Cost | None) -> Point | None:
+def _point(row: WorkPrecisionRow, cost: Cost | None) -> FrontPoint | None:
     if cost is None or row.seen is None:
         return None
-    return Point(cost.ratio, row.seen if row.figure is None else row.figure[0])
+    return FrontPoint(cost.ratio, row.seen if row.figure is None else row.figure[0])
 
 
 def _placed_row(
-    row: WorkPrecisionRow, cost: Cost | None, place: Placed, duration: float, *, comparable: bool
+    row: WorkPrecisionRow,
+    cost: Cost | None,
+    place: PlacedPoint,
+    duration: float,
+    *,
+    comparable: bool,
 ) -> WorkPrecisionRow:
     """A row with its cost; `comparable`: whether the scene's own setting has one."""
     row = replace(row, front=place.front, dominated_by=place.dominated_by)
@@ -208,7 +215,7 @@ def _placed_row(
     )
 
 
-def _orders(basis: Basis, found: Sequence[Measured]) -> tuple[OrderRow, ...]:
+def _orders(basis: Basis, found: Sequence[MeasuredRow]) -> tuple[OrderRow, ...]:
     own, known = basis.own, basis.known
     motion = known.motion
     turned = angular_distance(motion.attitude[:1], motion.attitude)

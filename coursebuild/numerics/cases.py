@@ -18,7 +18,7 @@ import numpy as np
 
 from coursebuild.model.scenarios import DeclaredScenario
 from coursebuild.numerics.engine import (
-    States,
+    EngineStates,
     compiled,
     initial_data,
     motion_of,
@@ -189,4 +189,6 @@ def closed_motion(
 
 def _start(model: Any, setup: Setup) -> Motion:
     data = initial_data(setup, model)
-    return motion_of(model, States(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None]))
+    return motion_of(
+        model, EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
+    )

@@ -29,7 +29,7 @@ _BAD = {
 """The warnings of a simulation that is lost."""
 
 
-class Status(enum.Enum):
+class RunStatus(enum.Enum):
     """How a run went."""
 
     OK = "ok"
@@ -41,19 +41,19 @@ class Status(enum.Enum):
     """MuJoCo put the state back to its beginning on the way: the end says nothing."""
 
 
-class Judgement(Struct, frozen=True):
+class RunJudgement(Struct, frozen=True):
     """How a run went, and what shows it, in words."""
 
-    status: Status
+    status: RunStatus
     reasons: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
         """Whether the run may be used."""
-        return self.status is Status.OK
+        return self.status is RunStatus.OK
 
 
-_WORSE = (Status.OK, Status.SLOW_GROWTH, Status.DIVERGED, Status.RESET)
+_WORSE = (RunStatus.OK, RunStatus.SLOW_GROWTH, RunStatus.DIVERGED, RunStatus.RESET)
 
 
 class Peaks(Struct, frozen=True):
@@ -106,34 +106,34 @@ def _more(before: float, values: Array) -> float:
 
 def judge(
     model: Any, data: Any, elapsed: float, seen: Peaks | None = None, bounds: Peaks = _NO_BOUNDS
-) -> Judgement:
+) -> RunJudgement:
     """The worst that a run shows when it has ended after `elapsed` s, with every reason for it.
 
     `seen` is the most that was seen on the way, `bounds` the most that can be.
     """
     most = peaks(data, Peaks() if seen is None else seen)
-    shown: list[tuple[Status, str]] = []
+    shown: list[tuple[RunStatus, str]] = []
     if not most.finite:
-        shown.append((Status.DIVERGED, "the state is not finite"))
+        shown.append((RunStatus.DIVERGED, "the state is not finite"))
     for kind, what in _BAD.items():
         if data.warning[int(kind)].number:
-            shown.append((Status.DIVERGED, f"MuJoCo warned of bad {what}"))
+            shown.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {what}"))
     if not abs(data.time - elapsed) <= model.opt.timestep / 2:
         said = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
-        shown.append((Status.RESET, said))
+        shown.append((RunStatus.RESET, said))
     for size, bound, what in (
         (most.position, bounds.position, "positions"),
         (most.velocity, bounds.velocity, "velocities"),
     ):
         if most.finite and not size <= bound:
             said = f"{what} reached {size / bound:.3g} times what can be"
-            shown.append((Status.SLOW_GROWTH, said))
+            shown.append((RunStatus.SLOW_GROWTH, said))
     deep = max(most.penetration / bounds.penetration, most.sunk)
     if not deep <= 1.0:
         said = f"bodies lie {deep:.3g} times as deep in each other as they may"
-        shown.append((Status.DIVERGED, said))
-    worst = max((status for status, _ in shown), key=_WORSE.index, default=Status.OK)
-    return Judgement(worst, tuple(said for _, said in shown))
+        shown.append((RunStatus.DIVERGED, said))
+    worst = max((status for status, _ in shown), key=_WORSE.index, default=RunStatus.OK)
+    return RunJudgement(worst, tuple(said for _, said in shown))
 
 
 def deepest_contact(data: Any) -> float:

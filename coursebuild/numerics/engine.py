@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.detector import Judgement, Peaks, deepest_contact, judge, peaks
+from coursebuild.numerics.detector import Peaks, RunJudgement, deepest_contact, judge, peaks
 from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
 
 _CODE = {
@@ -133,7 +133,7 @@ def initial_data(setup: Setup, model: Any) -> Any:
 # ------------------------------------------------------------------------------------------ states
 
 
-class States(Struct, frozen=True):
+class EngineStates(Struct, frozen=True):
     """A motion in the engine's coordinates, at n times."""
 
     times: Array
@@ -145,10 +145,10 @@ class States(Struct, frozen=True):
     act: Array
     """(n, na): activations of actuators."""
 
-    def head(self, count: int) -> States:
+    def head(self, count: int) -> EngineStates:
         """Only the first."""
         parts = (self.times, self.qpos, self.qvel, self.act)
-        return States(*(part[:count] for part in parts))
+        return EngineStates(*(part[:count] for part in parts))
 
 
 def coordinates(model: Any) -> tuple[list[int], list[int]]:
@@ -168,7 +168,7 @@ def coordinates(model: Any) -> tuple[list[int], list[int]]:
     return places, turns
 
 
-def motion_of(model: Any, states: States) -> Motion:
+def motion_of(model: Any, states: EngineStates) -> Motion:
     """States sorted into positions, attitudes and velocities."""
     places, turns = coordinates(model)
     attitude = np.empty((len(states.times), len(turns), 4))
@@ -177,14 +177,14 @@ def motion_of(model: Any, states: States) -> Motion:
     return Motion(states.times, states.qpos[:, places], attitude, states.qvel)
 
 
-def states_of(model: Any, motion: Motion, like: States) -> States:
+def states_of(model: Any, motion: Motion, like: EngineStates) -> EngineStates:
     """A motion in the engine's coordinates; activations as in a like motion."""
     places, turns = coordinates(model)
     qpos = like.qpos.copy()
     qpos[:, places] = motion.position
     for index, at in enumerate(turns):
         qpos[:, at : at + 4] = motion.attitude[:, index]
-    return States(motion.times, qpos, motion.velocity, like.act)
+    return EngineStates(motion.times, qpos, motion.velocity, like.act)
 
 
 # ------------------------------------------------------------------------------------- simulations
@@ -193,14 +193,14 @@ def states_of(model: Any, motion: Motion, like: States) -> States:
 class Run(Struct, frozen=True):
     """A simulation, looked at n times."""
 
-    states: States
+    states: EngineStates
     energy: Array
     """(n + 1, 2) J: potential and kinetic, first those of the beginning."""
     momentum: Array
     """(n + 1, 3) kg m²/s: angular, of everything about its centre of mass, in the world's frame."""
     penetration: float
     """Deepest contact at those times, m."""
-    judgement: Judgement
+    judgement: RunJudgement
 
 
 def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
@@ -228,7 +228,7 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
         # Where a step ends, its contacts are still those of its beginning.
         seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
     judgement = judge(model, data, steps * step, seen, bounds_of(setup))
-    states = States(times, qpos, qvel, act)
+    states = EngineStates(times, qpos, qvel, act)
     return Run(states, table[:, :2], table[:, 2:], seen.penetration, judgement)
 
 

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from coursebuild.numerics.engine import (
-    States,
+    EngineStates,
     compiled,
     coordinates,
     initial_data,
@@ -67,7 +67,7 @@ def forward_motion(
 
 def forward_states(
     model: Any, setup: Setup, times: Array, method: Method, *, evaluations: float = float("inf")
-) -> States:
+) -> EngineStates:
     """The states of a smooth scene at the rising times (n,) s.
 
     `evaluations`: the most accelerations to compute.
@@ -91,7 +91,7 @@ def forward_states(
     qpos = states[:, :nq].copy()
     for at in coordinates(model)[1]:
         qpos[:, at : at + 4] /= np.linalg.norm(qpos[:, at : at + 4], axis=1, keepdims=True)
-    return States(times, qpos, states[:, nq : nq + nv].copy(), states[:, nq + nv :].copy())
+    return EngineStates(times, qpos, states[:, nq : nq + nv].copy(), states[:, nq + nv :].copy())
 
 
 def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[float, ...]]]:
@@ -151,7 +151,7 @@ _TURNING = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
 # ------------------------------------------------------------- what the engine itself tends to
 
 
-def tends_to(model: Any, setup: Setup, states: States, step: float, parted: float) -> bool:
+def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted: float) -> bool:
     """Whether the engine comes nearer to these states, the smaller its steps are.
 
     Two integrations over the same accelerations agree also where these are not the engine's own, as
@@ -178,7 +178,7 @@ def tends_to(model: Any, setup: Setup, states: States, step: float, parted: floa
     return False
 
 
-def _gaps(model: Any, setup: Setup, states: States, step: float) -> Array:
+def _gaps(model: Any, setup: Setup, states: EngineStates, step: float) -> Array:
     """How far the engine is from these states at every sample: (n,); see `apart`."""
     for integrator in (Integrator.RK4, Integrator.IMPLICITFAST):
         try:

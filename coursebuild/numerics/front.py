@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.reports.bench import Setting, Verdict
+from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict
 from coursebuild.numerics.reports.points import seconds_text
 
 COST_SLACK = (0.03, 0.12)
@@ -26,7 +26,7 @@ ERROR_SLACK = 0.05
 """Relative."""
 
 
-class Point(Struct, frozen=True):
+class FrontPoint(Struct, frozen=True):
     """A setting in the plane of cost and error."""
 
     cost: float
@@ -35,7 +35,7 @@ class Point(Struct, frozen=True):
     """In any unit; 0 is as good as can be told."""
 
 
-class Placed(Struct, frozen=True):
+class PlacedPoint(Struct, frozen=True):
     """Where a point lies."""
 
     front: bool
@@ -43,7 +43,7 @@ class Placed(Struct, frozen=True):
     """The number of a better point; `None` on the front, or for what is no point."""
 
 
-def front(points: Sequence[Point | None]) -> tuple[Placed, ...]:
+def front(points: Sequence[FrontPoint | None]) -> tuple[PlacedPoint, ...]:
     """Which points no other dominates; `None` is a setting that was lost."""
     logs = [None if p is None else (math.log(p.cost), _log_error(p.error)) for p in points]
     slack = _slack(logs)
@@ -53,7 +53,8 @@ def front(points: Sequence[Point | None]) -> tuple[Placed, ...]:
     ]
     on_it = [mine is not None and not found for mine, found in zip(logs, better, strict=True)]
     return tuple(
-        Placed(there, _best(logs, found, on_it)) for there, found in zip(on_it, better, strict=True)
+        PlacedPoint(there, _best(logs, found, on_it))
+        for there, found in zip(on_it, better, strict=True)
     )
 
 
@@ -113,16 +114,16 @@ def _best(logs: Sequence[_Log | None], found: Sequence[int], on_it: Sequence[boo
 
 
 def verdict(
-    settings: Sequence[Setting],
-    points: Sequence[Point | None],
-    placed: Sequence[Placed],
+    settings: Sequence[MeasuredSetting],
+    points: Sequence[FrontPoint | None],
+    placed: Sequence[PlacedPoint],
     own: int,
     seen: float | None,
     reasons: Sequence[str],
     enough: int | None = None,
     *,
     hopeless: bool = False,
-) -> Verdict:
+) -> RowVerdict:
     """What the measurement says of the scene's own setting, number `own`.
 
     `seen`: its error in a picture, where 1 is just visible; `None` where it is not known.
@@ -137,20 +138,20 @@ def verdict(
     told = _noticed(seen) + _enough(settings, points, own, seen, enough, hopeless)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
-        return Verdict(False, None, None, None, noticeable, text + _noticed(seen))
+        return RowVerdict(False, None, None, None, noticeable, text + _noticed(seen))
     if better is None:
         text = "no other setting is cheaper without being less accurate"
-        return Verdict(True, None, None, None, noticeable, text + told)
+        return RowVerdict(True, None, None, None, noticeable, text + told)
     other = points[better]
     assert other is not None
     cost, error = other.cost / mine.cost, other.error / mine.error if mine.error > 0 else 1.0
     text = f"{words(settings[better])} is {_compared(cost, error)}"
-    return Verdict(False, better, cost, error, noticeable, text + told)
+    return RowVerdict(False, better, cost, error, noticeable, text + told)
 
 
 def _enough(
-    settings: Sequence[Setting],
-    points: Sequence[Point | None],
+    settings: Sequence[MeasuredSetting],
+    points: Sequence[FrontPoint | None],
     own: int,
     seen: float | None,
     enough: int | None,
@@ -167,12 +168,12 @@ def _enough(
 
 
 def _lost(
-    settings: Sequence[Setting],
-    points: Sequence[Point | None],
-    placed: Sequence[Placed],
+    settings: Sequence[MeasuredSetting],
+    points: Sequence[FrontPoint | None],
+    placed: Sequence[PlacedPoint],
     own: int,
     reasons: Sequence[str],
-) -> Verdict:
+) -> RowVerdict:
     """Of an own setting under which the scene does not run; the best one that does is named."""
     text = f"the scene does not run under its own setting, {words(settings[own])}: "
     text += "; ".join(reasons)
@@ -180,10 +181,10 @@ def _lost(
     better = min(there)[2] if there else None
     if better is not None:
         text += f"; {words(settings[better])} is the most accurate that does"
-    return Verdict(False, better, None, None, None, text)
+    return RowVerdict(False, better, None, None, None, text)
 
 
-def words(setting: Setting) -> str:
+def words(setting: MeasuredSetting) -> str:
     """A setting in a sentence."""
     more = [setting.solver and f"{setting.solver}, at most {setting.iterations} iterations"]
     more.append(setting.cone and f"{setting.cone} cone")

@@ -18,13 +18,13 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import States, advance, initial_data
+from coursebuild.numerics.engine import EngineStates, advance, initial_data
 from coursebuild.numerics.problem import Array, Setup
 from coursebuild.numerics.scene import Scene
 from mjcourse.spatial import angular_distance
 
 
-def visible_error(model: Any, scene: Scene, states: States, exact: States) -> float:
+def visible_error(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> float:
     """The largest displacement or turn of a body in a picture, where 1 is just visible."""
     place, turn = _picture(model, states)
     exact_place, exact_turn = _picture(model, exact)
@@ -34,7 +34,7 @@ def visible_error(model: Any, scene: Scene, states: States, exact: States) -> fl
     return max(moved / length, turned / math.radians(scene.visible.angle))
 
 
-def _picture(model: Any, states: States) -> tuple[Array, Array]:
+def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
     """Places (n, b + g, 3) of bodies and geoms that can move, and attitudes (n, b, 4) of bodies."""
     data = mujoco.MjData(model)
     bodies = np.flatnonzero(model.body_weldid != 0)
@@ -87,7 +87,7 @@ _UNITS = {
 """Of sensors whose unit does not depend on the joint that they are at."""
 
 
-def quantity_values(model: Any, scene: Scene, states: States) -> Array:
+def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     """What the scenario measures, at every sample: (n, d)."""
     assert scene.declared is not None and scene.declared.measure is not None
     wanted = scene.declared.measure
@@ -153,7 +153,7 @@ def _touched(model: Any, scene: Scene) -> set[Pair]:
     return found
 
 
-def sticking(model: Any, scene: Scene, states: States) -> Sticks:
+def sticking(model: Any, scene: Scene, states: EngineStates) -> Sticks:
     """What sticks in a motion, from sample to sample."""
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
     slow = [
@@ -163,7 +163,7 @@ def sticking(model: Any, scene: Scene, states: States) -> Sticks:
     return tuple(slow[max(0, i - 1)] & slow[i] for i in range(len(slow)))
 
 
-def slip(model: Any, scene: Scene, states: States, sticks: Sticks) -> float:
+def slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
     """The largest creep, m, of a pair that sticks in the reference."""
     total: dict[Pair, float] = {}
     before = 0.0
@@ -176,7 +176,7 @@ def slip(model: Any, scene: Scene, states: States, sticks: Sticks) -> float:
     return max(total.values(), default=0.0)
 
 
-def speeds_of(model: Any, scene: Scene, states: States) -> list[dict[Pair, float]]:
+def speeds_of(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair, float]]:
     """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
     data = initial_data(Setup(scenario=scene.scenario), model)
     found = []

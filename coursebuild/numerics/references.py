@@ -30,10 +30,10 @@ from msgspec.structs import replace
 
 from coursebuild.model.scenarios import DeclaredScenario
 from coursebuild.numerics.cases import closed_motion
-from coursebuild.numerics.detector import Judgement, Status
+from coursebuild.numerics.detector import RunJudgement, RunStatus
 from coursebuild.numerics.engine import (
+    EngineStates,
     Run,
-    States,
     initial_data,
     invariants,
     motion_of,
@@ -87,8 +87,8 @@ class Known(Struct, frozen=True):
     kind: str
     """`closed`, `ode` or `self`."""
     source: str
-    states: States
-    other: States
+    states: EngineStates
+    other: EngineStates
     """Those of the second reference."""
     motion: Motion
     floor: Sizes
@@ -144,7 +144,7 @@ def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
     exact.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
     most = QUICK_EVALUATIONS if quick else EVALUATIONS
 
-    def run(method: Method) -> States:
+    def run(method: Method) -> EngineStates:
         return forward_states(exact, first.setup, times, method, evaluations=most)
 
     states = run(_bulirsch_stoer)
@@ -196,7 +196,13 @@ def _until(setup: Setup, horizon: float) -> Setup:
 
 
 def _compared(
-    model: Any, kind: str, source: str, states: States, second: str, other: States, horizon: float
+    model: Any,
+    kind: str,
+    source: str,
+    states: EngineStates,
+    second: str,
+    other: EngineStates,
+    horizon: float,
 ) -> Known:
     motion = motion_of(model, states)
     gap = errors(motion, motion_of(model, other)).largest
@@ -295,7 +301,7 @@ def conserved(model: Any, first: Pilot, known: Known) -> Conserved:
     data, other = initial_data(first.setup, model), initial_data(first.setup, model)
     states = [(data.qpos, data.qvel), *zip(known.states.qpos, known.states.qvel, strict=True)]
     table = np.array([invariants(model, other, qpos, qvel) for qpos, qvel in states])
-    run = Run(known.states, table[:, :2], table[:, 2:], 0.0, Judgement(Status.OK))
+    run = Run(known.states, table[:, :2], table[:, 2:], 0.0, RunJudgement(RunStatus.OK))
     scale = energy_scale(run)
     if declared is not None:
         energy = "energy" in declared and scale > 0

@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import Run, States, motion_of, refsafe_active, simulate
+from coursebuild.numerics.engine import EngineStates, Run, motion_of, refsafe_active, simulate
 from coursebuild.numerics.measure import (
     FLOORS,
     Pair,
@@ -32,7 +32,7 @@ from coursebuild.numerics.measure import (
 from coursebuild.numerics.observe import quantity_name, quantity_values, slip, visible_error
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.references import Cone, Conserved, Known
-from coursebuild.numerics.reports.bench import Setting, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import MeasuredSetting, WorkPrecisionRow
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.settings import with_setting
 from coursebuild.numerics.stability import attempted
@@ -43,7 +43,7 @@ class Basis(Struct, frozen=True, eq=False):
 
     model: Any
     first: Pilot
-    own: Setting
+    own: MeasuredSetting
     """The scene's own setting."""
     cones: Mapping[str, Cone]
     conserved: Conserved
@@ -56,7 +56,7 @@ class Basis(Struct, frozen=True, eq=False):
         return self.cones[self.own.cone].known
 
 
-class Measured(Struct, frozen=True, eq=False):
+class MeasuredRow(Struct, frozen=True, eq=False):
     """What one setting gave; its cost is not known yet."""
 
     row: WorkPrecisionRow
@@ -70,7 +70,7 @@ class Measured(Struct, frozen=True, eq=False):
         return self.row.status == "ok"
 
 
-def measured(basis: Basis, setting: Setting) -> Measured:
+def measured(basis: Basis, setting: MeasuredSetting) -> MeasuredRow:
     """Run a scene under a setting, and compare it with its reference."""
     model, first, cone = basis.model, basis.first, basis.cones[setting.cone]
     one = with_setting(model, setting)
@@ -101,7 +101,7 @@ def measured(basis: Basis, setting: Setting) -> Measured:
     try:
         run = simulate(first.setup, one, thickness(model))
     except mujoco.FatalError as error:
-        return Measured(replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None)
+        return MeasuredRow(replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None)
     row = replace(
         row,
         status=run.judgement.status.value,
@@ -112,11 +112,11 @@ def measured(basis: Basis, setting: Setting) -> Measured:
         penetration=run.penetration,
     )
     if not run.judgement.ok:
-        return Measured(replace(row, growth=_growth(basis, setting, steps)), None)
+        return MeasuredRow(replace(row, growth=_growth(basis, setting, steps)), None)
     return _compared(basis, row, run)
 
 
-def _compared(basis: Basis, row: WorkPrecisionRow, run: Run) -> Measured:
+def _compared(basis: Basis, row: WorkPrecisionRow, run: Run) -> MeasuredRow:
     """With the errors of a run that went well."""
     model, scene, cone = basis.model, basis.first.scene, basis.cones[row.setting.cone]
     known = cone.known
@@ -135,7 +135,7 @@ def _compared(basis: Basis, row: WorkPrecisionRow, run: Run) -> Measured:
         seen=max(shown, floor) + cone.seen,
         slip=creep,
     )
-    return Measured(row, noticeable)
+    return MeasuredRow(row, noticeable)
 
 
 def _energy_drift(run: Run, conserved: Conserved) -> float | None:
@@ -150,7 +150,7 @@ def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | No
     return float(later.mean()) / expected - 1
 
 
-def _growth(basis: Basis, setting: Setting, steps: int) -> float | None:
+def _growth(basis: Basis, setting: MeasuredSetting, steps: int) -> float | None:
     """By what velocities were multiplied in a step, where they grew."""
     try:
         growth = attempted(basis.first.setup, with_setting(basis.model, setting), steps).growth
@@ -159,7 +159,7 @@ def _growth(basis: Basis, setting: Setting, steps: int) -> float | None:
     return growth if math.isfinite(growth) and growth > 1 else None
 
 
-def _quantity(basis: Basis, states: States, known: Known) -> Pair | None:
+def _quantity(basis: Basis, states: EngineStates, known: Known) -> Pair | None:
     """The error of what the scenario declares to be measured."""
     model, scene = basis.model, basis.first.scene
     if not quantity_name(model, scene):

@@ -16,14 +16,14 @@ from typing import Any
 import mujoco
 from msgspec.structs import replace
 
-from coursebuild.numerics.detector import Status
+from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.engine import choose, integrator_of, varied
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import STANDARD, Integrator
-from coursebuild.numerics.reports.bench import Setting, StableRow
+from coursebuild.numerics.reports.bench import MeasuredSetting, StableRow
 from coursebuild.numerics.reports.points import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
-from coursebuild.numerics.stability import Trial, attempted, scan
+from coursebuild.numerics.stability import StabilityTrial, attempted, scan
 
 _SOLVERS = {
     "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
@@ -41,9 +41,9 @@ _MOST_STEPS = 200_000
 """Steps of one trial of a timestep."""
 
 
-def own_setting(model: Any, first: Pilot) -> Setting:
+def own_setting(model: Any, first: Pilot) -> MeasuredSetting:
     """The setting that the model has."""
-    return Setting(
+    return MeasuredSetting(
         integrator=integrator_of(model).value,
         timestep=first.scene.own,
         solver=_name(_SOLVERS, int(model.opt.solver)) if first.constrained else "",
@@ -56,7 +56,7 @@ def _name(names: dict[str, int], number: int) -> str:
     return next(name for name, value in names.items() if value == number)
 
 
-def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[Setting, ...]:
+def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
     """All settings to measure, each once, the model's own among them."""
     own = own_setting(model, first)
     found = [
@@ -73,7 +73,7 @@ def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[Setting,
     return tuple(dict.fromkeys(found))
 
 
-def apply(model: Any, setting: Setting) -> None:
+def apply(model: Any, setting: MeasuredSetting) -> None:
     """Give a `mjModel` a setting; what is empty in it stays as it is."""
     choose(model, Integrator(setting.integrator), setting.timestep)
     if setting.solver:
@@ -83,7 +83,7 @@ def apply(model: Any, setting: Setting) -> None:
         model.opt.cone = CONES[setting.cone]
 
 
-def with_setting(model: Any, setting: Setting) -> Any:
+def with_setting(model: Any, setting: MeasuredSetting) -> Any:
     """A copy of a `mjModel` with a setting, and automatic reset off."""
     one = varied(model, Integrator(setting.integrator), setting.timestep)
     apply(one, setting)
@@ -105,12 +105,12 @@ def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow,
     rows = []
     for integrator in STANDARD:
 
-        def attempt(step: float, integrator: Integrator = integrator) -> Trial:
+        def attempt(step: float, integrator: Integrator = integrator) -> StabilityTrial:
             choose(one, integrator, step)
             try:
                 return attempted(first.setup, one, round(duration / step), thick)
             except mujoco.FatalError:
-                return Trial(step, Status.DIVERGED, math.nan)
+                return StabilityTrial(step, RunStatus.DIVERGED, math.nan)
 
         found = scan(attempt, search, grid=6 if quick else 12, resolution=1e-2 if quick else 1e-3)
         largest = None if math.isinf(found.largest) else found.largest

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Peaks, Status, judge
+from coursebuild.numerics.detector import Peaks, RunStatus, judge
 from coursebuild.numerics.engine import bounds_of, compiled, initial_data, watched
 from coursebuild.numerics.problem import (
     INTEGRATORS,
@@ -41,12 +41,12 @@ RESOLUTION = 1e-4
 _LOOKS = 20
 
 
-class Trial(Struct, frozen=True):
+class StabilityTrial(Struct, frozen=True):
     """One timestep tried."""
 
     timestep: float
     """s."""
-    status: Status
+    status: RunStatus
     growth: float
     """By what the state is multiplied in a step, from half the run to its end; 1 is neither growth
     nor decay, and no number where the run was lost before."""
@@ -54,7 +54,7 @@ class Trial(Struct, frozen=True):
     @property
     def stable(self) -> bool:
         """Whether the run stayed within the problem's bounds."""
-        return self.status is Status.OK
+        return self.status is RunStatus.OK
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -113,12 +113,12 @@ class Scan(Struct, frozen=True):
     where all tried are."""
     islands: tuple[float, ...]
     """Timesteps beyond that are stable all the same, s."""
-    beyond: Trial | None
+    beyond: StabilityTrial | None
     """The first unstable one of the grid."""
 
 
 def scan(
-    attempt: Callable[[float], Trial],
+    attempt: Callable[[float], StabilityTrial],
     search: tuple[float, float],
     *,
     grid: int = GRID,
@@ -143,7 +143,7 @@ def scan(
 
 
 def _bisected(
-    attempt: Callable[[float], Trial], low: float, high: float, resolution: float
+    attempt: Callable[[float], StabilityTrial], low: float, high: float, resolution: float
 ) -> float:
     while high / low > 1 + resolution:
         middle = math.sqrt(low * high)
@@ -154,12 +154,14 @@ def _bisected(
     return low
 
 
-def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Trial:
+def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
     """Run the problem's steps at a timestep (s), whatever its duration."""
     return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.steps)
 
 
-def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = None) -> Trial:
+def attempted(
+    setup: Setup, model: Any, steps: int, thickness: Array | None = None
+) -> StabilityTrial:
     """Make so many steps with a model's own timestep; `thickness` as for `detector.peaks`.
 
     A command changes with the first step that begins after its time: the timestep need not divide
@@ -181,7 +183,7 @@ def attempted(setup: Setup, model: Any, steps: int, thickness: Array | None = No
             sizes.append(float(np.linalg.norm(data.qvel)))
     elapsed = total * timestep
     judgement = judge(model, data, elapsed, seen, bounds_of(setup))
-    return Trial(timestep, judgement.status, _growth(sizes, chunk))
+    return StabilityTrial(timestep, judgement.status, _growth(sizes, chunk))
 
 
 def _parts(scenario: Scenario, timestep: float, done: int, count: int) -> list[int]:

@@ -35,7 +35,7 @@ from msgspec import Struct
 from coursebuild.numerics.engine import advance, initial_data, integrator_of, silent, varied
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import Array, Setup
-from coursebuild.numerics.reports.bench import Setting
+from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.settings import apply, with_setting
 
 Clock: TypeAlias = Callable[[], int]
@@ -191,7 +191,7 @@ class Cost(Struct, frozen=True):
 def costs(
     model: Any,
     first: Pilot,
-    chosen: Sequence[Setting],
+    chosen: Sequence[MeasuredSetting],
     own: int,
     clock: Clock,
     *,
@@ -294,7 +294,7 @@ def _lasting(made: Callable[[int], Job], clock: Clock) -> tuple[Job, int]:
         times *= 2
 
 
-def _steps(model: Any, first: Pilot, setting: Setting) -> int:
+def _steps(model: Any, first: Pilot, setting: MeasuredSetting) -> int:
     """Steps from each moment: over the same time with every timestep, as far as that is little."""
     most = min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
     span = min(most * first.scene.own, first.scene.scenario.duration / _MOMENTS)
@@ -307,7 +307,7 @@ def _job(
     states: Sequence[Array],
     steps: int,
     times: int,
-    setting: Setting | None = None,
+    setting: MeasuredSetting | None = None,
 ) -> Job:
     """So many steps from each of the states, and all of that so many times."""
 

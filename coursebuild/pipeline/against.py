@@ -21,7 +21,7 @@ from coursebuild.diagnostics import Severity
 from coursebuild.effects.environments import environment, needed, other_version
 from coursebuild.effects.errors import EffectError
 from coursebuild.effects.locks import project_lock
-from coursebuild.effects.surroundings import Place
+from coursebuild.effects.surroundings import OtherEnvironment
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.model import Course
 from coursebuild.pipeline.load import load
@@ -124,7 +124,7 @@ class _Work(Struct):
             failure(extraction, there.run, everything),
         )
 
-    def _place(self, engine: str) -> Place:
+    def _place(self, engine: str) -> OtherEnvironment:
         """The environment with a version of MuJoCo and the packages that the scripts use here."""
         memory = Memory(self.options.root, self.options.store)
         noted = [memory.last(extraction.path) for extraction in self.chosen]
@@ -144,7 +144,12 @@ class _Work(Struct):
         return self._run(scripts, place, stage), ""
 
     def _run(
-        self, scripts: Sequence[Extraction], place: Place, stage: str, *, fresh: bool = False
+        self,
+        scripts: Sequence[Extraction],
+        place: OtherEnvironment,
+        stage: str,
+        *,
+        fresh: bool = False,
     ) -> dict[str, RunStanding]:
         """How the scripts do there, by path."""
         from coursebuild.effects.runner import ScriptServer
@@ -155,7 +160,7 @@ class _Work(Struct):
             runs = run(scripts, options, self.progress, stage, memory, server.run)
         return run_standings(self.course, self.here, runs)
 
-    def _models(self, place: Place) -> tuple[ModelLine, ...]:
+    def _models(self, place: OtherEnvironment) -> tuple[ModelLine, ...]:
         """Of each model and MJCF block that compiles here, whether it does there."""
         from coursebuild.effects import mjcf
 

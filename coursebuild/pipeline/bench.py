@@ -27,7 +27,7 @@ from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import (
     BENCH,
-    Failure,
+    ReportFailure,
     bench_path,
     decode_bench,
     encode_bench,
@@ -35,7 +35,7 @@ from coursebuild.numerics.reports.records import (
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.reports import command, read_record, recorded_models, write_record
 from coursebuild.pipeline.scene_run import Measuring, SceneRun
-from coursebuild.pipeline.scenes import Scene, Scenes, find_scenes
+from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
 
 
 class Benched(Struct, frozen=True):
@@ -46,7 +46,7 @@ class Benched(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
     """Of models and what is declared for them."""
     checked: tuple[Checked, ...] = ()
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[ReportFailure, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
@@ -100,12 +100,12 @@ def record(
     """
     _whole("--record", quick=quick)
     found = _bench(options, names, measuring, quick=False, cards=True)
-    failures: list[Failure] = []
+    failures: list[ReportFailure] = []
     remarks: list[str] = []
     for scene in found.scenes:
         path = bench_path(scene.model)
         said = write_record(options.root, path, encode_bench(scene))
-        if isinstance(said, Failure):
+        if isinstance(said, ReportFailure):
             failures.append(said)
         else:
             remarks.append(said)
@@ -130,7 +130,7 @@ def check(
     """
     _whole("--check", quick=quick)
     found = find_scenes(options.root, names)
-    failures: list[Failure] = []
+    failures: list[ReportFailure] = []
     recorded: dict[str, SceneReport] = {}
     for scene in found.scenes:
         report, failure = _recorded(options, scene.name)
@@ -156,19 +156,19 @@ def _whole(option: str, *, quick: bool) -> None:
         raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
 
 
-def _bands(scene: Scene) -> Bands:
+def _bands(scene: CourseScene) -> Bands:
     return Bands() if scene.declared is None else scene.declared.bands
 
 
-def _recorded(options: Options, model: str) -> tuple[SceneReport | None, Failure | None]:
+def _recorded(options: Options, model: str) -> tuple[SceneReport | None, ReportFailure | None]:
     path, make = bench_path(model), command("bench", (model,), "--record")
     found, failure = read_record(options.root, path, decode_bench, make)
     if found is not None and found.model != model:
         why = f"{path} holds a report of the model `{found.model}`"
-        return None, Failure(why, f"make it again with `{make}`")
+        return None, ReportFailure(why, f"make it again with `{make}`")
     if found is not None and found.quick:
         why = f"{path} holds a report of `{BENCH} --quick`, which measures only a part"
-        return None, Failure(why, f"make it again with `{make}`")
+        return None, ReportFailure(why, f"make it again with `{make}`")
     return found, failure
 
 

@@ -29,12 +29,12 @@ from coursebuild.effects.locks import project_lock
 from coursebuild.effects.machine import machine
 from coursebuild.effects.read import read_course
 from coursebuild.numerics.reports.diet import DietReport
-from coursebuild.numerics.reports.records import Failure, diet_path, encode_diet
+from coursebuild.numerics.reports.records import ReportFailure, diet_path, encode_diet
 from coursebuild.pipeline.diet_model import CannotError, DietModel
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reports import write_record
-from coursebuild.pipeline.scenes import Scene, find_scenes
+from coursebuild.pipeline.scenes import CourseScene, find_scenes
 
 if TYPE_CHECKING:
     from coursebuild.numerics.pruning.ablation import Survey
@@ -62,7 +62,7 @@ class Dieted(Struct, frozen=True):
     reports: tuple[DietReport, ...]
     """By name."""
     diagnostics: tuple[Diagnostic, ...]
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[ReportFailure, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
@@ -97,11 +97,11 @@ def record(options: Options, names: tuple[str, ...] = (), *, quick: bool = False
     if quick:
         raise UsageError("--record takes no --quick: what is recorded is measured in full")
     found = diet(options, names)
-    failures: list[Failure] = []
+    failures: list[ReportFailure] = []
     remarks: list[str] = []
     for report in found.reports:
         said = write_record(options.root, diet_path(report.model), encode_diet(report))
-        if isinstance(said, Failure):
+        if isinstance(said, ReportFailure):
             failures.append(said)
         else:
             remarks.append(said)
@@ -130,12 +130,12 @@ class _Run:
         self.root = options.root
         self.quick = quick
         self.diagnostics: list[Diagnostic] = []
-        self.failures: list[Failure] = []
+        self.failures: list[ReportFailure] = []
         self.fixed: list[Fixed] = []
         self.progress = Progress(quiet=options.quiet)
         options.store.listen(self.progress.say)
 
-    def all(self, scenes: Sequence[Scene], *, fix: bool = False) -> tuple[DietReport, ...]:
+    def all(self, scenes: Sequence[CourseScene], *, fix: bool = False) -> tuple[DietReport, ...]:
         """Every model that can be looked at."""
         if not scenes:
             return ()
@@ -150,7 +150,7 @@ class _Run:
                     reports.append(report)
         return tuple(reports)
 
-    def _one(self, scene: Scene, fix: bool) -> DietReport | None:
+    def _one(self, scene: CourseScene, fix: bool) -> DietReport | None:
         look = DietModel(self.root, self.files, scene)
         key = self._key(look)
         kept = self._kept(key, fix)
@@ -208,7 +208,7 @@ class _Run:
         try:
             look.write()
         except EffectError as error:
-            self.failures.append(Failure(error.message, error.help))
+            self.failures.append(ReportFailure(error.message, error.help))
             return None
         for path in sorted(look.changed):
             self.fixed.append(Fixed(path, tuple(dict.fromkeys(kinds.get(path, ())))))

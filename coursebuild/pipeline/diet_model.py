@@ -24,7 +24,7 @@ from coursebuild.effects.write import write_atomic
 from coursebuild.model import Declarations, MjcfModel
 from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
-from coursebuild.pipeline.scenes import Scene, scene_digest
+from coursebuild.pipeline.scenes import CourseScene, scene_digest
 from coursebuild.source import Source, Span
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class CannotError(Exception):
 class DietModel:
     """A model of the course, its files, and who reads it."""
 
-    def __init__(self, root: Path, files: CourseFiles, scene: Scene) -> None:
+    def __init__(self, root: Path, files: CourseFiles, scene: CourseScene) -> None:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
@@ -263,7 +263,7 @@ def _is_model(path: str) -> bool:
     return path.startswith("models/") and path.endswith(".xml")
 
 
-def _readers(root: Path, files: CourseFiles, scene: Scene) -> Readers:
+def _readers(root: Path, files: CourseFiles, scene: CourseScene) -> Readers:
     """The files of the course that use a model, and what is to be measured on it."""
     from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
 

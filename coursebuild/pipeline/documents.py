@@ -36,7 +36,7 @@ from coursebuild.source import Source
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
-    from coursebuild.pipeline.reading import Reader
+    from coursebuild.pipeline.reading import PageReader
     from coursebuild.render.record import PageRecord
 
 Value = TypeVar("Value")
@@ -84,7 +84,7 @@ class Documents:
         self._fingerprint: tuple[Course, str | None] | None = None
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
-        self._reader: Reader | None = None
+        self._reader: PageReader | None = None
         self._workers: Workers[Request, Answer] | None = None
 
     def __enter__(self) -> Self:
@@ -255,10 +255,10 @@ class Documents:
             self._workers = None
             self._readers.clear()
 
-    def _here(self) -> Reader:
+    def _here(self) -> PageReader:
         """What reads and draws in this process."""
         if self._reader is None:
-            from coursebuild.pipeline.reading import Reader
+            from coursebuild.pipeline.reading import PageReader
 
-            self._reader = Reader(self._store, warm=self._warm)
+            self._reader = PageReader(self._store, warm=self._warm)
         return self._reader

@@ -46,7 +46,7 @@ from coursebuild.scripts.dependencies import (
     state_changes,
 )
 from coursebuild.scripts.extract import extract, jobs
-from coursebuild.scripts.remembered import Record
+from coursebuild.scripts.remembered import BindingRecord
 
 
 def explain(options: Options, name: str) -> Explanation:
@@ -164,11 +164,11 @@ class _Explainer:
         reasons = [] if holds else self._reasons(last, inputs)
         return _explained("lab", name, owner, last, tuple(reasons))
 
-    def _lab_holds(self, last: Record, inputs: Inputs) -> bool:
+    def _lab_holds(self, last: BindingRecord, inputs: Inputs) -> bool:
         same = not last.forgotten and last.inputs == inputs
         return same and not list(state_changes(last.dependencies, self.memory.states))
 
-    def _reasons(self, last: Record | None, inputs: Inputs) -> list[str]:
+    def _reasons(self, last: BindingRecord | None, inputs: Inputs) -> list[str]:
         if last is None:
             return ["there is no result of it on this machine"]
         found = input_changes(last.inputs, inputs)
@@ -190,7 +190,7 @@ class _Explainer:
                 found.append(self._lab(name))
         return tuple(found)
 
-    def _depends(self, last: Record | None, path: str) -> bool:
+    def _depends(self, last: BindingRecord | None, path: str) -> bool:
         folder = path.rpartition("/")[0]
         return last is not None and any(
             (d.kind is Kind.FILE and d.name == path)
@@ -245,7 +245,7 @@ def _explained(
     kind: Literal["script", "lab"],
     name: str,
     owner: str,
-    record: Record | None,
+    record: BindingRecord | None,
     reasons: tuple[str, ...],
 ) -> Explained:
     state: State = "would run" if reasons else "remembered"

@@ -29,7 +29,7 @@ from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.scene import SceneError, scenes
-from coursebuild.pipeline.scenes import Scene
+from coursebuild.pipeline.scenes import CourseScene
 
 _STEPS = 5000
 """Of a run in the browser's engine, at most."""
@@ -40,16 +40,16 @@ _SECONDS = 20.0
 _CODE = "({controls: [], readouts: [], plots: [], expect: []})"
 
 
-class Loaded(Struct, frozen=True):
+class CompiledScene(Struct, frozen=True):
     """A scene, compiled in this process."""
 
-    scene: Scene
+    scene: CourseScene
     model: Any
     """An `mjModel`."""
     scenarios: tuple[PhysicsScene, ...]
 
 
-def scenarios_of(root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene | Diagnostic:
     """Compile a scene, and work out its scenarios; or why they cannot be."""
     source = scene.model.source
     path = str(root / source.path)
@@ -61,11 +61,11 @@ def scenarios_of(root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnosti
         return _told(scene, error)
     except mujoco.FatalError as error:
         return _refused(scene, error)
-    return Loaded(scene, model, found)
+    return CompiledScene(scene, model, found)
 
 
 def measured(
-    loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+    loaded: CompiledScene, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
 ) -> ScenarioReport | Diagnostic:
     """Measure a scenario, by its number; or why it cannot be."""
     try:
@@ -83,20 +83,20 @@ def measured(
         return _refused(loaded.scene, error)
 
 
-def _told(scene: Scene, error: SceneError) -> Diagnostic:
+def _told(scene: CourseScene, error: SceneError) -> Diagnostic:
     place = error.span
     if place is None:
         place = scene.model.source.span(0, 0) if scene.declared is None else _beside(scene)
     return diagnose("scenario-model", place, error.message, help=error.help)
 
 
-def _refused(scene: Scene, error: Exception) -> Diagnostic:
+def _refused(scene: CourseScene, error: Exception) -> Diagnostic:
     """Such as a model that asks for less memory than it needs."""
     said = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
     return diagnose("model-error", scene.model.source.span(0, 0), said)
 
 
-def _beside(scene: Scene) -> Any:
+def _beside(scene: CourseScene) -> Any:
     assert scene.declared is not None
     return scene.declared.source.span(0, 0)
 
@@ -105,7 +105,7 @@ def _beside(scene: Scene) -> Any:
 
 
 def with_card(
-    root: Path, scene: Scene, report: SceneReport, seconds: float = _SECONDS
+    root: Path, scene: CourseScene, report: SceneReport, seconds: float = _SECONDS
 ) -> SceneReport:
     """The report with the model's card; a run in the browser's engine may take so many `seconds`.
 
@@ -135,7 +135,7 @@ def with_card(
     return replace(report, card=card)
 
 
-def _browser(root: Path, scene: Scene, scenario: Scenario, seconds: float) -> float | None:
+def _browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
     """Simulated time over the time it takes in WebAssembly; `None` where no run came to an end."""
     from coursebuild.effects.lab_engine import LabEngine
     from coursebuild.effects.native import NativeEngine, NativeError

@@ -37,7 +37,7 @@ from coursebuild.render.links import has
 from coursebuild.render.own_pages import own_pages
 from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.render.record import PageRecord
-from coursebuild.render.search.files import Entry
+from coursebuild.render.search.files import IndexEntry
 from coursebuild.render.shared import PageFacts
 from coursebuild.results import CachedFile
 from coursebuild.source import key_of
@@ -63,7 +63,7 @@ class _Wanted(Struct, frozen=True):
 class _Page(Struct, frozen=True):
     wanted: _Wanted
     indexed: bool
-    entry: Entry | None
+    entry: IndexEntry | None
     """Where it is searched."""
     ids: tuple[str, ...]
     """Its anchors."""
@@ -111,7 +111,7 @@ class Pages:
         return (page.wanted.path for page in self._pages if page.indexed)
 
     @property
-    def searched(self) -> tuple[Entry, ...]:
+    def searched(self) -> tuple[IndexEntry, ...]:
         """The pages that are searched, in order."""
         entries = (page.entry for page in self._pages)
         return tuple(entry for entry in entries if entry is not None)
@@ -267,7 +267,7 @@ class Pages:
         self._facts.add(record)
         entry, draft = None, record.draft
         if record.search is not None:
-            entry = Entry(draft.path, draft.kind, draft.title, *record.search)
+            entry = IndexEntry(draft.path, draft.kind, draft.title, *record.search)
         return _Page(page, draft.indexed, entry, record.ids)
 
     def _known(self, key: str) -> PageRecord | None:

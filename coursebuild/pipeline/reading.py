@@ -1,6 +1,6 @@
 """Documents read and pages drawn, one request at a time, here or in a copy of this process.
 
-Entry point: `Reader`, whose `answer` takes a `Task` or a `Draw`.
+Entry point: `PageReader`, whose `answer` takes a `Task` or a `Draw`.
 
 1. `Task`: the text is parsed and its formulas are typeset; the summary is kept in the store.
 2. `Draw`: a page is drawn from its inputs and its document; body and record are kept in the store.
@@ -112,7 +112,7 @@ def prepare_to_read(sample: Task) -> None:
         start()
 
 
-class Reader:
+class PageReader:
     """Reads and draws; a context manager, since formulas are typeset by an engine."""
 
     def __init__(self, store: Memo, *, warm: bool = False) -> None:

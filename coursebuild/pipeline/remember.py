@@ -26,7 +26,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.effects.conditions import conditions, places
 from coursebuild.effects.digests import Clock, Digests, changed_since
 from coursebuild.effects.packages import Installed
-from coursebuild.effects.surroundings import Place
+from coursebuild.effects.surroundings import OtherEnvironment
 from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.scripts.dependencies import (
     Dependency,
@@ -44,7 +44,7 @@ from coursebuild.scripts.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.scripts.remembered import REMEMBERED, Record, from_bytes, to_bytes
+from coursebuild.scripts.remembered import REMEMBERED, BindingRecord, from_bytes, to_bytes
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
@@ -68,7 +68,7 @@ class LabTrial(Struct, frozen=True):
 class States:
     """How things are now, each looked at when it is first asked for and not again."""
 
-    def __init__(self, root: Path, store: Memo, place: Place | None = None) -> None:
+    def __init__(self, root: Path, store: Memo, place: OtherEnvironment | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, None if place is None else place.prefix)
@@ -123,7 +123,7 @@ class Memory:
     """
 
     def __init__(
-        self, root: Path, store: Memo, *, fresh: bool = False, place: Place | None = None
+        self, root: Path, store: Memo, *, fresh: bool = False, place: OtherEnvironment | None = None
     ) -> None:
         self.elsewhere = place is not None
         self.store = store
@@ -160,7 +160,7 @@ class Memory:
         self.states.save()
         return found
 
-    def remembered(self, inputs: Inputs) -> Record | None:
+    def remembered(self, inputs: Inputs) -> BindingRecord | None:
         """The result kept on this machine that holds now."""
         group = group_key(inputs)
         for key in self.store.group(_RESULTS, group):
@@ -170,13 +170,13 @@ class Memory:
                 return record
         return None
 
-    def results(self, inputs: Inputs) -> list[Record]:
+    def results(self, inputs: Inputs) -> list[BindingRecord]:
         """All results kept on this machine for these inputs, newest first."""
         keys = self.store.group(_RESULTS, group_key(inputs))
         records = (self._read(self.store.peek(_RESULTS, key), inputs) for key in keys)
         return [record for record in records if record is not None]
 
-    def last(self, path: str) -> Record | None:
+    def last(self, path: str) -> BindingRecord | None:
         """What became of the last run of a script, without what it printed."""
         data = self.store.peek(_LAST, _last_key(path))
         record = None if data is None else from_bytes(data.partition(b"\n")[2])
@@ -185,7 +185,7 @@ class Memory:
     def note_lab(self, inputs: Inputs, files: Iterable[str], trial: LabTrial) -> None:
         """Note what a lab's trial depends on; `files` are those of its model."""
         needed = [Need(Kind.FILE, path) for path in sorted(files)]
-        record = Record(
+        record = BindingRecord(
             inputs,
             tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed),
             Outcome.OK if trial.ok else Outcome.FAILED,
@@ -213,7 +213,7 @@ class Memory:
             needed = folded(needed, self.states.now)
             dependencies = tuple(Dependency(n.kind, n.name, self.states.now(n)) for n in needed)
             why = why or self._disturbed(inputs, needed)
-        record = Record(
+        record = BindingRecord(
             inputs,
             dependencies,
             run.outcome,
@@ -260,10 +260,10 @@ class Memory:
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
-    def _holds(self, record: Record) -> bool:
+    def _holds(self, record: BindingRecord) -> bool:
         return not any(True for _ in state_changes(record.dependencies, self.states))
 
-    def _read(self, data: bytes | None, inputs: Inputs) -> Record | None:
+    def _read(self, data: bytes | None, inputs: Inputs) -> BindingRecord | None:
         """The record of an entry, if it is one of these inputs."""
         if data is None:
             return None
@@ -276,7 +276,7 @@ class Memory:
         )
         return record if fits else None
 
-    def _fetch(self, wanted: Sequence[Inputs]) -> list[Record]:
+    def _fetch(self, wanted: Sequence[Inputs]) -> list[BindingRecord]:
         """Results that hold from the shared cache."""
         if self.store.shared is None or not wanted:
             return []
@@ -287,7 +287,7 @@ class Memory:
             keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
             return [(key, self.store.get(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
 
-        found: list[Record] = []
+        found: list[BindingRecord] = []
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
@@ -300,7 +300,7 @@ class Memory:
                         break
         return found
 
-    def _note(self, record: Record, result: str = "") -> None:
+    def _note(self, record: BindingRecord, result: str = "") -> None:
         """Note under the script's path what is known of its last run.
 
         `result` is the key of the result, where it is remembered.
@@ -312,7 +312,7 @@ class Memory:
         before = self.store.peek(_LAST, key)
         if result and before is not None and before.startswith(head):
             return
-        bare = Record(
+        bare = BindingRecord(
             record.inputs,
             record.dependencies,
             record.outcome,
@@ -325,7 +325,7 @@ class Memory:
         if before != data:
             self.store.put(_LAST, key, data, local=True)
 
-    def _compare(self, record: Record, run: ScriptRun) -> None:
+    def _compare(self, record: BindingRecord, run: ScriptRun) -> None:
         """Hold a run made afresh against what is remembered for the same dependencies."""
         for before in self.results(record.inputs):
             if before.dependencies == record.dependencies:

@@ -13,7 +13,7 @@ from typing import TypeVar
 from coursebuild.effects.errors import EffectError, reason
 from coursebuild.effects.read import read_bytes
 from coursebuild.effects.write import resolve_inside, write_atomic
-from coursebuild.numerics.reports.records import FOLDER, Failure, RecordError
+from coursebuild.numerics.reports.records import FOLDER, RecordError, ReportFailure
 
 _T = TypeVar("_T")
 _SUFFIX = ".bench.json"
@@ -26,19 +26,19 @@ def command(name: str, names: Sequence[str], option: str) -> str:
 
 def read_record(
     root: Path, path: str, decode: Callable[[bytes], _T], make: str
-) -> tuple[_T, None] | tuple[None, Failure]:
+) -> tuple[_T, None] | tuple[None, ReportFailure]:
     """A recorded report, or why there is none; `make` is the command that makes it."""
     if not (root / path).exists() and not (root / path).is_symlink():
-        return None, Failure(f"{path} is not there", f"make it with `{make}`, and commit it")
+        return None, ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")
     try:
         return decode(read_bytes(root, path)), None
     except EffectError as error:
-        return None, Failure(error.message, error.help)
+        return None, ReportFailure(error.message, error.help)
     except RecordError as error:
-        return None, Failure(f"{path} {error.message}", f"make it again with `{make}`")
+        return None, ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
 
 
-def write_record(root: Path, path: str, data: bytes) -> str | Failure:
+def write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
     """Write a report; what was done in words, or why it cannot be done."""
     try:
         target = resolve_inside(root, path)
@@ -48,9 +48,9 @@ def write_record(root: Path, path: str, data: bytes) -> str | Failure:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(root, path, data, expected=before)
     except EffectError as error:
-        return Failure(error.message, error.help)
+        return ReportFailure(error.message, error.help)
     except OSError as error:
-        return Failure(f"{path} cannot be written: {reason(error)}")
+        return ReportFailure(f"{path} cannot be written: {reason(error)}")
     return f"wrote {path}"
 
 

@@ -18,10 +18,10 @@ from coursebuild.effects.machine import machine
 from coursebuild.numerics.reports.bench import Machine, ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.scenes import Scene
+from coursebuild.pipeline.scenes import CourseScene
 
 if TYPE_CHECKING:
-    from coursebuild.pipeline.measuring import Loaded
+    from coursebuild.pipeline.measuring import CompiledScene
 
 _SCENE, _SCENARIO = "bench", "bench-scenarios"
 """Kinds of what is kept."""
@@ -34,11 +34,19 @@ _LOCK = "bench-lock"
 class Measuring(Protocol):
     """What measures: `pipeline.measuring`."""
 
-    def scenarios_of(self, root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+    def scenarios_of(
+        self, root: Path, scene: CourseScene, *, quick: bool
+    ) -> CompiledScene | Diagnostic:
         """The scenarios of a scene, ready to run, or why they cannot be."""
 
     def measured(
-        self, loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+        self,
+        loaded: CompiledScene,
+        number: int,
+        *,
+        quick: bool,
+        timed: bool,
+        tell: Callable[[str], None],
     ) -> ScenarioReport | Diagnostic:
         """What was measured in one of them, or why nothing can be."""
 
@@ -66,7 +74,7 @@ class SceneRun:
         self._measuring = measuring
         options.store.listen(self.progress.say)
 
-    def all(self, scenes: Sequence[Scene]) -> tuple[SceneReport, ...]:
+    def all(self, scenes: Sequence[CourseScene]) -> tuple[SceneReport, ...]:
         """Every scene that can be measured."""
         if not scenes:
             return ()
@@ -79,7 +87,7 @@ class SceneRun:
                     reports.append(report)
         return tuple(reports)
 
-    def _one(self, scene: Scene, here: Machine, code: str) -> SceneReport | None:
+    def _one(self, scene: CourseScene, here: Machine, code: str) -> SceneReport | None:
         parts = (scene.name, scene.digest, f"{self.quick}", code, *_named(here))
         kept = self._kept(_SCENE, parts, SceneReport)
         if kept is not None and (kept.card is not None or not self.cards or not kept.scenarios):
@@ -93,7 +101,9 @@ class SceneRun:
             self.progress.finished(scene.name, verdict, time.monotonic() - began)
             return report
 
-    def _report(self, scene: Scene, here: Machine, parts: tuple[str, ...]) -> SceneReport | None:
+    def _report(
+        self, scene: CourseScene, here: Machine, parts: tuple[str, ...]
+    ) -> SceneReport | None:
         kept = self._kept(_SCENE, parts, SceneReport)  # by whom we waited for, perhaps
         if kept is None:
             found = self._scenarios(scene, parts)
@@ -109,7 +119,9 @@ class SceneRun:
             self._keep(_SCENE, parts, kept)
         return kept
 
-    def _scenarios(self, scene: Scene, parts: tuple[str, ...]) -> tuple[ScenarioReport, ...] | None:
+    def _scenarios(
+        self, scene: CourseScene, parts: tuple[str, ...]
+    ) -> tuple[ScenarioReport, ...] | None:
         """Each scenario, from what is kept or measured now; nothing where one cannot be."""
         loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
         if isinstance(loaded, Diagnostic):

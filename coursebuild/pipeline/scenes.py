@@ -32,7 +32,7 @@ from coursebuild.syntax.scenarios import parse_declarations
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
-class Scene(Struct, frozen=True):
+class CourseScene(Struct, frozen=True):
     """A model that can be measured."""
 
     model: MjcfModel
@@ -51,7 +51,7 @@ class Scene(Struct, frozen=True):
 class Scenes(Struct, frozen=True):
     """What was found."""
 
-    scenes: tuple[Scene, ...]
+    scenes: tuple[CourseScene, ...]
     """By name."""
     diagnostics: tuple[Diagnostic, ...]
     names: tuple[str, ...]
@@ -72,7 +72,7 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
     chosen = _named(names, models) if names else _whole(root, list(models.values()))
     declared, found = _declared(read.value, chosen, every=not names)
     found += [d for d in read.diagnostics if d.span.path.startswith("models/")]
-    scenes: list[Scene] = []
+    scenes: list[CourseScene] = []
     results = compile_models(root, chosen) if chosen else ()
     for model, result in zip(chosen, results, strict=True):
         if result.facts is None:
@@ -86,7 +86,7 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
                 continue
         elif model.name in declared:
             continue  # what is beside it cannot be read, and was told
-        scenes.append(Scene(model, says, result.facts, scene_digest(root, model, says)))
+        scenes.append(CourseScene(model, says, result.facts, scene_digest(root, model, says)))
     return Scenes(tuple(scenes), sort_diagnostics(found), tuple(sorted(models)))
 
 

@@ -30,7 +30,7 @@ from coursebuild.effects.resources import Bundle, template_texts
 from coursebuild.model import Course
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.kept import kept_font
+from coursebuild.pipeline.memoized import kept_font
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import Pages
 from coursebuild.pipeline.tasks import all_imports

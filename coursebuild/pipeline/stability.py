@@ -25,7 +25,7 @@ from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import (
     STABILITY_PATH,
-    Failure,
+    ReportFailure,
     decode_stability,
     encode_stability,
 )
@@ -102,7 +102,7 @@ class Cases(Struct, frozen=True):
     cases: tuple[CaseReport, ...]
     """Those that were measured."""
     checked: tuple[Checked, ...] = ()
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[ReportFailure, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
@@ -129,7 +129,7 @@ def record_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
         new = {case.name for case in measured}
         others = [case for case in found or () if case.name in known - new]
     said = write_record(options.root, STABILITY_PATH, encode_stability([*others, *measured]))
-    if isinstance(said, Failure):
+    if isinstance(said, ReportFailure):
         return Cases(measured, failures=(said,))
     return Cases(measured, remarks=(said,))
 
@@ -155,6 +155,6 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
     return Cases(measured, (Checked("stability", STABILITY_PATH, departures, remarks),))
 
 
-def _recorded(options: Options) -> tuple[tuple[CaseReport, ...] | None, Failure | None]:
+def _recorded(options: Options) -> tuple[tuple[CaseReport, ...] | None, ReportFailure | None]:
     make = command("stability", (), "--record")
     return read_record(options.root, STABILITY_PATH, decode_stability, make)

@@ -27,7 +27,7 @@ from coursebuild.effects.examples import Blocked, Obstacle, write_examples
 from coursebuild.effects.versions import engine_version, python_version
 from coursebuild.effects.write import remove_leftovers
 from coursebuild.model import Course, FeatureBlock, Lab, document_blocks, document_has
-from coursebuild.pipeline.kept import KeptBindings
+from coursebuild.pipeline.memoized import KeptBindings
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory, longest_first

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from coursebuild.preview.session import MOST, Session
-from coursebuild.preview.watcher import Watcher
+from coursebuild.preview.watcher import FolderWatcher
 
 QUIET = 0.008
 """Seconds without an event after which a save is complete."""
@@ -28,7 +28,7 @@ LONGEST = 0.250
 
 
 def follow(
-    session: Session, watcher: Watcher, said: Callable[[frozenset[str], float], None]
+    session: Session, watcher: FolderWatcher, said: Callable[[frozenset[str], float], None]
 ) -> None:
     """Take saves until the watcher is stopped.
 
@@ -52,7 +52,7 @@ def follow(
             said(paths, time.monotonic() - began)
 
 
-def _complete(root: Path, watcher: Watcher, paths: frozenset[str]) -> frozenset[str]:
+def _complete(root: Path, watcher: FolderWatcher, paths: frozenset[str]) -> frozenset[str]:
     """All paths of a save, once nothing more happens."""
     began = now = time.monotonic()
     while True:

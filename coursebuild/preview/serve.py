@@ -23,7 +23,7 @@ from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.saves import follow
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
-from coursebuild.preview.watcher import Watcher
+from coursebuild.preview.watcher import FolderWatcher
 from coursebuild.render.assets import page_script
 
 _GARBAGE = 200_000
@@ -46,7 +46,7 @@ def serve(options: Options, port: int) -> None:
         server = PreviewServer(port, session, files)
     except OSError as error:
         raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
-    watcher = Watcher(options.root)
+    watcher = FolderWatcher(options.root)
     sys.setswitchinterval(_SWITCH)
     try:
         print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
@@ -67,7 +67,11 @@ def serve(options: Options, port: int) -> None:
 
 
 def _work(
-    session: Session, watcher: Watcher, rebuild: BackgroundRebuild, progress: Progress, url: str
+    session: Session,
+    watcher: FolderWatcher,
+    rebuild: BackgroundRebuild,
+    progress: Progress,
+    url: str,
 ) -> None:
     """Follow a course that was read; ends by an exception only."""
     progress.say(f"ready: {url}")

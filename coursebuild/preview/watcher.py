@@ -1,6 +1,7 @@
 """Waiting for the author to save: changes of the course's files, as `watchfiles` tells of them.
 
-Entry point: `Watcher`. What reading a course leaves out (caches, editors' own files) is no change.
+Entry point: `FolderWatcher`. What reading a course leaves out (caches, editors' own files) is no
+change.
 
 The folders of the course are watched with all that is in them. Pages may lie elsewhere
 (`docs/guide.md`, `README.md`): of their folders only these files count. Folders that are made later
@@ -26,7 +27,7 @@ _STEP = 2
 """Milliseconds from one look for events to the next: a save is told of within two of them."""
 
 
-class Watcher:
+class FolderWatcher:
     """Tells of saves, also of those while the caller does something else."""
 
     def __init__(self, root: Path) -> None:

@@ -26,12 +26,12 @@ from coursebuild.render.context import PageContext
 from coursebuild.render.plainly import without_links
 
 
-class Entry(Struct, frozen=True):
+class ContentsEntry(Struct, frozen=True):
     """An entry of the contents list."""
 
     anchor: str
     title: Markup
-    children: tuple[Entry, ...] = ()
+    children: tuple[ContentsEntry, ...] = ()
 
 
 def article(page: PageContext, document: Document) -> Markup:
@@ -98,16 +98,16 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
     return (*groups, _Group(rest)) if rest else tuple(groups)
 
 
-def contents(page: PageContext, document: Document) -> tuple[Entry, ...]:
+def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]:
     """The contents list: headings of levels 2 and 3, the latter under the former."""
-    entries: list[Entry] = []
+    entries: list[ContentsEntry] = []
     for block in document.blocks:
         if not isinstance(block, Heading) or block.level > 3:
             continue
-        entry = Entry(block.anchor, page.inlines(without_links(block.children)))
+        entry = ContentsEntry(block.anchor, page.inlines(without_links(block.children)))
         if block.level == 3 and entries:
             last = entries[-1]
-            entries[-1] = Entry(last.anchor, last.title, (*last.children, entry))
+            entries[-1] = ContentsEntry(last.anchor, last.title, (*last.children, entry))
         else:
             entries.append(entry)
     return tuple(entries)

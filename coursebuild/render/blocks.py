@@ -119,7 +119,7 @@ def binding(page: PageContext, node: NumberBinding) -> Markup:
 # --- outputs
 
 
-class Output(Struct, frozen=True):
+class ShownOutput(Struct, frozen=True):
     """A recorded output, ready for its template."""
 
     caption: Markup
@@ -132,8 +132,8 @@ class Output(Struct, frozen=True):
     receipt: Receipt
 
 
-def _output(page: PageContext, block: Recording) -> Output:
-    return Output(
+def _output(page: PageContext, block: Recording) -> ShownOutput:
+    return ShownOutput(
         caption=page.inlines(block.caption),
         path=block.script or "",
         anchor=output_anchor(block.script, page.outputs[block.span.start]) if block.script else "",

@@ -40,7 +40,7 @@ from coursebuild.render.direction import direction
 from coursebuild.render.equations import NumberedFormula, numbered
 from coursebuild.render.library import Library
 from coursebuild.render.look import Look, OwnBlock, Words
-from coursebuild.render.page_inputs import Shown
+from coursebuild.render.page_inputs import ShownDocument
 from coursebuild.render.shown import file_address, shown
 from coursebuild.render.strings import Strings
 from coursebuild.render.tools import Tools
@@ -50,7 +50,7 @@ class PageContext(Struct, frozen=True):
     """One document on one page."""
 
     tools: Tools
-    shown: Shown
+    shown: ShownDocument
     place: urls.Place
     document: Document
     joined: Mapping[int, tuple[Recording, ...]]
@@ -68,7 +68,9 @@ class PageContext(Struct, frozen=True):
         return cls.made(library.tools, shown(library, place, document), place, document)
 
     @classmethod
-    def made(cls, tools: Tools, shown: Shown, place: urls.Place, document: Document) -> PageContext:
+    def made(
+        cls, tools: Tools, shown: ShownDocument, place: urls.Place, document: Document
+    ) -> PageContext:
         """The context, once it is known what the page shows of the course."""
         look = Look(words=_markup_words(tools.words), quantities=direction(tools.words.language))
         joined, outputs = dict(_joined(document)), _numbers(document)

@@ -22,7 +22,7 @@ _THIN = "\u2009"
 """A thin space; tables and numbers are kept in one line by the style sheet."""
 
 
-class Part(Struct, frozen=True):
+class FigurePart(Struct, frozen=True):
     """Rows of a table under a title of their own."""
 
     title: str
@@ -43,11 +43,13 @@ class Grid(Struct, frozen=True):
     """Columns of words; numbers stand at the right."""
     marked: tuple[int, ...] = ()
     """Rows that stand out."""
-    parts: tuple[Part, ...] = ()
+    parts: tuple[FigurePart, ...] = ()
     """All rows in order; empty where they are not parted."""
 
     @property
-    def bodies(self) -> tuple[tuple[Part | None, tuple[tuple[int, tuple[str, ...]], ...]], ...]:
+    def bodies(
+        self,
+    ) -> tuple[tuple[FigurePart | None, tuple[tuple[int, tuple[str, ...]], ...]], ...]:
         """The rows with their numbers, by part."""
         numbered = tuple(enumerate(self.rows))
         if not self.parts:
@@ -65,7 +67,7 @@ def grid(
     *,
     words: tuple[str, ...] = (),
     marked: tuple[int, ...] = (),
-    parts: tuple[Part, ...] = (),
+    parts: tuple[FigurePart, ...] = (),
 ) -> Grid:
     """A table of columns, those without any text left out; `words` are titles of such of words."""
     shown = [(title, cells) for n, (title, cells) in enumerate(columns) if not n or any(cells)]

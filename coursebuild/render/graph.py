@@ -1,6 +1,6 @@
 """Which lessons build on which, as a small drawing: nodes are links, arrows lead on.
 
-Entry points: `around(library, place, lesson)`, the neighbourhood of a lesson; `of_level`, the
+Entry points: `neighbourhood(library, place, lesson)`, the lessons around one; `of_level`, the
 lessons of a level with what they need from elsewhere; `drawings(graph, words)`, two of each, for
 wide and for narrow screens.
 
@@ -56,7 +56,7 @@ _EDGE = 2.0
 """Room for the lines around nodes at the edge of a drawing."""
 
 
-def around(library: Library, place: urls.Place, lesson: Lesson) -> Graphed | None:
+def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> Graphed | None:
     """What a lesson needs and leads to, and what comes before that; `None` for next to nothing."""
     needs = _first(library, lesson.prerequisites)
     leads = [other.id for other in library.leads[lesson.id]][:_BESIDE]

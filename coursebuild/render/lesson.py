@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from coursebuild.model import Document, Lesson, Status
 from coursebuild.render import meta, urls
-from coursebuild.render.graph import around
+from coursebuild.render.graph import neighbourhood
 from coursebuild.render.library import Library, document_scripts
 from coursebuild.render.owners import owner_links
 from coursebuild.render.page_inputs import PageInputs
@@ -27,7 +27,7 @@ class LessonLink(Struct, frozen=True):
     summary: str
     needs: tuple[LessonLink, ...] = ()
     asked: str = ""
-    """Its questions, where a list names them; see `asked.asked`."""
+    """Its questions, where a list names them; see `quiz_index`."""
 
 
 class LessonHead(Struct, frozen=True):
@@ -118,7 +118,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "level_href": place.href(urls.level_path(level)),
         "needs": lesson_link(library, place, lesson, needs=True).needs,
         "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
-        "graph": around(library, place, lesson),
+        "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(library, place, library.references.referrers.get(lesson.id, ())),
         "previous": lesson_link(library, place, order[at - 1]) if at else None,
         "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,

@@ -33,11 +33,10 @@ from coursebuild.model import (
 from coursebuild.model import document_scripts as document_scripts
 from coursebuild.numerics.reports import Reports
 from coursebuild.patterns import pattern
-from coursebuild.render.asked import AskedBy
-from coursebuild.render.asked import asked as asked_in
 from coursebuild.render.assets import Assets, strings_for
 from coursebuild.render.lab_files import PublishedLabs, lab_files
 from coursebuild.render.lookup.references import CrossReferences, Mentions, mentions
+from coursebuild.render.quiz_index import QuizIndex, quiz_index
 from coursebuild.render.strings import Strings
 from coursebuild.render.templates import templates_of
 from coursebuild.render.tools import Tools
@@ -83,7 +82,7 @@ class Library(Struct, frozen=True):
     uses: Mapping[str, tuple[ModelUse, ...]]
     """Where a model is used, by its name, in the order of the course."""
     references: CrossReferences
-    asked: AskedBy
+    asked: QuizIndex
     """The questions of each document, as lists of lessons name them."""
     labs: PublishedLabs
     _formulas: Mapping[Formula, str | MathError]
@@ -112,7 +111,7 @@ class Library(Struct, frozen=True):
         questions: dict[str, str] = {}
 
         def said(document: Document) -> Mentions:
-            text = asked_in(document)  # while its blocks are at hand
+            text = quiz_index(document)  # while its blocks are at hand
             if text:
                 questions[document.source.path] = text
             return mentions(document, course, lexicon_of(document, formulas))

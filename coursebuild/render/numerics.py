@@ -14,8 +14,8 @@ from coursebuild.numerics.reports.points import FLOORS, KNOWN, seconds_text, sta
 from coursebuild.numerics.reports.records import STABILITY_PATH
 from coursebuild.render import urls
 from coursebuild.render.figures import (
+    FigurePart,
     Grid,
-    Part,
     about_reference,
     again,
     bounded,
@@ -165,7 +165,7 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
         return None
     names: list[str] = []
     cells: list[tuple[str, ...]] = []
-    parts: list[Part] = []
+    parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
         some, rows = _merged([(_figure(words, line), line.integrator) for line in lines])
@@ -173,7 +173,7 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
         cells += rows
         unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
         title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
-        parts.append(Part(title, "; ".join(sources), len(rows)))
+        parts.append(FigurePart(title, "; ".join(sources), len(rows)))
     columns = [(words("measured.integrator"), names)]
     for n, key in enumerate(_FIGURE):
         columns.append((words(key), [row[n] for row in cells]))

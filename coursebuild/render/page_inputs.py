@@ -87,7 +87,7 @@ class ShownCallout(Struct, frozen=True):
     promise: str
 
 
-class Shown(Struct, frozen=True):
+class ShownDocument(Struct, frozen=True):
     """What the page of a document shows of the rest of the course, and of what running it found.
 
     What stands at a place in the document goes by its offset there.
@@ -166,4 +166,4 @@ class PageInputs(Struct, frozen=True):
     indexed: bool = True
     document: str | None = None
     """The path of its document, whose text and contents the template gets as well."""
-    shown: Shown | None = None
+    shown: ShownDocument | None = None

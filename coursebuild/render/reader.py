@@ -12,11 +12,11 @@ from msgspec import Struct
 
 from coursebuild.model import Lesson
 from coursebuild.render import urls
-from coursebuild.render.asked import count
 from coursebuild.render.library import Library, owners
 from coursebuild.render.owners import owner_path
 from coursebuild.render.page_inputs import PageInputs
 from coursebuild.render.pages import level_view
+from coursebuild.render.quiz_index import count
 
 KEPT_AS = "coursebuild.progress."
 """What the name under which a browser keeps progress begins with; the course's key follows. As in
@@ -31,7 +31,7 @@ class Asking(Struct, frozen=True):
     title: str
     href: str
     asked: str
-    """See `asked.asked`."""
+    """See `quiz_index`."""
     questions: int
 
 

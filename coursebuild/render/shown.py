@@ -39,9 +39,9 @@ from coursebuild.render.lab_files import LabFiles
 from coursebuild.render.library import Library
 from coursebuild.render.lookup.references import owner_path
 from coursebuild.render.page_inputs import (
-    Shown,
     ShownBench,
     ShownCallout,
+    ShownDocument,
     ShownLab,
     ShownRecord,
     ShownRun,
@@ -50,7 +50,7 @@ from coursebuild.render.page_inputs import (
 from coursebuild.results import Outcome, ScriptRun
 
 
-def shown(library: Library, place: urls.Place, document: Document) -> Shown:
+def shown(library: Library, place: urls.Place, document: Document) -> ShownDocument:
     """All that the document's page shows besides what stands in the document.
 
     The summary of a document does as well as the document.
@@ -58,7 +58,7 @@ def shown(library: Library, place: urls.Place, document: Document) -> Shown:
     page = _Page(library, place, document)
     for block in document_blocks(document):
         page.note(block)
-    return Shown(
+    return ShownDocument(
         engine=library.results.engine,
         python=library.results.python,
         hrefs=page.hrefs,

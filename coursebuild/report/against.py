@@ -21,7 +21,7 @@ from coursebuild.report.terminal import (
     visible,
     visible_lines,
 )
-from coursebuild.report.text import place
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 from coursebuild.results import Change, DriftKind
 
@@ -134,7 +134,7 @@ def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
         lines.append(visible(f"  {span.path}:{span.line}: {message}{said}"))
     named = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in named[:_NAMED]:
-        lines.append(visible(f"  {place(change.span)}: {_change(change, who)}"))
+        lines.append(visible(f"  {location(change.span)}: {_change(change, who)}"))
     if len(named) > _NAMED:
         lines.append(f"  and {plural(len(named) - _NAMED, 'more difference')}")
     before = "--- recorded" if script.changes else "--- here"

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 
 from coursebuild.numerics.reports.bench import (
     Machine,
+    MeasuredSetting,
     OrderRow,
     ScenarioReport,
     SceneReport,
-    Setting,
     StableRow,
     WorkPrecisionRow,
 )
@@ -202,7 +202,7 @@ def _lost(report: ScenarioReport, style: Style) -> list[str]:
     return ["", *lines] if lines else []
 
 
-def _named(rows: Sequence[WorkPrecisionRow], usual: Setting | None) -> str:
+def _named(rows: Sequence[WorkPrecisionRow], usual: MeasuredSetting | None) -> str:
     """Settings in words, those of an integrator together."""
     together: dict[tuple[str, str], list[str]] = {}
     for row in rows:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from coursebuild.numerics.reports.bench import ScenarioReport, Setting, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.points import (
     FLOORS,
     quantities,
@@ -106,7 +106,7 @@ def _marks(row: WorkPrecisionRow) -> str:
     return (OWN if row.own else " ") + (FRONT if row.front else " ")
 
 
-def _with(row: WorkPrecisionRow, usual: Setting | None) -> str:
+def _with(row: WorkPrecisionRow, usual: MeasuredSetting | None) -> str:
     """Solver, iterations and cone where they are not those of the scene, in few words."""
     parts = solving_parts(row.setting, usual)
     return ", ".join(

@@ -13,7 +13,7 @@ from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.report.plain import json_text, plain
 from coursebuild.report.sensitivity import sensitivity_value
 from coursebuild.report.terminal import Style
-from coursebuild.report.text import diagnostic_text, place
+from coursebuild.report.text import diagnostic_text
 from coursebuild.report.values import LabLine, Report, ScriptLine
 from coursebuild.rules import RULES
 from coursebuild.source import Span
@@ -82,7 +82,7 @@ def _case(suite: Element, group: str, name: str, seconds: float) -> Element:
 
 def _outcome(case: Element, d: Diagnostic) -> None:
     if d.severity is Severity.ERROR:
-        message = _xml_text(f"{place(d.span)}: {d.message}")
+        message = _xml_text(f"{location(d.span)}: {d.message}")
         told = SubElement(case, "failure", type=d.rule, message=message)
     else:
         told = SubElement(case, "system-out")

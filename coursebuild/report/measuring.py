@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.numerics.reports.departures import Checked, Departure
-from coursebuild.numerics.reports.records import Failure
+from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report.plain import json_text
 from coursebuild.report.terminal import (
     BOLD,
@@ -31,7 +31,7 @@ def measured_text(
     style: Style,
     *,
     diagnostics: Sequence[Diagnostic] = (),
-    failures: Sequence[Failure] = (),
+    failures: Sequence[ReportFailure] = (),
     checked: Sequence[Checked] = (),
     remarks: Sequence[str] = (),
 ) -> str:
@@ -46,7 +46,7 @@ def measured_json(
     measured: Mapping[str, object],
     *,
     diagnostics: Sequence[Diagnostic] = (),
-    failures: Sequence[Failure] = (),
+    failures: Sequence[ReportFailure] = (),
     checked: Sequence[Checked] = (),
     remarks: Sequence[str] = (),
 ) -> str:
@@ -62,7 +62,7 @@ def measured_json(
     )
 
 
-def failure_text(failure: Failure, style: Style) -> str:
+def failure_text(failure: ReportFailure, style: Style) -> str:
     """What is wrong with a recorded report, and how to mend it."""
     text = f"{style.paint('error', RED)}{style.paint(f': {visible(failure.message)}', BOLD)}\n"
     return text + (f"  help: {visible(failure.help)}\n" if failure.help else "")

@@ -12,7 +12,7 @@ from typing import Any, assert_never
 from coursebuild.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.report.plain import plain
 from coursebuild.report.terminal import FAINT, GREEN, YELLOW, Style
-from coursebuild.report.text import place
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 
 _WHY = {
@@ -65,7 +65,7 @@ def _row(row: Doubt | Flip) -> str:
             what = _flip(row)
         case _:
             assert_never(row)
-    return f"{place(row.span)}  {what}" + ("" if row.compared else "  (allowed for)")
+    return f"{location(row.span)}  {what}" + ("" if row.compared else "  (allowed for)")
 
 
 def _flip(row: Flip) -> str:

@@ -78,7 +78,7 @@ def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
     bar = style.paint("|", BLUE)
     lines = [
         f"{head}{style.paint(': ' + visible(diagnostic.message), BOLD)}",
-        f"{pad[1:]}{style.paint('-->', BLUE)} {place(span)}",
+        f"{pad[1:]}{style.paint('-->', BLUE)} {location(span)}",
     ]
     if span.source.text:
         text, at, width = _frame(span, max(style.width - gutter - 3, 40))
@@ -90,14 +90,14 @@ def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
             f"{pad} {bar} {' ' * at}{marks}{label}",
         ]
     for note in diagnostic.notes:
-        where = f"{place(note.span)}: " if note.span is not None else ""
+        where = f"{location(note.span)}: " if note.span is not None else ""
         lines += _remark("note", where + note.message, pad, style)
     if diagnostic.help:
         lines += _remark("help", diagnostic.help, pad, style)
     return "\n".join(lines)
 
 
-def place(span: Span) -> str:
+def location(span: Span) -> str:
     """Where a span begins: `content/lessons/4.2-x.md:210:26`."""
     return f"{span.path}:{span.line}:{span.column}"
 

@@ -35,7 +35,7 @@ from coursebuild.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
-from coursebuild.syntax.wording import Words, accepts, named, quoted, type_help, wrong_type
+from coursebuild.syntax.wording import FormatWords, accepts, named, quoted, type_help, wrong_type
 
 S = TypeVar("S", bound=Struct)
 
@@ -55,7 +55,7 @@ class Decoding(Struct, Generic[S], frozen=True):
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
 
-def decode(node: Node, type: type[S], name: str, words: Words) -> Decoding[S]:
+def decode(node: Node, type: type[S], name: str, words: FormatWords) -> Decoding[S]:
     """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
     decoder = _Decoder(words)
     value = decoder.value(node, _type_info(type), name, {})
@@ -74,7 +74,7 @@ class _Decoder:
     `name` is what messages call the node, `remarks` is the `extra` of the type's `Meta`.
     """
 
-    def __init__(self, words: Words) -> None:
+    def __init__(self, words: FormatWords) -> None:
         self.words = words
         self.diagnostics: list[Diagnostic] = []
         self.structs: dict[ObjectNode, Struct] = {}

@@ -1,7 +1,7 @@
 """Footnotes: which are written, which are referred to, and their numbers.
 
-Entry point: `Notes`. Numbers follow the order of first reference; labels are the same without
-regard to case.
+Entry point: `FootnoteList`. Numbers follow the order of first reference; labels are the same
+without regard to case.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Written(Struct):
     """Reads its blocks; done once all else is read, in the order of the numbers."""
 
 
-class Notes(Struct):
+class FootnoteList(Struct):
     """The footnotes of a document while it is read."""
 
     report: Callable[[Diagnostic], None]

@@ -21,7 +21,7 @@ from coursebuild.model import HtmlFlow, Inline, Math, RawInline
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.math import find_formula
-from coursebuild.syntax.mention import Item, plain, with_mentions
+from coursebuild.syntax.mention import TextPiece, plain, with_mentions
 from coursebuild.syntax.targets import check_raw_scheme
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
@@ -162,7 +162,7 @@ class _Flow:
         self.literal: list[str] = []
         """Open elements in which there are no formulas."""
         self.links = 0
-        self.run: list[Item] = []
+        self.run: list[TextPiece] = []
 
     def read(self) -> Iterator[Inline]:
         at = 0
@@ -180,7 +180,7 @@ class _Flow:
             elif found[0] != "$" or self.literal:
                 at = found.end()
                 self.run.append(
-                    Item(found[0] if self.literal else "$", start, at, bool(self.literal))
+                    TextPiece(found[0] if self.literal else "$", start, at, bool(self.literal))
                 )
             else:
                 formula = find_formula(self.text, start, len(self.text))
@@ -200,7 +200,7 @@ class _Flow:
             decoded = unescape(entity[0])
             if decoded != entity[0]:
                 self._text(at, entity.start())
-                self.run.append(Item(decoded, entity.start(), entity.end(), False))
+                self.run.append(TextPiece(decoded, entity.start(), entity.end(), False))
                 at = entity.end()
         self._text(at, end)
 
@@ -211,9 +211,9 @@ class _Flow:
             line_end = self.text.find("\n", at, end)
             stop = end if line_end < 0 else line_end
             if stop > at:
-                self.run.append(Item(self.text[at:stop], at, stop))
+                self.run.append(TextPiece(self.text[at:stop], at, stop))
             if line_end >= 0:
-                self.run.append(Item("\n", stop, stop + 1))
+                self.run.append(TextPiece("\n", stop, stop + 1))
             at = stop + 1
 
     def _flush(self) -> list[Inline]:

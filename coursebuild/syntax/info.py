@@ -134,7 +134,7 @@ def _unescaped(value: Excerpt) -> Excerpt:
     return joined(value.slice(a, b) for a, b in zip(cuts[::2], cuts[1::2], strict=True)) or value
 
 
-class Keys(Struct, frozen=True):
+class FenceKeys(Struct, frozen=True):
     """The keys of a fence that its kind knows, each at most once."""
 
     words: tuple[Word, ...]
@@ -146,7 +146,7 @@ class Keys(Struct, frozen=True):
 
 def read_keys(
     kind: str, words: Sequence[Word], *, values: Sequence[str] = (), flags: Sequence[str] = ()
-) -> Parsed[Keys]:
+) -> Parsed[FenceKeys]:
     """Sort the words of a fence of ours: which keys take a value, which are flags."""
     known = [*values, *flags]
     kept: dict[str, Word] = {}
@@ -169,4 +169,4 @@ def read_keys(
             diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
         else:
             kept[key] = word
-    return Parsed(Keys(tuple(kept.values())), tuple(diagnostics))
+    return Parsed(FenceKeys(tuple(kept.values())), tuple(diagnostics))

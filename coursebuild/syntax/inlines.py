@@ -45,7 +45,7 @@ from coursebuild.syntax.block_parser import Definitions
 from coursebuild.syntax.headings import term_id
 from coursebuild.syntax.html import Balance, tags
 from coursebuild.syntax.markdown import definition_label, inline_tokens
-from coursebuild.syntax.mention import Item, may_mention, plain, with_mentions
+from coursebuild.syntax.mention import TextPiece, may_mention, plain, with_mentions
 from coursebuild.syntax.session import Session
 from coursebuild.syntax.spans import PositionedToken, locate
 from coursebuild.syntax.targets import check_scheme, classify
@@ -106,7 +106,7 @@ class _Pass:
         self.reader = reader
         self.content = content
         self.stack = [_Frame(None)]
-        self.run: list[Item] = []
+        self.run: list[TextPiece] = []
         self.texts: list[tuple[int, str]] = []
         self.links = 0 if mentions and may_mention(content.text) else 1
         """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
@@ -119,11 +119,11 @@ class _Pass:
                 text = token.content
                 if text:
                     literal = kind == "text" or text == token.markup
-                    self.run.append(Item(text, token.start, token.end, literal))
+                    self.run.append(TextPiece(text, token.start, token.end, literal))
                     if literal:
                         self.texts.append((token.start, text))
             elif kind == "softbreak":
-                self.run.append(Item("\n", token.start, token.end, False))
+                self.run.append(TextPiece("\n", token.start, token.end, False))
             elif kind == "math_unclosed":
                 self._unclosed_math(token)
             elif token.nesting == 1:
@@ -167,7 +167,7 @@ class _Pass:
         self.reader.report(
             diagnose("math-unclosed", span, "display math is never closed", help=help)
         )
-        self.run.append(Item(token.content, token.start, token.end))
+        self.run.append(TextPiece(token.content, token.start, token.end))
 
     # -- containers
 
@@ -350,7 +350,7 @@ class _Pass:
     def _footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
         reference = self.reader.notes.refer(token.content, span)
         if reference is None:
-            self.run.append(Item(f"[^{token.content}]", token.start, token.end))
+            self.run.append(TextPiece(f"[^{token.content}]", token.start, token.end))
         return reference
 
 

@@ -43,7 +43,7 @@ class Camera(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
 
-class Setting(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SettingFields(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What a slider and a select share: a value, and what becomes of it."""
 
     label: Annotated[Text, Meta(description="unique among the controls of the lab")]
@@ -63,7 +63,7 @@ class Setting(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     reset: Annotated[bool, Meta(description="changing it resets the simulation")] = False
 
 
-class Slider(Setting, frozen=True, kw_only=True, tag_field="type", tag="slider"):
+class Slider(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="slider"):
     """A slider: the control that `type` need not name."""
 
     implied: ClassVar[bool] = True
@@ -76,7 +76,7 @@ class Slider(Setting, frozen=True, kw_only=True, tag_field="type", tag="slider")
     digits: Annotated[Digits | None, Meta(description="decimal places shown")] = None
 
 
-class Select(Setting, frozen=True, kw_only=True, tag_field="type", tag="select"):
+class Select(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="select"):
     """A choice between named values."""
 
     options: Annotated[
@@ -102,7 +102,7 @@ class Readout(Struct, frozen=True, forbid_unknown_fields=True):
     digits: Annotated[Digits, Meta(description="decimal places of a number")] = 3
 
 
-class Trace(Struct, frozen=True, forbid_unknown_fields=True):
+class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
     """A line of a plot."""
 
     label: Text
@@ -126,7 +126,7 @@ class RefLine(Struct, frozen=True, forbid_unknown_fields=True):
 class Plot(Struct, frozen=True, forbid_unknown_fields=True):
     """A plot against simulated time."""
 
-    traces: Annotated[tuple[Trace, ...], Meta(min_length=1)]
+    traces: Annotated[tuple[TraceFields, ...], Meta(min_length=1)]
     ylabel: str = ""
     xlabel: str = ""
     window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None

@@ -30,7 +30,7 @@ _SPACE = " \t\n"
 _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
-class Formula(NamedTuple):
+class FormulaText(NamedTuple):
     """A formula found in a text: its TeX is at `[start, end)`; its dollars end at `after`."""
 
     start: int
@@ -41,7 +41,7 @@ class Formula(NamedTuple):
 
 def find_formula(
     text: str, at: int, limit: int, last_runs: dict[int, int] | None = None
-) -> Formula | None:
+) -> FormulaText | None:
     """The formula that begins with the `$` at `at` and closes before `limit`, if it is one.
 
     `last_runs` says where the last run of each number of backticks begins; by it a code span inside
@@ -64,9 +64,9 @@ def find_formula(
             return None
         elif width == 1:
             closes = text[end - 1] not in _SPACE and text[end + 1 : end + 2] not in _DIGITS
-            return Formula(start, end, end + 1, False) if closes else None
+            return FormulaText(start, end, end + 1, False) if closes else None
         elif text.startswith("$$", end, limit):
-            return Formula(start, end, end + 2, True)
+            return FormulaText(start, end, end + 2, True)
         else:
             end += 1
 

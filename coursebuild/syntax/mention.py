@@ -1,6 +1,6 @@
 """Mentions in prose: "Lesson 2.2", "Lessons 2.2 and 2.3", "Level 18" become links by themselves.
 
-Entry points: `Item` (a stretch of text between other inlines), `may_mention`, `plain` and
+Entry points: `TextPiece` (a stretch of text between other inlines), `may_mention`, `plain` and
 `with_mentions` (a run of items into inlines).
 
 1. Text and soft line ends that follow each other make one run, so that a mention may be broken over
@@ -30,7 +30,7 @@ _NEXT = {
 }
 
 
-class Item(NamedTuple):
+class TextPiece(NamedTuple):
     """A stretch of text in a block's content, or a soft line end (`text` is a line feed)."""
 
     text: str
@@ -53,10 +53,10 @@ def may_mention(text: str) -> bool:
     return "Lesson" in text or "Level" in text
 
 
-def plain(run: Sequence[Item], content: Excerpt) -> list[Inline]:
+def plain(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
     out: list[Inline] = []
-    text: list[Item] = []
+    text: list[TextPiece] = []
     for item in run:
         if item.text != "\n":
             text.append(item)
@@ -70,7 +70,7 @@ def plain(run: Sequence[Item], content: Excerpt) -> list[Inline]:
     return out
 
 
-def _text(items: list[Item], content: Excerpt) -> Text:
+def _text(items: list[TextPiece], content: Excerpt) -> Text:
     if len(items) == 1:
         text, start, end, _ = items[0]
         return Text(content.span(start, end), text)
@@ -78,7 +78,7 @@ def _text(items: list[Item], content: Excerpt) -> Text:
     return Text(content.span(items[0].start, items[-1].end), joined)
 
 
-def with_mentions(run: Sequence[Item], content: Excerpt) -> list[Inline]:
+def with_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
     joined = "".join([item.text for item in run])
     if not may_mention(joined):
@@ -111,12 +111,12 @@ def _mentions(text: str) -> Iterator[_Mention]:
             at = found.end()
 
 
-def _cut(run: Sequence[Item], starts: list[int], start: int, end: int) -> list[Item]:
+def _cut(run: Sequence[TextPiece], starts: list[int], start: int, end: int) -> list[TextPiece]:
     """The items between two offsets of the joined text.
 
     An item that is not literal keeps its whole place.
     """
-    out: list[Item] = []
+    out: list[TextPiece] = []
     i = bisect_right(starts, start) - 1
     while i < len(run) and starts[i] < end:
         item = run[i]
@@ -124,7 +124,7 @@ def _cut(run: Sequence[Item], starts: list[int], start: int, end: int) -> list[I
         if last > first:
             text = item.text[first:last]
             if item.literal:
-                out.append(Item(text, item.start + first, item.start + last))
+                out.append(TextPiece(text, item.start + first, item.start + last))
             else:
                 out.append(item._replace(text=text))
         i += 1

@@ -15,7 +15,7 @@ from coursebuild.model import Comparison, Inline, Mode, Recording, Table, plain_
 from coursebuild.patterns import pattern
 from coursebuild.source import Span
 from coursebuild.syntax.fence import Fence, is_ours
-from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
+from coursebuild.syntax.info import FenceKeys, Word, parse_info, read_keys
 from coursebuild.syntax.session import Session
 
 _CAPTION = pattern(r"\s*Output\b.*:\s*", re.DOTALL)
@@ -155,7 +155,7 @@ def stray_keys(fence: Fence) -> list[Diagnostic]:
     return diagnostics
 
 
-def _keys(fence: Fence) -> tuple[Keys, list[Diagnostic]]:
+def _keys(fence: Fence) -> tuple[FenceKeys, list[Diagnostic]]:
     info = parse_info(fence.info)
     keys = read_keys("text", info.value.words, values=_VALUES, flags=_FLAGS)
     return keys.value, [*info.diagnostics, *keys.diagnostics]
@@ -174,7 +174,7 @@ def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | No
     return None
 
 
-def _contradictions(keys: Keys, diagnostics: list[Diagnostic]) -> None:
+def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
     """Report the first key that does not go with one before it."""
     mode: Word | None = None
     volatile, ellipsis = keys.get("volatile"), keys.get("ellipsis")

@@ -18,7 +18,7 @@ from coursebuild.model import PlainCode, Script
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Span
 from coursebuild.syntax.fence import Fence
-from coursebuild.syntax.info import Keys, Word, parse_info, read_keys
+from coursebuild.syntax.info import FenceKeys, Word, parse_info, read_keys
 
 DEFAULT_TIMEOUT = 60.0
 """Seconds."""
@@ -76,7 +76,7 @@ def _needs_file(word: Word) -> Diagnostic:
     )
 
 
-def _script(fence: Fence, file: Word, keys: Keys) -> tuple[Script | None, list[Diagnostic]]:
+def _script(fence: Fence, file: Word, keys: FenceKeys) -> tuple[Script | None, list[Diagnostic]]:
     diagnostics: list[Diagnostic] = []
     path, path_span = file.value or "", file.value_span
     wrong = path_mistake(path)

@@ -12,7 +12,7 @@ from typing import TypeVar
 from coursebuild.diagnostics import Diagnostic, Parsed
 from coursebuild.source import Source
 from coursebuild.syntax.block_parser import Definitions
-from coursebuild.syntax.footnotes import Notes
+from coursebuild.syntax.footnotes import FootnoteList
 from coursebuild.syntax.headings import Anchors
 
 T = TypeVar("T")
@@ -34,7 +34,7 @@ class Session:
         """Whether the nearest script above has no path that it may have."""
         self.level = 1
         """Level of the heading above."""
-        self.notes = Notes(self.report)
+        self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)
 
     def report(self, diagnostic: Diagnostic) -> None:

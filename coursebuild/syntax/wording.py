@@ -1,7 +1,7 @@
 """How messages call types and the author's values.
 
-Entry points: `Words` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`, `quoted`,
-`short`.
+Entry points: `FormatWords` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
+`quoted`, `short`.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from coursebuild.syntax.nodes import (
 _NUMBER = pattern(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
-class Words(Struct, frozen=True):
+class FormatWords(Struct, frozen=True):
     """The nouns of a language for what the other calls an object."""
 
     object: str
     objects: str
 
 
-JSON = Words("an object", "objects")
-TOML = Words("a table", "tables")
+JSON = FormatWords("an object", "objects")
+TOML = FormatWords("a table", "tables")
 
 
 _SIMPLE = {
@@ -137,14 +137,14 @@ def quoted(node: Node) -> str:
     return f"`{short(node.value if isinstance(node, StringNode) else node.raw)}`"
 
 
-def wrong_type(node: Node, name: str, type: inspect.Type, words: Words) -> str:
+def wrong_type(node: Node, name: str, type: inspect.Type, words: FormatWords) -> str:
     """The message for a value of a type that its field does not take."""
     expected = _in_words(type)[0].replace("an object", words.object)
     expected = expected.replace("objects", words.objects)
     return f"{named(name)} must be {expected}, not {_found(node, words)}"
 
 
-def _found(node: Node, words: Words) -> str:
+def _found(node: Node, words: FormatWords) -> str:
     match node:
         case ObjectNode():
             return words.object

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.effects.runner import ScriptServer, clean_environment
-from coursebuild.effects.surroundings import Place, library_folder
+from coursebuild.effects.surroundings import OtherEnvironment, library_folder
 from coursebuild.results import Outcome, ScriptRun
 from support.probe_scripts import FAILURES, PROBES
 from support.runners import job
@@ -109,14 +109,14 @@ def test_a_spawned_script_does_what_it_does_alone(spawning: ScriptServer, root: 
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
+def place(tmp_path_factory: pytest.TempPathFactory) -> OtherEnvironment:
     """An interpreter with no packages."""
     prefix = tmp_path_factory.mktemp("place") / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", prefix], check=True)
-    return Place("a place", str(prefix / "bin/python"), str(prefix), library_folder())
+    return OtherEnvironment("a place", str(prefix / "bin/python"), str(prefix), library_folder())
 
 
-def installed(place: Place, name: str) -> Path:
+def installed(place: OtherEnvironment, name: str) -> Path:
     """Where a module of a place is."""
     (folder,) = Path(place.prefix).glob("lib/python*/site-packages")
     return folder / f"{name}.py"
@@ -132,7 +132,7 @@ STARTS = (
 )
 
 
-def test_an_installation_with_its_own_start(place: Place, root: Path) -> None:
+def test_an_installation_with_its_own_start(place: OtherEnvironment, root: Path) -> None:
     (root / "examples/x.py").write_text(
         "import sys\nprint(getattr(sys, 'marked', None), 'sitecustomize' in sys.modules)"
     )
@@ -171,7 +171,9 @@ UNFIT = (
 )
 
 
-def test_where_an_import_does_more_scripts_are_not_forked(place: Place, root: Path) -> None:
+def test_where_an_import_does_more_scripts_are_not_forked(
+    place: OtherEnvironment, root: Path
+) -> None:
     """A package that starts a thread, prints, fails or crashes when it is imported."""
     code = "if 0:\n    import numpy\n"
     code += "print('ran', 'coursebuild:' in open('/proc/self/cmdline').read())"
@@ -187,7 +189,7 @@ def test_where_an_import_does_more_scripts_are_not_forked(place: Place, root: Pa
     assert said == {"pi = 3": "ran True\n"} | dict.fromkeys(UNFIT, "ran False\n")
 
 
-def test_a_package_that_is_not_installed_is_no_trouble(place: Place, root: Path) -> None:
+def test_a_package_that_is_not_installed_is_no_trouble(place: OtherEnvironment, root: Path) -> None:
     code = "try: import numpy\nexcept ModuleNotFoundError as error: print(error)\n"
     code += "print('coursebuild:' in open('/proc/self/cmdline').read())"
     (root / "examples/x.py").write_text(code)
@@ -196,7 +198,7 @@ def test_a_package_that_is_not_installed_is_no_trouble(place: Place, root: Path)
     assert run.stdout == "No module named 'numpy'\nTrue\n"
 
 
-def test_another_version_of_a_package_is_imported_anew(place: Place, root: Path) -> None:
+def test_another_version_of_a_package_is_imported_anew(place: OtherEnvironment, root: Path) -> None:
     (root / "examples/x.py").write_text("import numpy\nprint(numpy.__version__)")
     module = installed(place, "numpy")
     with ScriptServer(place=place) as server:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import watchfiles
 
-from coursebuild.preview.watcher import Watcher
+from coursebuild.preview.watcher import FolderWatcher
 from support.runners import wait_until
 
 pytestmark = pytest.mark.site
@@ -32,8 +32,8 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def saves(root: Path) -> Iterator[Watcher]:
-    found = Watcher(root)
+def saves(root: Path) -> Iterator[FolderWatcher]:
+    found = FolderWatcher(root)
     found.watch_also(frozenset({"docs/guide.md", "own.md", LESSON}))
     found.start()
     found.wait()
@@ -42,7 +42,7 @@ def saves(root: Path) -> Iterator[Watcher]:
     assert found.stopped
 
 
-def told(saves: Watcher, wanted: set[str], seconds: float = 120.0) -> set[str]:
+def told(saves: FolderWatcher, wanted: set[str], seconds: float = 120.0) -> set[str]:
     """What is told of until all that is wanted was."""
     found: set[str] = set()
     until = time.monotonic() + seconds
@@ -54,7 +54,7 @@ def told(saves: Watcher, wanted: set[str], seconds: float = 120.0) -> set[str]:
     return found
 
 
-def told_of_a_save(root: Path, saves: Watcher, path: str) -> None:
+def told_of_a_save(root: Path, saves: FolderWatcher, path: str) -> None:
     """A new folder is watched a moment after it is there: its files are saved until then."""
     until = time.monotonic() + 120
     found: frozenset[str] = frozenset()
@@ -82,7 +82,7 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("path", [LESSON, "docs/guide.md", "own.md"])
-def test_every_change_is_told_of(root: Path, saves: Watcher, path: str, change: str) -> None:
+def test_every_change_is_told_of(root: Path, saves: FolderWatcher, path: str, change: str) -> None:
     CHANGES[change](root / path)
     found = told(saves, {path})
     moved = (
@@ -91,7 +91,7 @@ def test_every_change_is_told_of(root: Path, saves: Watcher, path: str, change: 
     assert found <= {path, *moved}
 
 
-def test_what_is_not_of_the_course_is_not_told_of(root: Path, saves: Watcher) -> None:
+def test_what_is_not_of_the_course_is_not_told_of(root: Path, saves: FolderWatcher) -> None:
     assert not saves.get(0.5)
     for path in (
         "content/lessons/.1.1-one.md.swp",
@@ -109,7 +109,7 @@ def test_what_is_not_of_the_course_is_not_told_of(root: Path, saves: Watcher) ->
     assert not saves.get(0.5)
 
 
-def test_folders_that_are_made_later(root: Path, saves: Watcher) -> None:
+def test_folders_that_are_made_later(root: Path, saves: FolderWatcher) -> None:
     (root / "models/deep/deeper").mkdir(parents=True)
     (root / "models/deep/deeper/a.xml").write_text("<mujoco/>")
     (root / "content/pages/one").mkdir(parents=True)
@@ -119,7 +119,7 @@ def test_folders_that_are_made_later(root: Path, saves: Watcher) -> None:
         told_of_a_save(root, saves, path)
 
 
-def test_folders_that_go_and_come_back(root: Path, saves: Watcher) -> None:
+def test_folders_that_go_and_come_back(root: Path, saves: FolderWatcher) -> None:
     shutil.rmtree(root / "content")
     told(saves, {"content"})
     (root / "content/lessons").mkdir(parents=True)
@@ -128,7 +128,7 @@ def test_folders_that_go_and_come_back(root: Path, saves: Watcher) -> None:
     told_of_a_save(root, saves, LESSON)
 
 
-def test_another_folder_in_the_place_of_one(root: Path, saves: Watcher) -> None:
+def test_another_folder_in_the_place_of_one(root: Path, saves: FolderWatcher) -> None:
     shutil.copytree(root / "content", root / "new")
     (root / "content").rename(root / "old")
     (root / "new").rename(root / "content")
@@ -136,7 +136,7 @@ def test_another_folder_in_the_place_of_one(root: Path, saves: Watcher) -> None:
     told_of_a_save(root, saves, LESSON)
 
 
-def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: Watcher) -> None:
+def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: FolderWatcher) -> None:
     shutil.copytree(root / "docs", root / "new")
     (root / "docs").rename(root / "old")
     (root / "new").rename(root / "docs")
@@ -144,7 +144,7 @@ def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: Watcher
     told_of_a_save(root, saves, "docs/guide.md")
 
 
-def test_a_file_elsewhere_that_is_asked_for_later(root: Path, saves: Watcher) -> None:
+def test_a_file_elsewhere_that_is_asked_for_later(root: Path, saves: FolderWatcher) -> None:
     (root / "far").mkdir()
     saves.watch_also(frozenset({"docs/guide.md", "far/later.md"}))
     told_of_a_save(root, saves, "far/later.md")
@@ -166,7 +166,7 @@ def test_while_no_folder_changes_watching_is_not_begun_again(
             yield batch
 
     monkeypatch.setattr(watchfiles, "watch", watch)
-    saves = Watcher(root)
+    saves = FolderWatcher(root)
     saves.watch_also(frozenset({"docs/guide.md"}))
     saves.start()
     wait_until(lambda: min(looks[True], looks[False]) > 3, "four looks")
@@ -177,20 +177,20 @@ def test_while_no_folder_changes_watching_is_not_begun_again(
 def test_files_in_a_linked_folder(root: Path) -> None:
     (root / "far").mkdir()
     (root / "content/near").symlink_to(root / "far")
-    saves = Watcher(root)
+    saves = FolderWatcher(root)
     saves.start()
     saves.wait()
     told_of_a_save(root, saves, "content/near/a.svg")
     saves.stop()
 
 
-def test_odd_names(root: Path, saves: Watcher) -> None:
+def test_odd_names(root: Path, saves: FolderWatcher) -> None:
     for name in ("a\nb.md", "é ß.md", "x" * 255):
         (root / "content" / name).write_text("x")
         told(saves, {f"content/{name}"})
 
 
-def test_who_waits_is_woken_when_watching_ends(saves: Watcher) -> None:
+def test_who_waits_is_woken_when_watching_ends(saves: FolderWatcher) -> None:
     thread = threading.Thread(target=saves.stop)
     thread.start()
     assert not saves.get(600.0)

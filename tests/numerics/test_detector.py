@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
-from coursebuild.numerics.detector import Peaks, Status, judge, peaks
+from coursebuild.numerics.detector import Peaks, RunStatus, judge, peaks
 from coursebuild.numerics.engine import advance, compiled, simulate
 from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.problems import problem_named
@@ -40,7 +40,7 @@ def test_a_run_that_was_reset_and_ends_with_error_zero_is_lost() -> None:
     advance(model, data, 1000)
     assert data.qpos[0] == 0.0 == data.qvel[0]  # as if it had come to rest
     found = judge(model, data, 1000 * 0.3)
-    assert found.status is Status.RESET
+    assert found.status is RunStatus.RESET
     assert "MuJoCo warned of bad accelerations" in found.reasons
     assert any("the state was reset" in reason for reason in found.reasons)
 
@@ -50,8 +50,8 @@ def test_the_clock_alone_tells_of_a_reset() -> None:
     advance(model, data, 50)
     mujoco.mj_resetData(model, data)
     advance(model, data, 50)
-    assert judge(model, data, 1.0).status is Status.RESET
-    assert judge(model, data, 0.5).status is Status.OK
+    assert judge(model, data, 1.0).status is RunStatus.RESET
+    assert judge(model, data, 0.5).status is RunStatus.OK
 
 
 def test_a_slow_growth_without_any_warning_is_seen() -> None:
@@ -60,7 +60,7 @@ def test_a_slow_growth_without_any_warning_is_seen() -> None:
     assert abs(data.qpos[0]) > 100
     assert not any(warning.number for warning in data.warning)
     found = judge(model, data, 130 * 0.2002, bounds=Peaks(1.0, 10.0, math.inf))
-    assert found.status is Status.SLOW_GROWTH
+    assert found.status is RunStatus.SLOW_GROWTH
     assert any(reason.startswith("positions reached") for reason in found.reasons)
 
 
@@ -69,7 +69,7 @@ def test_without_automatic_reset_a_divergence_stays_visible() -> None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     advance(model, data, 2000)
     found = judge(model, data, 2000 * 0.3)
-    assert found.status is Status.DIVERGED
+    assert found.status is RunStatus.DIVERGED
     assert not np.isfinite(data.qpos[0]) or abs(data.qpos[0]) > 1e10
 
 
@@ -92,7 +92,7 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
     soft = replace(sunk, mjcf=sunk.mjcf.replace('solref="0.004 1"', 'solref="0.04 1"'))
     soft = replace(soft, scenario=replace(soft.scenario, qpos=(0.0, 0.0)))
     run = simulate(soft, compiled(soft.mjcf, Integrator.EULER, 1e-3))
-    assert run.judgement.status is Status.DIVERGED
+    assert run.judgement.status is RunStatus.DIVERGED
     assert len(run.judgement.reasons) == 1
     assert "as deep in each other" in run.judgement.reasons[0]
 
@@ -116,7 +116,7 @@ def test_every_seeded_divergence_is_flagged() -> None:
             continue
         for factor in (1.005, 1.1, 2.0, 5.0):
             trial = attempt(problem, integrator, factor * limit.timestep)
-            assert trial.status in (Status.DIVERGED, Status.SLOW_GROWTH), (integrator, factor)
+            assert trial.status in (RunStatus.DIVERGED, RunStatus.SLOW_GROWTH), (integrator, factor)
 
 
 def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
@@ -135,7 +135,7 @@ def test_a_good_run_is_good() -> None:
     good = judge(model, data, 1.0, bounds=Peaks(1.0, 10.0, math.inf))
     assert good.ok and good.reasons == ()
     data.time = math.nan
-    assert judge(model, data, 1.0).status is Status.RESET
+    assert judge(model, data, 1.0).status is RunStatus.RESET
 
 
 def test_warnings_are_counted_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:

@@ -6,19 +6,25 @@ import random
 
 import pytest
 
-from coursebuild.numerics.front import Point, front, verdict, words
-from coursebuild.numerics.reports.bench import Setting, Verdict
+from coursebuild.numerics.front import FrontPoint, front, verdict, words
+from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict
 
-EULER, RK4 = Setting("Euler", 0.002, "", 0, ""), Setting("RK4", 0.01, "", 0, "")
+EULER, RK4 = MeasuredSetting("Euler", 0.002, "", 0, ""), MeasuredSetting("RK4", 0.01, "", 0, "")
 
 
 def on_it(*points: tuple[float, float] | None) -> list[bool]:
-    found = front([None if one is None else Point(*one) for one in points])
+    found = front([None if one is None else FrontPoint(*one) for one in points])
     return [place.front for place in found]
 
 
 def test_cheaper_and_more_accurate_is_better() -> None:
-    points = [Point(1, 1e-3), Point(0.5, 1e-5), Point(0.1, 0.3), Point(4, 1e-3), None]
+    points = [
+        FrontPoint(1, 1e-3),
+        FrontPoint(0.5, 1e-5),
+        FrontPoint(0.1, 0.3),
+        FrontPoint(4, 1e-3),
+        None,
+    ]
     found = front(points)
     assert [place.front for place in found] == [False, True, True, False, False]
     assert [place.dominated_by for place in found] == [1, None, None, 1, None]
@@ -40,7 +46,7 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
 
 
 def test_what_dominates_is_on_the_front() -> None:
-    points = [Point(8, 8.0), Point(4, 4.0), Point(2, 2.0), Point(1, 1.0)]
+    points = [FrontPoint(8, 8.0), FrontPoint(4, 4.0), FrontPoint(2, 2.0), FrontPoint(1, 1.0)]
     assert [place.dominated_by for place in front(points)] == [3, 3, 3, None]
 
 
@@ -58,13 +64,13 @@ def test_the_front_is_the_same_however_costs_are_disturbed(seed: int) -> None:
 
 
 def judged(
-    points: list[Point | None], seen: float | None, reasons: tuple[str, ...] = ()
-) -> Verdict:
+    points: list[FrontPoint | None], seen: float | None, reasons: tuple[str, ...] = ()
+) -> RowVerdict:
     return verdict([EULER, RK4], points, front(points), 0, seen, reasons)
 
 
 def test_a_verdict_on_a_good_choice() -> None:
-    found = judged([Point(1, 1e-3), Point(4, 1e-7)], 1e-3)
+    found = judged([FrontPoint(1, 1e-3), FrontPoint(4, 1e-7)], 1e-3)
     assert (found.on_front, found.better, found.noticeable) == (True, None, False)
     assert found.text == (
         "no other setting is cheaper without being less accurate; a learner would not notice its "
@@ -73,13 +79,13 @@ def test_a_verdict_on_a_good_choice() -> None:
 
 
 def test_what_can_just_be_seen_is_noticed() -> None:
-    found = judged([Point(1, 1e-3), Point(4, 1e-7)], 1.0)
+    found = judged([FrontPoint(1, 1e-3), FrontPoint(4, 1e-7)], 1.0)
     assert found.noticeable is True
     assert "; a learner would notice its error, which is 1 times what can be seen" in found.text
 
 
 def test_a_verdict_on_a_bad_one() -> None:
-    found = judged([Point(1, 2.5), Point(0.94, 2.5e-6)], 2.5)
+    found = judged([FrontPoint(1, 2.5), FrontPoint(0.94, 2.5e-6)], 2.5)
     assert (found.on_front, found.better, found.noticeable) == (False, 1, True)
     assert found.cost_ratio == pytest.approx(0.94)
     assert found.error_ratio == pytest.approx(1e-6)
@@ -90,7 +96,7 @@ def test_a_verdict_on_a_bad_one() -> None:
 
 
 def test_a_verdict_names_what_would_be_enough() -> None:
-    points: list[Point | None] = [Point(0.5, 50), Point(2, 1e-6)]
+    points: list[FrontPoint | None] = [FrontPoint(0.5, 50), FrontPoint(2, 1e-6)]
     found = verdict([EULER, RK4], points, front(points), 0, 50, (), 1)
     assert found.text.endswith(
         "a learner would notice its error, which is 50 times what can be seen; the cheapest "
@@ -103,7 +109,7 @@ def test_a_verdict_names_what_would_be_enough() -> None:
 
 
 def test_a_verdict_where_too_little_is_known() -> None:
-    found = judged([Point(1, 2.0), Point(0.5, 2.0)], None)
+    found = judged([FrontPoint(1, 2.0), FrontPoint(0.5, 2.0)], None)
     assert found.noticeable is None
     assert found.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
@@ -112,7 +118,7 @@ def test_a_verdict_where_too_little_is_known() -> None:
 
 
 def test_a_verdict_where_the_scene_does_not_run() -> None:
-    found = judged([None, Point(1, 2.0)], None, ("the state is not finite",))
+    found = judged([None, FrontPoint(1, 2.0)], None, ("the state is not finite",))
     assert (found.on_front, found.better, found.cost_ratio) == (False, 1, None)
     assert found.text == (
         "the scene does not run under its own setting, Euler at 2 ms: the state is not finite; "
@@ -128,5 +134,5 @@ def test_a_verdict_where_nothing_was_timed() -> None:
 
 
 def test_settings_in_words() -> None:
-    full = Setting("implicitfast", 0.002, "Newton", 20, "elliptic")
+    full = MeasuredSetting("implicitfast", 0.002, "Newton", 20, "elliptic")
     assert words(full) == "implicitfast at 2 ms, Newton, at most 20 iterations, elliptic cone"

@@ -11,8 +11,8 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure, orders
-from coursebuild.numerics.detector import Judgement, Status
-from coursebuild.numerics.engine import Run, States
+from coursebuild.numerics.detector import RunJudgement, RunStatus
+from coursebuild.numerics.engine import EngineStates, Run
 from coursebuild.numerics.measure import (
     FLOORS,
     Errors,
@@ -172,8 +172,8 @@ def test_no_drift_of_energy_is_given_where_it_is_not_conserved() -> None:
 def run_of(energy: list[list[float]], momentum: list[list[float]]) -> Run:
     """A run of which only the invariants are looked at: potential and kinetic energy, momentum."""
     times, nothing = np.arange(1.0, len(energy)), np.empty((len(energy) - 1, 0))
-    ok, table = Judgement(Status.OK), np.array(energy)
-    states = States(times, nothing, nothing, nothing)
+    ok, table = RunJudgement(RunStatus.OK), np.array(energy)
+    states = EngineStates(times, nothing, nothing, nothing)
     return Run(states, table, np.array(momentum), 0.0, ok)
 
 

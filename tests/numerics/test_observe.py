@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.engine import States
+from coursebuild.numerics.engine import EngineStates
 from coursebuild.numerics.observe import slip, speeds_of, sticking, touched_pairs
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.reachability import possible_pairs
@@ -100,13 +100,13 @@ def ball() -> tuple[Any, Scene]:
     return model, scene
 
 
-def moving(speed: list[float], spin: list[float]) -> States:
+def moving(speed: list[float], spin: list[float]) -> EngineStates:
     """A ball on a plane, at three times, with speeds along x and spins about y."""
     times = np.array([0.1, 0.2, 0.3])
     qpos = np.tile([0, 0, 0.0999, 1, 0, 0, 0], (3, 1)).astype(float)
     qvel = np.zeros((3, 6))
     qvel[:, 0], qvel[:, 4] = speed, spin
-    return States(times, qpos, qvel, np.empty((3, 0)))
+    return EngineStates(times, qpos, qvel, np.empty((3, 0)))
 
 
 def test_speeds_are_those_of_the_point_that_touches() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from coursebuild.numerics.cases import agreement
-from coursebuild.numerics.engine import States, compiled, motion_of
+from coursebuild.numerics.engine import EngineStates, compiled, motion_of
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.problems import all_problems, problem_named, problem_names
@@ -61,7 +61,7 @@ def test_the_reference_begins_where_the_scenario_does() -> None:
         model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
         qpos = np.array([scenario.qpos or model.qpos0], dtype=float)
         qvel = np.array([scenario.qvel or [0.0] * model.nv], dtype=float)
-        begun = motion_of(model, States(np.zeros(1), qpos, qvel, np.empty((1, 0))))
+        begun = motion_of(model, EngineStates(np.zeros(1), qpos, qvel, np.empty((1, 0))))
         soon = problem.reference.motion(np.array([1e-9, 2e-9]))
         assert soon.position.shape[1:] == begun.position.shape[1:], problem.name
         for found, expected, rtol, atol in (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import States
+from coursebuild.numerics.engine import EngineStates
 from coursebuild.numerics.forward import forward_states, tends_to
 from coursebuild.numerics.integrate import NoConvergenceError, bulirsch_stoer
 from coursebuild.numerics.pilot import pilot
@@ -232,7 +232,7 @@ def arm(damping: float, more: str = "") -> Any:
 def tends(model: Any, other: Any, step: float = 0.004) -> bool:
     """Whether one model in small steps does what another's accelerations say."""
     setup = Setup(scenario=Scenario(2.0, 0.1))
-    states: States = forward_states(
+    states: EngineStates = forward_states(
         other, setup, setup.scenario.times, lambda r, y, t: bulirsch_stoer(r, y, t, 1e-12)
     )
     return tends_to(model, setup, states, step, 0.01)

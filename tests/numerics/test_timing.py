@@ -9,7 +9,7 @@ import mujoco
 import pytest
 
 from coursebuild.numerics.pilot import pilot
-from coursebuild.numerics.reports.bench import Setting
+from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
 from coursebuild.numerics.timing import FEWEST, Job, Stepped, costs, full_state, time_ratio, timed
 
@@ -131,7 +131,9 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(mujoco, "mj_step", step)
     chosen = [
-        Setting(name, h, "", 0, "") for name in ("RK4", "Euler") for h in (0.008, 0.004, 0.001)
+        MeasuredSetting(name, h, "", 0, "")
+        for name in ("RK4", "Euler")
+        for h in (0.008, 0.004, 0.001)
     ]
     found = costs(model, first, chosen, 4, machine.clock)
     expected = [price * 0.004 / h for price in (13 / 3, 1.0) for h in (0.008, 0.004, 0.001)]
@@ -152,7 +154,7 @@ def test_the_clock_is_told_of_no_step_beyond_the_scenario(monkeypatch: pytest.Mo
         latest[0] = max(latest[0], data.time)
 
     monkeypatch.setattr(mujoco, "mj_step", step)
-    chosen = [Setting("Euler", h, "", 0, "") for h in (0.016, 0.004)]
+    chosen = [MeasuredSetting("Euler", h, "", 0, "") for h in (0.016, 0.004)]
     costs(model, first, chosen, 1, machine.clock, quick=True)
     assert 0.9 * scene.scenario.duration < latest[0] <= scene.scenario.duration * 1.05
 

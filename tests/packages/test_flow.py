@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from coursebuild.render.packages.flow import Flow, Places
+from coursebuild.render.packages.flow import Flow, FlowPlaces
 from coursebuild.render.packages.xml import document, element
 from support.archives import formula_mistakes
 from support.hostile_html import HOSTILE
@@ -35,7 +35,7 @@ PIECES = st.one_of(
 
 
 def flow() -> Flow:
-    places = Places(
+    places = FlowPlaces(
         link=lambda address: address if address.startswith("https:") else None,
         picture=lambda address: f"../{address}" if address.endswith(".png") else None,
     )

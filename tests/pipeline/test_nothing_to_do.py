@@ -49,7 +49,7 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
     assert done.stderr == (
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
         "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
-        "'coursebuild.effects', 'coursebuild.effects.place']\n"
+        "'coursebuild.effects', 'coursebuild.effects.course_root']\n"
     )
 
 

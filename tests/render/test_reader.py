@@ -11,7 +11,7 @@ import pytest
 from coursebuild.features.quiz.keys import text_key
 from coursebuild.model import Document
 from coursebuild.model.summary import without_prose
-from coursebuild.render.asked import asked, count
+from coursebuild.render.quiz_index import count, quiz_index
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
 from support.rendered_course import Make
@@ -33,9 +33,9 @@ NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
 
 def test_the_questions_of_a_document() -> None:
     document = parsed("> [!note]\n> Text.\n\n" + TWO)
-    assert asked(document) == NAMES
-    assert asked(without_prose(document)) == NAMES, "its skeleton is enough"
-    assert asked(parsed("Text.")) == ""
+    assert quiz_index(document) == NAMES
+    assert quiz_index(without_prose(document)) == NAMES, "its skeleton is enough"
+    assert quiz_index(parsed("Text.")) == ""
 
 
 def parsed(text: str) -> Document:

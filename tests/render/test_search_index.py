@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.render.search import index
-from coursebuild.render.search.files import Entry, SearchFiles
-from coursebuild.render.search.index import Plan
+from coursebuild.render.search.files import IndexEntry, SearchFiles
+from coursebuild.render.search.index import IndexPlan
 from coursebuild.render.search.words import is_fuzzy
 from coursebuild.results import CachedFile
 
@@ -48,7 +48,8 @@ def made(terms: dict[str, dict[str, int]], shelf: Shelf) -> dict[str, CachedFile
         for path, found in terms.items()
     }
     entries = [
-        Entry(path, "lesson", f"Title {path}", "", str(hash(text))) for path, text in data.items()
+        IndexEntry(path, "lesson", f"Title {path}", "", str(hash(text)))
+        for path, text in data.items()
     ]
     files = SearchFiles(
         entries,
@@ -90,7 +91,7 @@ def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, 
 @pytest.mark.parametrize("pages", [1, 3, 40, 150])
 def test_every_term_stands_once_where_the_browser_looks(pages: int) -> None:
     terms = course(pages)
-    plan = Plan.of(pages)
+    plan = IndexPlan.of(pages)
     found = shards(made(terms, Shelf()))
     assert sorted(found) == list(range(plan.terms + plan.words))
     expected: dict[str, list[tuple[int, int]]] = {}
@@ -109,10 +110,10 @@ def test_every_term_stands_once_where_the_browser_looks(pages: int) -> None:
 
 
 def test_the_plan_grows_with_the_course() -> None:
-    plans = {pages: Plan.of(pages) for pages in (0, 1, 80, 2000, 100_000)}
-    assert plans[0] == plans[1] == Plan(1, 1, 1)
-    assert plans[80] == Plan(4, 8, 1)
-    assert plans[2000] == Plan(64, 128, 16)
+    plans = {pages: IndexPlan.of(pages) for pages in (0, 1, 80, 2000, 100_000)}
+    assert plans[0] == plans[1] == IndexPlan(1, 1, 1)
+    assert plans[80] == IndexPlan(4, 8, 1)
+    assert plans[2000] == IndexPlan(64, 128, 16)
     assert plans[100_000].terms == 1024
 
 

@@ -15,7 +15,7 @@ from coursebuild.render.reader import progress_inputs
 from coursebuild.render.search.page import page_text, searched, terms
 from coursebuild.render.search.page_inputs import search_inputs
 from coursebuild.render.search.sections import drawn_sections
-from coursebuild.render.search.values import PageText, Piece, Section
+from coursebuild.render.search.values import PageText, Section, SectionPiece
 from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]
@@ -119,7 +119,9 @@ def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     for inputs in left_out:
         assert page_text(inputs(library), None, "<p>Text</p>") is None, inputs
     stub = page_text(stub_inputs(library, library.lessons["1.2"]), None, "<p>Other</p>")
-    assert stub == PageText("Later", "1.2", (Section("", "", 0, (Piece("text", "Comes later."),)),))
+    assert stub == PageText(
+        "Later", "1.2", (Section("", "", 0, (SectionPiece("text", "Comes later."),)),)
+    )
     level = page_text(level_inputs(library, made.course.levels[0]), None, "<p>Lessons</p>")
     assert level is not None and "Lessons" not in str(level)
     model = page_text(model_inputs(library, made.course.models[0]), None, "<h2 id='x'>Facts</h2>")
@@ -129,8 +131,8 @@ def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
 
 
 def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
-    piece = Piece("text", "body body body body; inertia")
-    code = Piece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
+    piece = SectionPiece("text", "body body body body; inertia")
+    code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
     page = PageText("Body", "4.2", (Section("a", "Inertia", 2, (piece, code), ("frac",)),))
     lines = terms(page).decode().split("\n")
     assert lines == sorted(lines, key=lambda line: line[1:])
@@ -167,16 +169,19 @@ def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make)
     ("body", "sections"),
     [
         ("", ()),
-        ("<main><h1>Title</h1><p>Text</p></main>", (Section("", "", 0, (Piece("text", "Text"),)),)),
+        (
+            "<main><h1>Title</h1><p>Text</p></main>",
+            (Section("", "", 0, (SectionPiece("text", "Text"),)),),
+        ),
         (
             "<h2 id=a>A <b>b</b></h2><nav>no</nav><ul><li>one<li>two</ul><pre>code</pre>"
             "<h3>B</h3>tail &lt;i>",
             (
-                Section("a", "A b", 2, (Piece("text", "one"), Piece("text", "two"))),
-                Section("", "B", 3, (Piece("text", "tail <i>"),)),
+                Section("a", "A b", 2, (SectionPiece("text", "one"), SectionPiece("text", "two"))),
+                Section("", "B", 3, (SectionPiece("text", "tail <i>"),)),
             ),
         ),
-        ("</p></div><p>x<br>y</b></p>", (Section("", "", 0, (Piece("text", "xy"),)),)),
+        ("</p></div><p>x<br>y</b></p>", (Section("", "", 0, (SectionPiece("text", "xy"),)),)),
     ],
 )
 def test_a_drawn_page_by_its_headings(body: str, sections: tuple[Section, ...]) -> None:

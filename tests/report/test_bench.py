@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import diagnose
-from coursebuild.numerics.reports.bench import SceneCard, SceneReport, Verdict, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import RowVerdict, SceneCard, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.points import seconds_text, setting_text
-from coursebuild.numerics.reports.records import Failure
+from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
 from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import bench_values
@@ -83,7 +83,7 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
 def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
     on_front: bool, noticeable: bool | None, colour: str
 ) -> None:
-    verdict = Verdict(on_front, None, None, None, noticeable, "So it is.")
+    verdict = RowVerdict(on_front, None, None, None, noticeable, "So it is.")
     text = bench_text([scene(scenario([row()], verdict=verdict))], Style(colour=True, width=80))
     assert f"\x1b[{colour}m    So it is." in text
 
@@ -269,7 +269,7 @@ def test_json_says_what_is_wrong() -> None:
         measured_json(
             bench_values([]),
             diagnostics=[diagnose("model-error", span, "the model `arm` does not compile: no")],
-            failures=[Failure("a", "b")],
+            failures=[ReportFailure("a", "b")],
             checked=[Checked("arm", "x.json", (departure,), ("c",))],
             remarks=["d"],
         )
@@ -324,7 +324,7 @@ leg  as recorded in content/reports/arm.bench.json
 
 
 def test_a_failure_as_text() -> None:
-    assert failure_text(Failure("a\x1b", "b"), Style()) == "error: a␛\n  help: b\n"
-    assert failure_text(Failure("a"), Style(colour=True)) == (
+    assert failure_text(ReportFailure("a\x1b", "b"), Style()) == "error: a␛\n  help: b\n"
+    assert failure_text(ReportFailure("a"), Style(colour=True)) == (
         "\x1b[1;31merror\x1b[0m\x1b[1m: a\x1b[0m\n"
     )

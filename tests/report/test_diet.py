@@ -14,18 +14,18 @@ from coursebuild.numerics.reports.diet import (
     DietReport,
     DietScenario,
     Finding,
-    Place,
+    ModelPlace,
     Saving,
     StaleKeep,
     TextEdit,
     Tried,
 )
-from coursebuild.numerics.reports.records import Failure, decode_diet, encode_diet
+from coursebuild.numerics.reports.records import ReportFailure, decode_diet, encode_diet
 from coursebuild.report import Style
 from coursebuild.report.diet import diet_text, diet_values
 from coursebuild.report.measuring import measured_json, measured_text
 
-PLACE = Place("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
+PLACE = ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
 SURE = Saving(2.2, 0.01, True, 1234, 30)
 FINDING = Finding(
@@ -167,7 +167,9 @@ def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
 
 def test_json_and_record_hold_everything() -> None:
     value = json.loads(
-        measured_json(diet_values([REPORT]), failures=[Failure("no", "yes")], remarks=["said"])
+        measured_json(
+            diet_values([REPORT]), failures=[ReportFailure("no", "yes")], remarks=["said"]
+        )
     )
     assert value["models"][0]["findings"][0]["edits"][0]["old"] == EDIT.old
     assert value["failures"] == [{"message": "no", "help": "yes"}] and value["remarks"] == ["said"]
@@ -178,6 +180,6 @@ def test_json_and_record_hold_everything() -> None:
 
 def test_a_report_on_no_model() -> None:
     assert diet_text([], Style()) == ""
-    failure = Failure("models/a.xml was changed in the meantime")
+    failure = ReportFailure("models/a.xml was changed in the meantime")
     failed = measured_text("", Style(), failures=[failure])
     assert failed == "error: models/a.xml was changed in the meantime\n"

@@ -7,12 +7,12 @@ from typing import Any
 
 from coursebuild.numerics.reports.bench import (
     Machine,
+    MeasuredSetting,
     OrderRow,
+    RowVerdict,
     ScenarioReport,
     SceneReport,
-    Setting,
     StableRow,
-    Verdict,
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.cases import (
@@ -24,7 +24,7 @@ from coursebuild.numerics.reports.cases import (
 )
 
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
-VERDICT = Verdict(True, None, None, None, False, "The scene’s own setting is on the front.")
+VERDICT = RowVerdict(True, None, None, None, False, "The scene’s own setting is on the front.")
 CASE = CaseReport(
     name="spring",
     title="A spring",
@@ -40,9 +40,9 @@ CASE = CaseReport(
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
 
-def setting(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> Setting:
+def setting(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> MeasuredSetting:
     solving = {"solver": "", "iterations": 0, "cone": "", **other}
-    return Setting(integrator=integrator, timestep=timestep, **solving)
+    return MeasuredSetting(integrator=integrator, timestep=timestep, **solving)
 
 
 def row(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> WorkPrecisionRow:
@@ -133,7 +133,7 @@ def swing() -> ScenarioReport:
             StableRow("implicit", None, True, (1e-3, 0.1)),
             StableRow("RK4", 0.09, False, (1e-3, 0.1)),
         ),
-        verdict=Verdict(False, 13, 0.39, 1 / 32, True, text),
+        verdict=RowVerdict(False, 13, 0.39, 1 / 32, True, text),
     )
 
 
@@ -191,6 +191,6 @@ def awkward() -> ScenarioReport:
         second="",
         agreement=None,
         stable=(StableRow("Euler", 0.0, False, (1e-4, 0.1)),),
-        verdict=Verdict(False, 2, 0.5, 0.1, None, text),
+        verdict=RowVerdict(False, 2, 0.5, 0.1, None, text),
         notes=("a note that does not fit into one line of a terminal, as there are some, too",),
     )

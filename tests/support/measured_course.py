@@ -9,9 +9,9 @@ from typing import Any
 from coursebuild.core.engine.memo import Memo
 from coursebuild.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.pipeline.measuring import Loaded
+from coursebuild.pipeline.measuring import CompiledScene
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.scenes import Scene
+from coursebuild.pipeline.scenes import CourseScene
 from support.bench_reports import swing
 
 BOX = """\
@@ -36,13 +36,21 @@ class Fake:
         self.found = list(found) or [swing()]
         self.asked: list[tuple[str, int, bool, bool]] = []
 
-    def scenarios_of(self, root: Path, scene: Scene, *, quick: bool) -> Loaded | Diagnostic:
+    def scenarios_of(
+        self, root: Path, scene: CourseScene, *, quick: bool
+    ) -> CompiledScene | Diagnostic:
         assert root.is_absolute()
         scenes: Any = tuple(self.found)
-        return Loaded(scene, None, scenes)
+        return CompiledScene(scene, None, scenes)
 
     def measured(
-        self, loaded: Loaded, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+        self,
+        loaded: CompiledScene,
+        number: int,
+        *,
+        quick: bool,
+        timed: bool,
+        tell: Callable[[str], None],
     ) -> ScenarioReport | Diagnostic:
         tell("swing: Euler")
         self.asked.append((loaded.scene.name, number, quick, timed))

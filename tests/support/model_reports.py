@@ -17,7 +17,7 @@ from coursebuild.numerics.reports.diet import (
     DietReport,
     DietScenario,
     Finding,
-    Place,
+    ModelPlace,
     Saving,
 )
 from support.bench_reports import MACHINE, awkward, swing
@@ -38,7 +38,7 @@ def finding(kind: str = "sensor-unread", **other: object) -> Finding:
     fields: dict[str, object] = {
         "kind": kind,
         "message": "nobody reads <this> sensor",
-        "places": (Place("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
+        "places": (ModelPlace("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
         "label": "bit-identical",
         "difference": 0.0,
         "scenarios": ("swing",),

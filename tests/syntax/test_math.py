@@ -7,12 +7,14 @@ import re
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from coursebuild.syntax.math import Formula, _closing, find_formula
+from coursebuild.syntax.math import FormulaText, _closing, find_formula
 
 TEXTS = st.text("$`\\ \n1a{", max_size=20)
 
 
-def each_mark(text: str, at: int, limit: int, last_runs: dict[int, int] | None) -> Formula | None:
+def each_mark(
+    text: str, at: int, limit: int, last_runs: dict[int, int] | None
+) -> FormulaText | None:
     width = 2 if text.startswith("$$", at) else 1
     start = at + width
     if start >= limit or (width == 1 and text[start] in " \t\n"):
@@ -24,11 +26,11 @@ def each_mark(text: str, at: int, limit: int, last_runs: dict[int, int] | None) 
                 return None
         elif mark[0] == "$" and width == 2:
             if len(mark) >= 2:
-                return Formula(start, end, end + 2, True)
+                return FormulaText(start, end, end + 2, True)
         elif mark[0] == "$":
             digit = re.match("[0-9]", text[end + 1 :])
             closes = text[end - 1] not in " \t\n" and not digit
-            return Formula(start, end, end + 1, False) if closes else None
+            return FormulaText(start, end, end + 1, False) if closes else None
     return None
 
 

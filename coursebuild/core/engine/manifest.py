@@ -32,7 +32,7 @@ _JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """What file managers strew about."""
 
 
-class Entry(Struct, frozen=True, array_like=True):
+class ManifestEntry(Struct, frozen=True, array_like=True):
     """A published file."""
 
     key: str
@@ -46,7 +46,7 @@ class Entry(Struct, frozen=True, array_like=True):
     inode: int
 
     @classmethod
-    def of(cls, key: str, digest: str, status: os.stat_result) -> Entry:
+    def of(cls, key: str, digest: str, status: os.stat_result) -> ManifestEntry:
         """The entry of a file that was just written."""
         return cls(key, digest, status.st_size, status.st_mtime_ns, status.st_ino)
 
@@ -64,7 +64,7 @@ class Manifest(Struct, frozen=True):
     """The files of one site, by path."""
 
     place: Path
-    entries: Mapping[str, Entry]
+    entries: Mapping[str, ManifestEntry]
 
     @classmethod
     def read(cls, root: Path, place: Path) -> Manifest:
@@ -72,10 +72,10 @@ class Manifest(Struct, frozen=True):
         with contextlib.suppress(OSError, ValueError):
             digest, _, body = _file(root, place).read_bytes().partition(b"\n")
             if digest.decode() == hashlib.sha256(body).hexdigest():
-                return cls(place, msgspec.json.decode(body, type=dict[str, Entry]))
+                return cls(place, msgspec.json.decode(body, type=dict[str, ManifestEntry]))
         return cls(place, {})
 
-    def entry(self, path: str, key: str) -> Entry | None:
+    def entry(self, path: str, key: str) -> ManifestEntry | None:
         """What was published at a path under a key."""
         found = self.entries.get(path)
         return found if found is not None and found.key == key else None

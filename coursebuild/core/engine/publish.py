@@ -34,8 +34,8 @@ from coursebuild.core.engine.exchange import exchange
 from coursebuild.core.engine.manifest import (
     FOLDER,
     MARKER,
-    Entry,
     Manifest,
+    ManifestEntry,
     foreign_files,
     holds,
     marker,
@@ -155,7 +155,7 @@ class _Site(Struct, frozen=True):
 
     def fill(
         self, slot: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
-    ) -> tuple[dict[str, Entry], list[str]]:
+    ) -> tuple[dict[str, ManifestEntry], list[str]]:
         """Make the slot hold the site; gives what is in it, and the paths that are new."""
         folders = _folders([*self.files, *([self.listed.path] if self.listed else [])])
         known = {p: e for p, (_, k) in self.files.items() if (e := self.old.entry(p, k))}
@@ -175,7 +175,7 @@ class _Site(Struct, frozen=True):
         write_file(f"{slot}/{MARKER}", marker(entries))
         return entries, made
 
-    def _add_list(self, listed: FileList, slot: Path, entries: dict[str, Entry]) -> bool:
+    def _add_list(self, listed: FileList, slot: Path, entries: dict[str, ManifestEntry]) -> bool:
         """Add the list of all files; whether it is a new one."""
         key = self._list_key(listed)
         entry = self.old.entry(listed.path, key)
@@ -185,7 +185,7 @@ class _Site(Struct, frozen=True):
         facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
         target = f"{slot}/{listed.path}"
         digest = write_file(target, listed.make(facts))
-        entries[listed.path] = Entry.of(key, digest, os.lstat(target))
+        entries[listed.path] = ManifestEntry.of(key, digest, os.lstat(target))
         return True
 
     def _list_key(self, listed: FileList) -> str:
@@ -194,7 +194,7 @@ class _Site(Struct, frozen=True):
         text = "\n".join((listed.key, *lines))
         return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
-    def _link(self, path: str, entry: Entry, slot: Path) -> bool:
+    def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
         """Link a file of the old site, if it is as it should be."""
         target = f"{slot}/{path}"
         try:
@@ -326,8 +326,8 @@ def _put_away(root: Path, slot: Path) -> None:
 
 
 def _sift(
-    folder: str, prefix: str, known: Mapping[str, Entry], folders: Container[str]
-) -> dict[str, Entry]:
+    folder: str, prefix: str, known: Mapping[str, ManifestEntry], folders: Container[str]
+) -> dict[str, ManifestEntry]:
     """Remove from a folder all but files that are as they should be; gives these.
 
     Args:
@@ -336,7 +336,7 @@ def _sift(
         known: what the files should be, by path.
         folders: those that may stay.
     """
-    kept: dict[str, Entry] = {}
+    kept: dict[str, ManifestEntry] = {}
     with os.scandir(folder) as entries:
         found = list(entries)
     for entry in found:

@@ -35,7 +35,7 @@ _WRITERS = 4
 T = TypeVar("T")
 
 
-class Place(Protocol):
+class SharedFolder(Protocol):
     """Where files can be put. Paths are POSIX and relative; whatever is raised means trouble."""
 
     def read(self, path: str) -> bytes | None:
@@ -58,7 +58,7 @@ class FolderPlace:
         self.folder = folder
 
     def read(self, path: str) -> bytes | None:
-        """See `Place`."""
+        """See `SharedFolder`."""
         try:
             return (self.folder / path).read_bytes()
         except (FileNotFoundError, NotADirectoryError):
@@ -67,7 +67,7 @@ class FolderPlace:
             return None
 
     def write(self, path: str, data: bytes) -> None:
-        """See `Place`; whole or not at all."""
+        """See `SharedFolder`; whole or not at all."""
         target = self.folder / path
         self.folder.mkdir(exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -81,7 +81,7 @@ class FolderPlace:
             raise
 
     def names(self, folder: str) -> list[str]:
-        """See `Place`."""
+        """See `SharedFolder`."""
         try:
             found = [path.name for path in (self.folder / folder).iterdir()]
         except (FileNotFoundError, NotADirectoryError):
@@ -97,7 +97,7 @@ class RemotePlace:
         self.top = top.rstrip("/")
 
     def read(self, path: str) -> bytes | None:
-        """See `Place`."""
+        """See `SharedFolder`."""
         try:
             data: bytes = self.files.cat_file(f"{self.top}/{path}")
         except (FileNotFoundError, NotADirectoryError):
@@ -105,7 +105,7 @@ class RemotePlace:
         return data
 
     def write(self, path: str, data: bytes) -> None:
-        """See `Place`."""
+        """See `SharedFolder`."""
         full = f"{self.top}/{path}"
         try:
             self.files.pipe_file(full, data)
@@ -114,7 +114,7 @@ class RemotePlace:
             self.files.pipe_file(full, data)
 
     def names(self, folder: str) -> list[str]:
-        """See `Place`."""
+        """See `SharedFolder`."""
         try:
             found = self.files.ls(f"{self.top}/{folder}", detail=False)
         except (FileNotFoundError, NotADirectoryError):
@@ -153,7 +153,7 @@ def shared_cache(where: str) -> SharedCache:
 class SharedCache:
     """What the store asks, whatever becomes of the place."""
 
-    def __init__(self, where: str, place: Place, timeout: float = _TIMEOUT) -> None:
+    def __init__(self, where: str, place: SharedFolder, timeout: float = _TIMEOUT) -> None:
         self.where = where
         self.place = place
         self.timeout = timeout

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coursebuild.core.engine.manifest import Entry
+from coursebuild.core.engine.manifest import ManifestEntry
 from coursebuild.results import OutputFile, SiteFile
 
 if TYPE_CHECKING:
@@ -29,25 +29,25 @@ _MOST = 4
 @contextmanager
 def writing(
     folder: Path, files: Sequence[tuple[SiteFile, str]], jobs: int
-) -> Iterator[Callable[[], dict[str, Entry]]]:
+) -> Iterator[Callable[[], dict[str, ManifestEntry]]]:
     """Gives what writes files with their keys into a folder; its own folders are there.
 
     What that gives is the entries of the files, by path.
     """
 
-    def write(file: SiteFile, key: str) -> Entry:
+    def write(file: SiteFile, key: str) -> ManifestEntry:
         target = f"{folder}/{file.path}"
         Path(target).unlink(missing_ok=True)  # half of it, by a copy that died
         digest = write_file(target, file.data if isinstance(file, OutputFile) else file.make())
-        return Entry.of(key, digest, os.lstat(target))
+        return ManifestEntry.of(key, digest, os.lstat(target))
 
-    def share(start: int) -> list[Entry]:
+    def share(start: int) -> list[ManifestEntry]:
         return [write(*found) for found in files[start : start + _SHARE]]
 
     starts = range(0, len(files), _SHARE)
     with _workers(share, jobs if len(files) >= _MANY else 1) as workers:
 
-        def written() -> dict[str, Entry]:
+        def written() -> dict[str, ManifestEntry]:
             tasks = ((None, start) for start in starts)
             parts = map(share, starts) if workers is None else workers.map(tasks)[0]
             entries = (entry for part in parts for entry in part)
@@ -58,8 +58,8 @@ def writing(
 
 @contextmanager
 def _workers(
-    share: Callable[[int], list[Entry]], jobs: int
-) -> Iterator[Workers[int, list[Entry]] | None]:
+    share: Callable[[int], list[ManifestEntry]], jobs: int
+) -> Iterator[Workers[int, list[ManifestEntry]] | None]:
     if jobs > 1:
         from coursebuild.core.engine.workers import Workers, can_fork
 

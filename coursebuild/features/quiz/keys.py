@@ -1,6 +1,6 @@
 """Keys by which a learner's answers find their question again, whatever else of a quiz changes.
 
-Entry points: `text_key`, `Keys`.
+Entry points: `text_key`, `QuestionKeys`.
 
 A question's key is its `id`, or else a hash of its kind and its text; an option's and an item's is
 a hash of its text. So adding, removing and moving them changes no other's key.
@@ -25,7 +25,7 @@ def text_key(kind: str, text: str) -> str:
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
-class Keys(Struct):
+class QuestionKeys(Struct):
     """Keys that are each given once."""
 
     taken: set[str] = field(default_factory=set)

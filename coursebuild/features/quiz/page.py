@@ -43,7 +43,7 @@ class Option(Struct, frozen=True):
     right: bool
 
 
-class Item(Struct, frozen=True):
+class OrderItem(Struct, frozen=True):
     """An item that is to be put in order."""
 
     key: str
@@ -73,7 +73,7 @@ class QuestionView(Struct, frozen=True):
     tolerance: str = ""
     unit: Markup = Markup()
     reference: Markup = Markup()
-    items: tuple[Item, ...] = ()
+    items: tuple[OrderItem, ...] = ()
     """In the right order."""
     order: tuple[int, ...] = ()
     """Indices into `items`, as they are shown."""
@@ -132,7 +132,7 @@ def _question(page: PageContext, block: Quiz, question: AnyQuestion, number: int
             return _output(page, view, question)
         case OrderQuestion():
             items = tuple(
-                Item(key, page.inlines(item))
+                OrderItem(key, page.inlines(item))
                 for key, item in zip(question.item_keys, question.items, strict=True)
             )
             order = shuffle(len(items), f"{block.id}/{number}")

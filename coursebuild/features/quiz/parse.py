@@ -18,7 +18,7 @@ from typing import assert_never
 from msgspec.structs import replace
 
 from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
-from coursebuild.features.quiz.keys import Keys
+from coursebuild.features.quiz.keys import QuestionKeys
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     Choice,
@@ -34,8 +34,8 @@ from coursebuild.features.quiz.schema import (
     MultipleChoice,
     Numeric,
     Open,
-    Order,
-    Output,
+    OrderFields,
+    OutputFields,
     Predict,
     QuizFile,
 )
@@ -113,7 +113,7 @@ def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[O
     """The key of each question: its id, or that of its text, which must not be another's id."""
     fields = {node: decoding.structs.get(node) for node in nodes}
     given = {n: f.id for n, f in fields.items() if isinstance(f, AnyFields) and f.id is not None}
-    keys = Keys(set(given.values()))
+    keys = QuestionKeys(set(given.values()))
     return {
         node: given[node] if node in given else keys.of(_kind(node), known.q)
         for node, known in fields.items()
@@ -146,7 +146,7 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
             if fields.answer == 0 and fields.tol is None:
                 message = "`tol` is missing: of an answer that is 0 it cannot be a share"
                 yield diagnose("field-missing", node.place("answer"), message)
-        case Order():
+        case OrderFields():
             yield from _check_distinct(node, "items", "two items are the same: `{}`")
         case _:
             pass
@@ -216,11 +216,11 @@ def _question(
             return NumericQuestion(*common, fields.answer, written, tolerance, fields.unit)
         case Open():
             return OpenQuestion(*common, prose.blocks(node.get("reference")))
-        case Output():
+        case OutputFields():
             script, line = node.place("of"), node.place("line")
             return OutputQuestion(*common, fields.of, script, fields.line, line)
-        case Order():
-            keys = Keys().each("item", fields.items)
+        case OrderFields():
+            keys = QuestionKeys().each("item", fields.items)
             return OrderQuestion(*common, prose.each_inlines(node.get("items")), keys)
         case _:
             assert_never(fields)
@@ -231,7 +231,7 @@ def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Ch
     items = options.items if isinstance(options, ArrayNode) else ()
     feedback = prose.each_blocks(node.get("feedback"))
     padded = feedback + ((),) * (len(items) - len(feedback))
-    keys = Keys().each("option", texts)
+    keys = QuestionKeys().each("option", texts)
     return tuple(
         Choice(item.span, key, prose.inlines(item), text)
         for item, key, text in zip(items, keys, padded, strict=False)

@@ -86,14 +86,14 @@ class Open(Common, frozen=True, kw_only=True, tag_field="kind", tag="open"):
     reference: Annotated[Blocks, Meta(description="the answer to compare with")]
 
 
-class Output(Common, frozen=True, kw_only=True, tag_field="kind", tag="output"):
+class OutputFields(Common, frozen=True, kw_only=True, tag_field="kind", tag="output"):
     """What does a script print? The key is its verified output."""
 
     of: Annotated[Text, Meta(description="the script, as in `examples/x.py`")]
     line: Annotated[int, Meta(ge=1, description="the line of its output, from 1")]
 
 
-class Order(Common, frozen=True, kw_only=True, tag_field="kind", tag="order"):
+class OrderFields(Common, frozen=True, kw_only=True, tag_field="kind", tag="order"):
     """Items to be put in order."""
 
     items: Annotated[
@@ -102,7 +102,7 @@ class Order(Common, frozen=True, kw_only=True, tag_field="kind", tag="order"):
     ]
 
 
-AnyFields: TypeAlias = MultipleChoice | Predict | Numeric | Open | Output | Order
+AnyFields: TypeAlias = MultipleChoice | Predict | Numeric | Open | OutputFields | OrderFields
 
 
 class QuizFile(Struct, frozen=True, forbid_unknown_fields=True):

@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.compare import Case, Comparison, Seen, watch
+from coursebuild.numerics.pruning.compare import Case, MotionComparison, Seen, watch
 from coursebuild.numerics.pruning.dynamics import collisions, idle, settings
-from coursebuild.numerics.pruning.edits import Edit, merge_edits
+from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.meshes import meshes
 from coursebuild.numerics.pruning.model_text import ModelText
@@ -28,11 +28,11 @@ from coursebuild.numerics.pruning.scenery import scenery
 from coursebuild.numerics.pruning.trials import (
     Candidate,
     Item,
-    Look,
     NotTriedError,
+    PruningContext,
+    PruningTrial,
+    PruningTrials,
     Ratio,
-    Trial,
-    Trials,
 )
 from coursebuild.numerics.pruning.unused import unused
 from coursebuild.numerics.reports.diet import (
@@ -40,7 +40,7 @@ from coursebuild.numerics.reports.diet import (
     EQUAL,
     IDENTICAL,
     UNTOUCHED,
-    Place,
+    ModelPlace,
     Saving,
     TextEdit,
 )
@@ -81,7 +81,7 @@ class Survey(Struct, frozen=True):
     slim: Saving | None
     slim_difference: float | None
     stale: tuple[str, ...]
-    edits: tuple[Edit, ...]
+    edits: tuple[ModelEdit, ...]
     """All that `--fix` changes."""
 
 
@@ -96,7 +96,7 @@ class _Surveyor:
         self.scene = order.scene
         self.seen = tuple(watch(order.scene.model, case) for case in order.cases)
         self.cases = [one.case for one in self.seen if one.judgement.ok]
-        self.trials = Trials(order.scene, self.cases, order.clock, quick=order.quick)
+        self.trials = PruningTrials(order.scene, self.cases, order.clock, quick=order.quick)
         self.findings: list[Finding] = []
         self.tried: list[Tried] = []
         self.used: set[str] = set()
@@ -122,7 +122,7 @@ class _Surveyor:
         declared = any(one.case.declared for one in self.seen)
         model = self.scene.model
         keyframes = frozenset({one.case.scenario.keyframe for one in self.seen} - {-1})
-        look = Look(
+        look = PruningContext(
             self.scene,
             self.order.readers,
             good,
@@ -169,7 +169,7 @@ class _Surveyor:
             if ratio is None or not (ratio.certain and ratio.value >= LEAST):
                 self._note(candidate, items, None, "it saves no time")
                 return True
-            trial = Trial(edits, model, left, self.trials.compared(model, left))
+            trial = PruningTrial(edits, model, left, self.trials.compared(model, left))
         except NotTriedError as error:
             self._note(candidate, items, None, str(error))
             return False
@@ -177,11 +177,11 @@ class _Surveyor:
 
     def _parts(
         self, candidate: Candidate, items: Sequence[Item]
-    ) -> Iterator[tuple[list[Item], Trial]]:
+    ) -> Iterator[tuple[list[Item], PruningTrial]]:
         """Items that go together, and how it went without them; what cannot be tried is noted."""
         waiting = [list(items)]
-        same: list[tuple[list[Item], Trial]] = []
-        near: list[tuple[list[Item], Trial]] = []
+        same: list[tuple[list[Item], PruningTrial]] = []
+        near: list[tuple[list[Item], PruningTrial]] = []
         while waiting:
             part = waiting.pop()
             try:
@@ -206,8 +206,8 @@ class _Surveyor:
         yield from self._joined(near, identical=False)
 
     def _joined(
-        self, parts: Sequence[tuple[list[Item], Trial]], *, identical: bool
-    ) -> Iterator[tuple[list[Item], Trial]]:
+        self, parts: Sequence[tuple[list[Item], PruningTrial]], *, identical: bool
+    ) -> Iterator[tuple[list[Item], PruningTrial]]:
         """Parts that are alike, as one where that is like them."""
         if len(parts) > 1:
             items = [item for part, _ in parts for item in part]
@@ -221,7 +221,7 @@ class _Surveyor:
                 return
         yield from parts
 
-    def _timed(self, candidate: Candidate, trial: Trial) -> Ratio | None:
+    def _timed(self, candidate: Candidate, trial: PruningTrial) -> Ratio | None:
         if not candidate.timed or not (trial.result.identical or trial.result.equal):
             return None
         return self.trials.ratio(trial.model, trial.left)
@@ -230,7 +230,7 @@ class _Surveyor:
         self,
         candidate: Candidate,
         items: Sequence[Item],
-        trial: Trial,
+        trial: PruningTrial,
         ratio: Ratio | None,
         reason: str | None,
     ) -> bool:
@@ -263,7 +263,7 @@ class _Surveyor:
             self.faults += items
         return True
 
-    def _unfixed(self, candidate: Candidate, trial: Trial, label: str, reason: str) -> str:
+    def _unfixed(self, candidate: Candidate, trial: PruningTrial, label: str, reason: str) -> str:
         if reason:
             return "it is kept"
         if candidate.is_setting:
@@ -289,13 +289,13 @@ class _Surveyor:
         message = _said(candidate, names)
         self.tried.append(Tried(candidate.kind, message, names, finite, why))
 
-    def _place(self, item: Item) -> Place:
+    def _place(self, item: Item) -> ModelPlace:
         element = item.element
         assert element is not None
         line, column = element.document.position(element.start)
-        return Place(item.name, place_of(element), element.document.path, line, column)
+        return ModelPlace(item.name, place_of(element), element.document.path, line, column)
 
-    def _texts(self, edits: Sequence[Edit]) -> tuple[TextEdit, ...]:
+    def _texts(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
         by_path = {document.path: document for document in self.scene.documents}
         found = []
         for edit in merge_edits(edits):
@@ -306,7 +306,7 @@ class _Surveyor:
             found.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
         return tuple(found)
 
-    def _together(self, items: Sequence[Item]) -> tuple[Saving | None, tuple[Edit, ...]]:
+    def _together(self, items: Sequence[Item]) -> tuple[Saving | None, tuple[ModelEdit, ...]]:
         """All that is to be fixed at once; less, where that is no longer the same."""
         left = list(items)
         while left:
@@ -345,7 +345,7 @@ def _said(candidate: Candidate, names: Sequence[str]) -> str:
     return candidate.message.replace("{}", shown)
 
 
-def _label(candidate: Candidate, result: Comparison) -> str:
+def _label(candidate: Candidate, result: MotionComparison) -> str:
     if result.identical:
         certain = candidate.proof or candidate.is_setting
         return IDENTICAL if certain else UNTOUCHED

@@ -22,7 +22,7 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.model.scenarios import Declarations
-from coursebuild.numerics.detector import Judgement, Peaks, judge, peaks
+from coursebuild.numerics.detector import Peaks, RunJudgement, judge, peaks
 from coursebuild.numerics.engine import advance, initial_data
 from coursebuild.numerics.problem import Scenario, Setup, whole_number
 from coursebuild.numerics.pruning.mapping import Mapping, transfer
@@ -81,7 +81,7 @@ def cases(model: Any, declared: Declarations | None, *, quick: bool) -> tuple[Ca
     return (Case("start", Scenario(10 * step, step), 10),)
 
 
-class Comparison(Struct, frozen=True):
+class MotionComparison(Struct, frozen=True):
     """How a changed model did in all scenarios."""
 
     identical: bool
@@ -100,7 +100,7 @@ def quiet(model: Any) -> Any:
     return model
 
 
-def compare(base: Any, changed: Any, mapping: Mapping, cases: Sequence[Case]) -> Comparison:
+def compare(base: Any, changed: Any, mapping: Mapping, cases: Sequence[Case]) -> MotionComparison:
     """Run both in all the scenarios.
 
     Raises:
@@ -115,7 +115,7 @@ def compare(base: Any, changed: Any, mapping: Mapping, cases: Sequence[Case]) ->
         difference = max(difference, _shots(base, changed, mapping, case))
         if math.isinf(difference):
             break
-    return Comparison(identical, difference)
+    return MotionComparison(identical, difference)
 
 
 def _both(base: Any, changed: Any, mapping: Mapping, case: Case) -> tuple[Any, Any]:
@@ -219,7 +219,7 @@ class Seen(Struct, frozen=True, eq=False):
     """What a run of the whole model showed."""
 
     case: Case
-    judgement: Judgement
+    judgement: RunJudgement
     touching: frozenset[tuple[int, int]]
     """Pairs of geoms between which there was a contact."""
     constrained: bool

@@ -24,7 +24,7 @@ from coursebuild.numerics.pruning.edits import set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
-from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
+from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
 
 _NO_BIAS = int(mujoco.mjtBias.mjBIAS_NONE)
 _NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)
@@ -32,14 +32,14 @@ _FIXED_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED)
 _AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_AFFINE)
 
 
-def idle(look: Look) -> Iterator[Candidate]:
+def idle(look: PruningContext) -> Iterator[Candidate]:
     """Actuators that nobody commands, tendons without a force, fluid that nothing feels."""
     yield from _actuators(look)
     yield from _tendons(look)
     yield from _fluid(look)
 
 
-def _tendons(look: Look) -> Iterator[Candidate]:
+def _tendons(look: PruningContext) -> Iterator[Candidate]:
     """Tendons along which nothing acts, and whose length nobody asks for."""
     if look.readers.whole("tendon"):
         return
@@ -86,7 +86,7 @@ def _slack(model: Any, number: int) -> bool:
     )
 
 
-def _actuators(look: Look) -> Iterator[Candidate]:
+def _actuators(look: PruningContext) -> Iterator[Candidate]:
     if look.readers.whole("actuator"):
         return
     driven = _driven(look)
@@ -114,7 +114,7 @@ def _actuators(look: Look) -> Iterator[Candidate]:
         yield Candidate("actuator-idle", message, tuple(held), blocked=blocked)
 
 
-def _driven(look: Look) -> set[int]:
+def _driven(look: PruningContext) -> set[int]:
     """Actuators that get a command other than 0 in a scenario or a keyframe."""
     model = look.model
     found: set[int] = set()
@@ -146,7 +146,7 @@ def _excludes_zero(model: Any, number: int) -> bool:
     return any(low > 0 or high < 0 for low, high in ranges)
 
 
-def _fluid(look: Look) -> Iterator[Candidate]:
+def _fluid(look: PruningContext) -> Iterator[Candidate]:
     model = look.model
     options = [one for one in look.scene.elements if one.tag == "option"]
     having = {
@@ -182,7 +182,7 @@ MOST_PAIRS = 100_000
 """Pairs beyond which nothing is proved of them."""
 
 
-def collisions(look: Look) -> Iterator[Candidate]:
+def collisions(look: PruningContext) -> Iterator[Candidate]:
     """Contact as a whole, or geoms that can touch nothing."""
     model = look.model
     pairs = frozenset(islice(each_pair(model), MOST_PAIRS))
@@ -207,7 +207,9 @@ def _pairs(pairs: frozenset[Pair]) -> str:
     return f"{len(pairs)} pairs of geoms" if len(pairs) != 1 else "1 pair of geoms"
 
 
-def _geoms(look: Look, pairs: frozenset[Pair], apart: frozenset[Pair]) -> Iterator[Candidate]:
+def _geoms(
+    look: PruningContext, pairs: frozenset[Pair], apart: frozenset[Pair]
+) -> Iterator[Candidate]:
     near = {geom for pair in pairs - apart for geom in pair}
     far = {geom for pair in apart for geom in pair} - near
     explicit = {int(g) for g in (*look.model.pair_geom1, *look.model.pair_geom2)}
@@ -236,7 +238,7 @@ _SOLVERS = {0: "PGS", 1: "CG", 2: "Newton"}
 _TOLERANCE = 1e-6
 
 
-def settings(look: Look) -> Iterator[Candidate]:
+def settings(look: PruningContext) -> Iterator[Candidate]:
     """Other settings, for a model in which a constraint was ever active."""
     model = look.model
     if not any(seen.constrained for seen in look.seen):
@@ -273,7 +275,7 @@ def _flag(kind: str, message: str, name: str, value: str) -> Candidate:
     return Candidate(kind, message, (Item(kind, None, flags=((name, value),)),), is_setting=True)
 
 
-def _dimensions(look: Look) -> Iterator[Candidate]:
+def _dimensions(look: PruningContext) -> Iterator[Candidate]:
     """Contacts without rolling or torsional friction, and without any."""
     having = [
         one

@@ -1,6 +1,6 @@
 """Changes of MJCF as replacements of bytes: everything else stays as its author wrote it.
 
-Entry points: `Edit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers`,
+Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers`,
 `set_options` make them; `apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
 
 1. An element that has lines of its own goes with these; one that shares its line goes with the
@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.markup import Document, Element
+from coursebuild.numerics.pruning.markup import Element, Markup
 
 Settings: TypeAlias = Sequence[tuple[str, str | None]]
 """Names of attributes and their values; `None` for one to take out."""
@@ -32,7 +32,7 @@ _SECTIONS = frozenset(
 """What may go when nothing is left in it."""
 
 
-class Edit(Struct, frozen=True, order=True):
+class ModelEdit(Struct, frozen=True, order=True):
     """Bytes `[start, end)` of a file replaced."""
 
     path: str
@@ -41,7 +41,7 @@ class Edit(Struct, frozen=True, order=True):
     new: bytes
 
 
-def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
+def apply_edits(data: bytes, edits: Iterable[ModelEdit]) -> bytes:
     """The bytes with all edits of one file; an edit inside of what another one removes is void.
 
     Raises:
@@ -59,14 +59,14 @@ def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join((*parts, data[last:]))
 
 
-def merge_edits(edits: Iterable[Edit]) -> tuple[Edit, ...]:
+def merge_edits(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     """The same changes in order, with removals that follow each other in one."""
-    found: list[Edit] = []
+    found: list[ModelEdit] = []
     for edit in sorted(set(edits)):
         last = found[-1] if found else None
         joins = last is not None and (last.path, last.end) == (edit.path, edit.start)
         if last is not None and joins and not (last.new or edit.new):
-            found[-1] = Edit(last.path, last.start, edit.end, b"")
+            found[-1] = ModelEdit(last.path, last.start, edit.end, b"")
         else:
             found.append(edit)
     return tuple(found)
@@ -75,7 +75,7 @@ def merge_edits(edits: Iterable[Edit]) -> tuple[Edit, ...]:
 # ---------------------------------------------------------------------------------------- elements
 
 
-def remove(elements: Iterable[Element]) -> tuple[Edit, ...]:
+def remove(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
     """Take elements out of their files, with sections of which nothing is left."""
     gone = set(elements)
     waiting = list(gone)
@@ -110,7 +110,7 @@ def _has_more(parent: Element) -> bool:
     return any(data[end:start].strip() for end, start in zip(ends, starts, strict=True))
 
 
-def _removal(element: Element) -> Edit:
+def _removal(element: Element) -> ModelEdit:
     data, start, end = element.document.data, element.start, element.end
     left = _before(data, start)
     right = _after(data, end)
@@ -120,7 +120,7 @@ def _removal(element: Element) -> Edit:
         start, end = (left, line_end.end()) if line_end else (start, right)
     else:
         start = left
-    return Edit(element.document.path, start, end, b"")
+    return ModelEdit(element.document.path, start, end, b"")
 
 
 def _before(data: bytes, at: int) -> int:
@@ -139,21 +139,21 @@ def _after(data: bytes, at: int) -> int:
 # -------------------------------------------------------------------------------------- attributes
 
 
-def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple[Edit, ...]:
+def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple[ModelEdit, ...]:
     """Give attributes other values; write those that are not there behind the last."""
     path = element.document.path
-    edits: list[Edit] = []
+    edits: list[ModelEdit] = []
     new: list[tuple[str, str]] = []
     for name, value in values:
         there = element.attribute(name)
         if there is not None:
-            edits.append(Edit(path, *there.inner, value.encode()))
+            edits.append(ModelEdit(path, *there.inner, value.encode()))
         else:
             new.append((name, value))
     if new:
         tag = element.start + 1 + len(element.tag.encode())
         at = max([a.end for a in element.attributes], default=tag)
-        edits.append(Edit(path, at, at, _written(new)))
+        edits.append(ModelEdit(path, at, at, _written(new)))
     return tuple(edits)
 
 
@@ -161,15 +161,15 @@ def _written(values: Iterable[tuple[str, str]]) -> bytes:
     return "".join(f' {name}="{value}"' for name, value in values).encode()
 
 
-def drop_attribute(element: Element, name: str) -> Edit:
+def drop_attribute(element: Element, name: str) -> ModelEdit:
     """Take out an attribute, with the blanks before it."""
     there = element.attribute(name)
     assert there is not None, name
     start = len(element.document.data[: there.start].rstrip())
-    return Edit(element.document.path, start, there.end, b"")
+    return ModelEdit(element.document.path, start, there.end, b"")
 
 
-def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[Edit, ...]:
+def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[ModelEdit, ...]:
     """Take numbers (from 0) out of an attribute that lists some; nothing where it has fewer."""
     there = element.attribute(name)
     if there is None or not places:
@@ -182,16 +182,16 @@ def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[
     path, found = element.document.path, []
     for place in range(left[-1]):  # each with the blanks behind it
         if place not in left:
-            found.append(Edit(path, start + spans[place][0], start + spans[place + 1][0], b""))
+            found.append(ModelEdit(path, start + spans[place][0], start + spans[place + 1][0], b""))
     if left[-1] + 1 < len(spans):  # the last ones with the blanks before them
-        found.append(Edit(path, start + spans[left[-1]][1], start + spans[-1][1], b""))
+        found.append(ModelEdit(path, start + spans[left[-1]][1], start + spans[-1][1], b""))
     return tuple(found)
 
 
 # ----------------------------------------------------------------------------------------- options
 
 
-def set_options(main: Document, options: Settings, flags: Settings) -> tuple[Edit, ...]:
+def set_options(main: Markup, options: Settings, flags: Settings) -> tuple[ModelEdit, ...]:
     """Set attributes of `option` and of its `flag`, or take them out (`None`), all at once.
 
     What is left without attributes goes; what is not there yet is written into the model's own
@@ -218,10 +218,10 @@ def set_options(main: Document, options: Settings, flags: Settings) -> tuple[Edi
 
 
 def _changed(
-    elements: Sequence[Element], wanted: Settings, main: Document, spared: set[Element]
-) -> tuple[list[Edit], list[tuple[str, str]]]:
+    elements: Sequence[Element], wanted: Settings, main: Markup, spared: set[Element]
+) -> tuple[list[ModelEdit], list[tuple[str, str]]]:
     """Edits of elements that are there, and what none of them can take."""
-    edits: list[Edit] = []
+    edits: list[ModelEdit] = []
     new: list[tuple[str, str]] = []
     for name, value in wanted:
         having = [one for one in elements if one.attribute(name) is not None]
@@ -247,7 +247,7 @@ def _is_emptied(element: Element, wanted: Settings, gone: Collection[Element]) -
     return had and not (left or inside or _has_more(element))
 
 
-def _first_child(parent: Element, new: bytes) -> Edit:
+def _first_child(parent: Element, new: bytes) -> ModelEdit:
     """Write an element before the first child of another, on a line of its own."""
     path, data = parent.document.path, parent.document.data
     newline = b"\r\n" if b"\r\n" in data else b"\n"
@@ -256,14 +256,14 @@ def _first_child(parent: Element, new: bytes) -> Edit:
     if parent.tail == parent.end:  # it is one tag, `<a/>`
         slash = len(data[: parent.end - 2].rstrip())
         text = b">" + inner + newline + outer + f"</{parent.tag}>".encode()
-        return Edit(path, slash, parent.end, text)
+        return ModelEdit(path, slash, parent.end, text)
     if parent.children:
         first = parent.children[0]
         if data[parent.head : first.start].strip(b" \t") == b"":  # all on one line
             inner = new
         else:
             inner = newline + _indent(data, first.start) + new
-    return Edit(path, parent.head, parent.head, inner)
+    return ModelEdit(path, parent.head, parent.head, inner)
 
 
 def _indent(data: bytes, at: int) -> bytes:

@@ -1,6 +1,6 @@
 """MJCF as text whose every element and attribute knows its place, in bytes.
 
-Entry points: `Document`, `Element`, `parse_markup(path, data)`; `place_of`.
+Entry points: `Markup`, `Element`, `parse_markup(path, data)`; `place_of`.
 
 1. The standard library's parser tells at which byte an element begins and ends; attributes are then
    looked up in its tag. Whatever the file declares, it is read as UTF-8, as MuJoCo does.
@@ -24,7 +24,7 @@ _NEWLINE = re.compile(r"\r\n|\r|\n")
 class MarkupError(Exception):
     """A text is no XML."""
 
-    def __init__(self, document: Document, offset: int, message: str) -> None:
+    def __init__(self, document: Markup, offset: int, message: str) -> None:
         self.path, self.message = document.path, message
         self.line, self.column = document.position(offset)
         super().__init__(f"{self.path}:{self.line}:{self.column}: {message}")
@@ -46,7 +46,7 @@ class Attribute(Struct, frozen=True):
 class Element(Struct, eq=False):
     """An element of a file."""
 
-    document: Document
+    document: Markup
     tag: str
     parent: Element | None
     attributes: tuple[Attribute, ...]
@@ -57,7 +57,7 @@ class Element(Struct, eq=False):
     """Where its end tag begins; `head` where it has none."""
     end: int = 0
     children: list[Element] = field(default_factory=list)
-    included: Document | None = None
+    included: Markup | None = None
     """The file that an `include` pulls in."""
 
     def __repr__(self) -> str:
@@ -96,7 +96,7 @@ class Element(Struct, eq=False):
         return parent
 
 
-class Document:
+class Markup:
     """A file."""
 
     def __init__(self, path: str, data: bytes) -> None:
@@ -113,13 +113,13 @@ class Document:
         return len(lines), len(lines[-1]) + 1
 
 
-def parse_markup(path: str, data: bytes) -> Document:
+def parse_markup(path: str, data: bytes) -> Markup:
     """A file's elements; includes are not followed.
 
     Raises:
         MarkupError: it is no XML, or declares entities of its own.
     """
-    document = Document(path, data)
+    document = Markup(path, data)
     opened: list[Element] = []
     parser = expat.ParserCreate("utf-8")
     parser.ordered_attributes = True

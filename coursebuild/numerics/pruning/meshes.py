@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from coursebuild.numerics.pruning.edits import Edit, drop_attribute, set_attributes
+from coursebuild.numerics.pruning.edits import ModelEdit, drop_attribute, set_attributes
 from coursebuild.numerics.pruning.markup import Element, place_of
-from coursebuild.numerics.pruning.trials import Candidate, Item, Look, worded
+from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, worded
 from coursebuild.numerics.pruning.unused import asset_name
 from mjcourse.spatial import quat_conj, quat_rotate
 
@@ -33,7 +33,7 @@ _MOST = 100
 """Geoms that are tried; each is compiled a few times."""
 
 
-def meshes(look: Look) -> Iterator[Candidate]:
+def meshes(look: PruningContext) -> Iterator[Candidate]:
     """Geoms that only show a mesh, and could be a primitive."""
     items: list[Item] = []
     for element in _shown(look)[:_MOST]:
@@ -53,7 +53,7 @@ def meshes(look: Look) -> Iterator[Candidate]:
         )
 
 
-def _shown(look: Look) -> list[Element]:
+def _shown(look: PruningContext) -> list[Element]:
     """Geoms that are meshes of their own, and touch nothing."""
     model = look.model
     paired = {int(g) for g in (*model.pair_geom1, *model.pair_geom2)}
@@ -75,7 +75,7 @@ def _shown(look: Look) -> list[Element]:
     return found
 
 
-def _item(look: Look, element: Element) -> Item | None:
+def _item(look: PruningContext, element: Element) -> Item | None:
     thing = look.scene.ids(element)
     assert thing is not None
     geom = thing.ids[0]
@@ -98,7 +98,7 @@ def _item(look: Look, element: Element) -> Item | None:
     return None
 
 
-def _replaced(element: Element, shape: str, other: Any, geom: int) -> tuple[Edit, ...]:
+def _replaced(element: Element, shape: str, other: Any, geom: int) -> tuple[ModelEdit, ...]:
     count = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(shape, 3)
     values = (
         ("type", shape),
@@ -115,7 +115,7 @@ def _text(numbers: Any) -> str:
     return " ".join(f"{float(number):.9g}" for number in numbers)
 
 
-def _unshared(look: Look, element: Element) -> tuple[Element, ...]:
+def _unshared(look: PruningContext, element: Element) -> tuple[Element, ...]:
     """The mesh, if nothing else shows it."""
     name = element.get("mesh")
     using = [one for one in look.scene.elements if one.get("mesh") == name and one is not element]

@@ -20,8 +20,8 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.edits import Edit, apply_edits, set_attributes
-from coursebuild.numerics.pruning.markup import Document, Element, parse_markup
+from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, set_attributes
+from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup
 
 _DEEPEST = 32
 
@@ -63,7 +63,7 @@ class Thing(Struct, frozen=True):
 class ModelText:
     """A model and its files."""
 
-    def __init__(self, documents: Sequence[Document], compile: Compile, *, check: bool) -> None:
+    def __init__(self, documents: Sequence[Markup], compile: Compile, *, check: bool) -> None:
         self.documents = tuple(documents)
         self.main = documents[0]
         self.elements: tuple[Element, ...] = tuple(self.main.root.walk())
@@ -72,7 +72,7 @@ class ModelText:
         self.model: Any = self._checked() if check else self.compiled()
         self._things = self._named()
 
-    def compiled(self, edits: Iterable[Edit] = ()) -> Any:
+    def compiled(self, edits: Iterable[ModelEdit] = ()) -> Any:
         """A `mjModel` of the files with these changes.
 
         Raises:
@@ -80,7 +80,7 @@ class ModelText:
         """
         return self._compile(_whole(self.main, _by_path(edits)))
 
-    def files(self, edits: Iterable[Edit]) -> dict[str, bytes]:
+    def files(self, edits: Iterable[ModelEdit]) -> dict[str, bytes]:
         """The new bytes of each file that these edits change."""
         data = {document.path: document.data for document in self.documents}
         return {path: apply_edits(data[path], some) for path, some in _by_path(edits).items()}
@@ -108,7 +108,7 @@ class ModelText:
     def _named(self) -> dict[Element, Thing]:
         """What each element becomes; nothing where names cannot be given."""
         wanted: dict[Element, tuple[str, str]] = {}
-        edits: list[Edit] = []
+        edits: list[ModelEdit] = []
         for number, element in enumerate(self.elements):
             kind = thing_kind(element)
             if kind is None:
@@ -158,9 +158,9 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
     )
 
 
-def _included(document: Document, folder: str, read: Read, depth: int) -> list[Document]:
+def _included(document: Markup, folder: str, read: Read, depth: int) -> list[Markup]:
     """The files that a file includes, from its folder or the model's, and those that they do."""
-    found: list[Document] = []
+    found: list[Markup] = []
     for element in list(document.root.walk()):
         if element.tag != "include":
             continue
@@ -178,14 +178,14 @@ def _included(document: Document, folder: str, read: Read, depth: int) -> list[D
     return found
 
 
-def _by_path(edits: Iterable[Edit]) -> dict[str, list[Edit]]:
-    found: dict[str, list[Edit]] = {}
+def _by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
+    found: dict[str, list[ModelEdit]] = {}
     for edit in edits:
         found.setdefault(edit.path, []).append(edit)
     return found
 
 
-def _whole(document: Document, edits: Mapping[str, Sequence[Edit]]) -> bytes:
+def _whole(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
     """A file with edits, and in place of its includes what these hold."""
     own = list(edits.get(document.path, ()))
     removed = [(one.start, one.end) for one in own if not one.new and one.end > one.start]
@@ -196,7 +196,9 @@ def _whole(document: Document, edits: Mapping[str, Sequence[Edit]]) -> bytes:
         assert inner is not None
         text = _whole(inner, edits)
         root = parse_markup(inner.path, text).root
-        own.append(Edit(document.path, element.start, element.end, text[root.head : root.tail]))
+        own.append(
+            ModelEdit(document.path, element.start, element.end, text[root.head : root.tail])
+        )
     return apply_edits(document.data, own)
 
 

@@ -23,8 +23,8 @@ import numpy as np
 
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.reachability import moving_ball
-from coursebuild.numerics.pruning.trees import Box, References, Trees, Vector
-from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
+from coursebuild.numerics.pruning.trees import Bounds, References, Trees, Vector
+from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
 
 REGIONS = 5.0
 """Sizes of the region that what matters sweeps, or can reach."""
@@ -36,7 +36,7 @@ _VIEWS = frozenset(("camera", "light"))
 """What shows other things, wherever it is."""
 
 
-def scenery(look: Look) -> Iterator[Candidate]:
+def scenery(look: PruningContext) -> Iterator[Candidate]:
     """Geoms fixed to the world, and bodies that move, far from everything else."""
     trees = Trees(look, References(look))
     focus = trees.focus()
@@ -47,7 +47,9 @@ def scenery(look: Look) -> Iterator[Candidate]:
     yield from _geoms(look, trees, focus, region)
 
 
-def _bodies(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Iterator[Candidate]:
+def _bodies(
+    look: PruningContext, trees: Trees, focus: frozenset[int], region: Bounds
+) -> Iterator[Candidate]:
     far = _out_of_reach(trees, focus, region)
     items: list[Item] = []
     roots: set[int] = set()
@@ -83,7 +85,7 @@ def _bodies(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Ite
 _FAR = "nothing that could touch it comes near in these runs"
 
 
-def _out_of_reach(trees: Trees, focus: frozenset[int], region: Box) -> frozenset[int]:
+def _out_of_reach(trees: Trees, focus: frozenset[int], region: Bounds) -> frozenset[int]:
     """Trees that what the scene is about can never get to, and that do not come to it in a run.
 
     What touches one that may be reached has a part in it.
@@ -95,7 +97,7 @@ def _out_of_reach(trees: Trees, focus: frozenset[int], region: Box) -> frozenset
         own = trees.region([root])
         away, least = region.distance(own), REGIONS * region.size
         if ball is not None:
-            away = own.distance(Box(ball[0], ball[0])) - ball[1]
+            away = own.distance(Bounds(ball[0], ball[0])) - ball[1]
             least = CLEAR * ball[1] if trees.is_rubble(root) else max(least, REGIONS * 2 * ball[1])
         if away > max(least, MOVES * trees.way(root)):
             far.add(root)
@@ -109,7 +111,9 @@ def _out_of_reach(trees: Trees, focus: frozenset[int], region: Box) -> frozenset
     return frozenset(far)
 
 
-def _geoms(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Iterator[Candidate]:
+def _geoms(
+    look: PruningContext, trees: Trees, focus: frozenset[int], region: Bounds
+) -> Iterator[Candidate]:
     model = look.model
     moving = [g for g in range(model.ngeom) if trees.of_body[int(model.geom_bodyid[g])] in focus]
     ball = moving_ball(model, moving) if focus == trees.roots else None
@@ -133,7 +137,11 @@ def _geoms(look: Look, trees: Trees, focus: frozenset[int], region: Box) -> Iter
 
 
 def _is_scenery(
-    look: Look, trees: Trees, element: Element, region: Box, ball: tuple[Vector, float] | None
+    look: PruningContext,
+    trees: Trees,
+    element: Element,
+    region: Bounds,
+    ball: tuple[Vector, float] | None,
 ) -> bool:
     """Whether it is a far geom of the world, or a body of the world with nothing but such geoms."""
     if element.tag not in ("geom", "body"):
@@ -159,7 +167,7 @@ def _name(element: Element) -> str:
     return element.get("name") or place_of(element)
 
 
-def _is_far(trees: Trees, geom: int, region: Box, ball: tuple[Vector, float] | None) -> bool:
+def _is_far(trees: Trees, geom: int, region: Bounds, ball: tuple[Vector, float] | None) -> bool:
     model = trees.model
     body = int(model.geom_bodyid[geom])
     size = float(model.geom_rbound[geom])
@@ -168,7 +176,7 @@ def _is_far(trees: Trees, geom: int, region: Box, ball: tuple[Vector, float] | N
     if geom in trees.touched:
         return False
     place = trees.place[geom]
-    near = Box(place - size, place + size)
+    near = Bounds(place - size, place + size)
     if region.distance(near) < REGIONS * region.size:
         return False
     return ball is None or float(np.linalg.norm(place - ball[0])) > ball[1] + size

@@ -1,6 +1,6 @@
 """Bodies of a model that move together, what they sweep, and what refers to them.
 
-Entry points: `Trees`, `References`, `Box`.
+Entry points: `Trees`, `References`, `Bounds`.
 
 `Trees.focus` are those that the scene is about: the driven, measured, coupled, those set in motion
 or named by a lesson; where there is none, those with a sensor, else mechanisms, else what has a
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import is_repeated
-from coursebuild.numerics.pruning.trials import Look
+from coursebuild.numerics.pruning.trials import PruningContext
 from coursebuild.numerics.pruning.unused import unread_sensors
 
 Vector = NDArray[np.float64]
@@ -26,7 +26,7 @@ Vector = NDArray[np.float64]
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
 
 
-class Box(Struct, frozen=True, eq=False):
+class Bounds(Struct, frozen=True, eq=False):
     """A region, along the axes of the world."""
 
     low: Vector
@@ -37,7 +37,7 @@ class Box(Struct, frozen=True, eq=False):
         """Its diagonal, m."""
         return float(np.linalg.norm(self.high - self.low))
 
-    def distance(self, other: Box) -> float:
+    def distance(self, other: Bounds) -> float:
         """Between the nearest points of two, m."""
         gap = np.maximum(0.0, np.maximum(self.low - other.high, other.low - self.high))
         return float(np.linalg.norm(gap))
@@ -46,7 +46,7 @@ class Box(Struct, frozen=True, eq=False):
 class Trees:
     """Bodies that move together: each by the body at its root."""
 
-    def __init__(self, look: Look, references: References) -> None:
+    def __init__(self, look: PruningContext, references: References) -> None:
         self.look = look
         self.references = references
         self.model = model = look.model
@@ -136,13 +136,13 @@ class Trees:
             return True
         return bool(self.references.of(elements).others)
 
-    def region(self, roots: Iterable[int]) -> Box:
+    def region(self, roots: Iterable[int]) -> Bounds:
         """What trees sweep in all the runs."""
         bodies = [b for root in roots for b in self.bodies[root]]
         sizes = np.array([self._size(b) for b in bodies])[:, None]
         low = np.min([s.low[bodies] - sizes for s in self.look.seen], axis=(0, 1))
         high = np.max([s.high[bodies] + sizes for s in self.look.seen], axis=(0, 1))
-        return Box(low, high)
+        return Bounds(low, high)
 
     def way(self, root: int) -> float:
         """How far a tree's bodies go in a run, m."""
@@ -175,7 +175,7 @@ class Referring(Struct, frozen=True, eq=False):
 class References:
     """Which elements refer to which names."""
 
-    def __init__(self, look: Look) -> None:
+    def __init__(self, look: PruningContext) -> None:
         self._unread = set(unread_sensors(look))
         self._by_name: dict[str, list[Element]] = {}
         for element in look.scene.elements:

@@ -1,6 +1,6 @@
 """What could be left out of a model, and models without it, run and timed beside the original.
 
-Entry points: `Candidate`, `Item`, `Look`; `Trials`.
+Entry points: `Candidate`, `Item`, `PruningContext`; `PruningTrials`.
 
 1. A candidate is a kind of thing that may be in vain, with every place where the model has it. Why
    it must be in vain whatever happens is its `proof`; without one only runs speak for it.
@@ -17,8 +17,8 @@ import mujoco
 from msgspec import Struct
 
 from coursebuild.numerics.engine import initial_data
-from coursebuild.numerics.pruning.compare import Case, Comparison, Seen, compare
-from coursebuild.numerics.pruning.edits import Edit, drop_numbers, remove, set_options
+from coursebuild.numerics.pruning.compare import Case, MotionComparison, Seen, compare
+from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove, set_options
 from coursebuild.numerics.pruning.mapping import Gone, fits, mapping_without, transfer
 from coursebuild.numerics.pruning.mapping import Mapping as Left
 from coursebuild.numerics.pruning.markup import Element, place_of
@@ -44,7 +44,7 @@ class Item(Struct, frozen=True, eq=False):
     """Where to point at; `None`: at the model."""
     gone: tuple[Element, ...] = ()
     """Elements to take out."""
-    edits: tuple[Edit, ...] = ()
+    edits: tuple[ModelEdit, ...] = ()
     """Other changes of the text."""
     options: tuple[tuple[str, str | None], ...] = ()
     flags: tuple[tuple[str, str | None], ...] = ()
@@ -74,7 +74,7 @@ class Candidate(Struct, frozen=True, eq=False):
     """Who may need it, so that it is no fault; empty where nobody does."""
 
 
-class Look(Struct, frozen=True, eq=False):
+class PruningContext(Struct, frozen=True, eq=False):
     """All that is known before anything is tried."""
 
     scene: ModelText
@@ -106,13 +106,13 @@ def named_item(element: Element, *more: Element) -> Item:
 # ----------------------------------------------------------------------------------------- trials
 
 
-class Trial(Struct, frozen=True, eq=False):
+class PruningTrial(Struct, frozen=True, eq=False):
     """A changed model, and how it did."""
 
-    edits: tuple[Edit, ...]
+    edits: tuple[ModelEdit, ...]
     model: Any
     left: Left
-    result: Comparison
+    result: MotionComparison
 
 
 class Ratio(Struct, frozen=True):
@@ -133,7 +133,7 @@ class NotTriedError(Exception):
     """A change that makes no model, or one that cannot be compared."""
 
 
-class Trials:
+class PruningTrials:
     """Tries a model without things, in its scenarios."""
 
     def __init__(
@@ -144,16 +144,16 @@ class Trials:
         self.clock = clock
         self.quick = quick
 
-    def run(self, items: Iterable[Item]) -> Trial:
+    def run(self, items: Iterable[Item]) -> PruningTrial:
         """The model without these, in all scenarios.
 
         Raises:
             NotTriedError: it is no model, or cannot be compared.
         """
         edits, model, left = self.changed(items)
-        return Trial(edits, model, left, self.compared(model, left))
+        return PruningTrial(edits, model, left, self.compared(model, left))
 
-    def changed(self, items: Iterable[Item]) -> tuple[tuple[Edit, ...], Any, Left]:
+    def changed(self, items: Iterable[Item]) -> tuple[tuple[ModelEdit, ...], Any, Left]:
         """The edits without these, the model that they give, and what is left of the original.
 
         Raises:
@@ -170,7 +170,7 @@ class Trials:
             raise NotTriedError("what is left cannot be told from what is gone")
         return edits, model, left
 
-    def compared(self, model: Any, left: Left) -> Comparison:
+    def compared(self, model: Any, left: Left) -> MotionComparison:
         """How a changed model does.
 
         Raises:
@@ -204,7 +204,7 @@ class Trials:
         setups = [case.setup for case in self.cases]
         return [s for one in setups for s in moments(model, initial_data(one, model), one)]
 
-    def saving(self, trial: Trial, ratio: Ratio | None) -> Saving:
+    def saving(self, trial: PruningTrial, ratio: Ratio | None) -> Saving:
         """What a change saves, in time and bytes."""
         files = self.scene.files(trial.edits)
         before = {one.path: len(one.data) for one in self.scene.documents}
@@ -218,7 +218,7 @@ class Trials:
 # ----------------------------------------------------------------------------------------- changes
 
 
-def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[Edit, ...], Gone]:
+def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
     """All the edits that items make together, and what they take out of the compiled model."""
     some = list(items)
     gone = list(dict.fromkeys(one for item in some for one in item.gone))
@@ -238,10 +238,10 @@ def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[Edit, ...], G
     return _outermost(edits), lost
 
 
-def _outermost(edits: Iterable[Edit]) -> tuple[Edit, ...]:
+def _outermost(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     """Without those inside of what another one takes out."""
     some = sorted(set(edits), key=lambda one: (one.path, one.start, -one.end))
-    found: list[Edit] = []
+    found: list[ModelEdit] = []
     for edit in some:
         last = found[-1] if found else None
         inside = last is not None and last.path == edit.path and not last.new
@@ -250,7 +250,7 @@ def _outermost(edits: Iterable[Edit]) -> tuple[Edit, ...]:
     return tuple(found)
 
 
-def _keyframes(scene: ModelText, gone: Gone, removed: set[Element]) -> Sequence[Edit]:
+def _keyframes(scene: ModelText, gone: Gone, removed: set[Element]) -> Sequence[ModelEdit]:
     """Keyframes list a number for every coordinate: those of what is gone go too."""
     if not (gone.bodies or gone.actuators):
         return ()

@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import thing_kind
-from coursebuild.numerics.pruning.trials import Candidate, Item, Look, named_item, worded
+from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
 
 _SITE = frozenset(
     "site site1 site2 refsite cranksite slidersite sidesite objname refname".split(" ")
@@ -24,7 +24,7 @@ Kept = Callable[[str, str], bool]
 """Whether a finding of this kind and name is to be kept."""
 
 
-def unused(look: Look, kept: Kept) -> Iterator[Candidate]:
+def unused(look: PruningContext, kept: Kept) -> Iterator[Candidate]:
     """What nothing refers to and nobody reads."""
     assets = _Assets(look, kept)
     yield from assets.candidates()
@@ -57,7 +57,7 @@ _PLURALS = {"class": "classes", "mesh": "meshes"}
 class _Assets:
     """Assets, from those that elements refer to down to those that assets refer to."""
 
-    def __init__(self, look: Look, kept: Kept) -> None:
+    def __init__(self, look: PruningContext, kept: Kept) -> None:
         self._look = look
         self._kept = kept
         self._gone: list[Element] = []
@@ -104,7 +104,7 @@ def asset_name(element: Element) -> str:
     return PurePosixPath(file.replace("\\", "/")).name.rpartition(".")[0] or file
 
 
-def _classes(look: Look) -> list[Item]:
+def _classes(look: PruningContext) -> list[Item]:
     """Default classes that neither they nor one below them is used."""
     used = {
         value
@@ -128,7 +128,7 @@ def _classes(look: Look) -> list[Item]:
     return found
 
 
-def _sites(look: Look, gone: Collection[Element]) -> list[Item]:
+def _sites(look: PruningContext, gone: Collection[Element]) -> list[Item]:
     """Sites that only elements which are gone refer to."""
     if look.readers.whole("site"):
         return []
@@ -148,7 +148,7 @@ def _sites(look: Look, gone: Collection[Element]) -> list[Item]:
     return found
 
 
-def _keyframes(look: Look) -> Iterator[Candidate]:
+def _keyframes(look: PruningContext) -> Iterator[Candidate]:
     keys = [one for one in look.scene.elements if one.tag == "key" and _in_keyframe(one)]
     if look.readers.whole("keyframe") or look.readers.whole("keyframe-number"):
         return
@@ -167,14 +167,14 @@ def _in_keyframe(element: Element) -> bool:
     return element.above is not None and element.above.tag == "keyframe"
 
 
-def _sensors(look: Look) -> list[Item]:
+def _sensors(look: PruningContext) -> list[Item]:
     return [named_item(one) for one in unread_sensors(look)]
 
 
 _UNREAD = "what a sensor says changes nothing that moves"
 
 
-def unread_sensors(look: Look) -> list[Element]:
+def unread_sensors(look: PruningContext) -> list[Element]:
     """Sensors that nobody reads."""
     if look.readers.whole("sensor"):
         return []
@@ -185,7 +185,7 @@ def unread_sensors(look: Look) -> list[Element]:
     ]
 
 
-def _flags(look: Look) -> Iterator[Candidate]:
+def _flags(look: PruningContext) -> Iterator[Candidate]:
     for flag, what in (("energy", "energy"), ("fwdinv", "fwdinv")):
         having = [
             one

@@ -21,7 +21,7 @@ class Machine(Record, frozen=True):
     """What the processor calls itself; empty where it does not say."""
 
 
-class Setting(Record, frozen=True):
+class MeasuredSetting(Record, frozen=True):
     """What can be chosen without changing the scene."""
 
     integrator: str
@@ -39,7 +39,7 @@ class Setting(Record, frozen=True):
 class WorkPrecisionRow(Record, frozen=True):
     """One setting in one scenario. Errors are the largest over the horizon, and at its end."""
 
-    setting: Setting
+    setting: MeasuredSetting
     status: str
     """`ok`, `slow-growth`, `diverged` or `reset`."""
     reasons: tuple[str, ...]
@@ -112,7 +112,7 @@ class StableRow(Record, frozen=True):
     """The timesteps between which was looked, s."""
 
 
-class Verdict(Record, frozen=True):
+class RowVerdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
     on_front: bool
@@ -157,7 +157,7 @@ class ScenarioReport(Record, frozen=True):
     rows: tuple[WorkPrecisionRow, ...]
     orders: tuple[OrderRow, ...]
     stable: tuple[StableRow, ...]
-    verdict: Verdict
+    verdict: RowVerdict
     velocity_floor: float = 0.0
     """As `floor`, of velocities: around an impact they are known far worse than places."""
     smooth: bool = True

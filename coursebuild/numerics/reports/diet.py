@@ -17,7 +17,7 @@ CHANGES = "changes the result"
 LABELS = (IDENTICAL, EQUAL, UNTOUCHED, CHANGES)
 
 
-class Place(Record, frozen=True):
+class ModelPlace(Record, frozen=True):
     """An element of the model."""
 
     name: str
@@ -66,7 +66,7 @@ class Finding(Record, frozen=True):
     kind: str
     """By which it is kept, such as `sensor-unread`."""
     message: str
-    places: tuple[Place, ...]
+    places: tuple[ModelPlace, ...]
     """Empty where it is about the model as a whole."""
     label: str
     """One of `LABELS`."""

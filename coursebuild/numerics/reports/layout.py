@@ -1,6 +1,6 @@
 """Where the parts of a work–precision plot go: its frame, the lanes above it, the key below.
 
-Entry points: `Layout`; `Frame`, from values to places; `grid(frame, …)`, ticks and titles.
+Entry points: `PlotLayout`; `Frame`, from values to places; `grid(frame, …)`, ticks and titles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from msgspec import Struct
 from coursebuild.drawing.marks import markup_text, shortened, text_width
 from coursebuild.drawing.scales import log_ticks
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.numerics.reports.points import Chart, Line, Point, lane_text
+from coursebuild.numerics.reports.points import Chart, PlotLine, Point, lane_text
 
 SIZE = 12.0
 """Of letters, in the units of the drawing."""
@@ -32,7 +32,7 @@ _LARGEST = 290.0
 class Lane(Struct, frozen=True):
     """A line's place above the plot."""
 
-    line: Line
+    line: PlotLine
     text: str
     top: float
     tall: bool
@@ -44,7 +44,7 @@ class Lane(Struct, frozen=True):
         return self.top + (TALL_LANE if self.tall else LANE) - LANE / 2
 
 
-class Layout:
+class PlotLayout:
     """The places in one plot, in units of the drawing; fixed once made."""
 
     def __init__(self, report: ScenarioReport, found: Chart, width: float) -> None:

@@ -29,12 +29,12 @@ from coursebuild.numerics.reports.layout import (
     TICK_SIZE,
     WIDE,
     Lane,
-    Layout,
+    PlotLayout,
     entry_width,
     grid,
 )
 from coursebuild.numerics.reports.points import (
-    Line,
+    PlotLine,
     Point,
     Quantity,
     chart,
@@ -105,7 +105,7 @@ def plot_svg(
     found = chart(report, shown)
     if not any((*line.points, *line.others) for line in found.lines):
         return ""
-    layout = Layout(report, found, NARROW if narrow else WIDE)
+    layout = PlotLayout(report, found, NARROW if narrow else WIDE)
     body = "".join(_Picture(layout).parts())
     title, text = described(report, found)
     style = f"<style>{STYLE}</style>" if whole else ""
@@ -123,7 +123,7 @@ def plot_svg(
 class _Picture:
     """Draws one plot."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: PlotLayout) -> None:
         self.layout = layout
         self.frame = layout.frame
         self.report = layout.report
@@ -235,14 +235,14 @@ class _Picture:
             f'font-size="{TICK_SIZE:g}"{halo()}>{markup_text(lane.text)}</text>'
         )
 
-    def _line(self, line: Line) -> str:
+    def _line(self, line: PlotLine) -> str:
         places = [self._place(point) for point in line.points]
         d = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in places)
         dashes = f' stroke-dasharray="{dash(line.number)}"' if dash(line.number) else ""
         look = f'stroke="{colour(line.number)}" stroke-width="1.7" stroke-linejoin="round"{dashes}'
         return path(d, look)
 
-    def _mark(self, line: Line, point: Point, size: float) -> str:
+    def _mark(self, line: PlotLine, point: Point, size: float) -> str:
         x, y = self._place(point)
         title = markup_text(point_title(self.report, self.layout.chart, point))
         return symbol(line.number, x, y, size, full=self.report.rows[point.row].front, title=title)

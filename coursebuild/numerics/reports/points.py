@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.reports.bench import ScenarioReport, Setting, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
@@ -61,7 +61,7 @@ class Point(Struct, frozen=True):
     """`None` for a run that was lost."""
 
 
-class Line(Struct, frozen=True):
+class PlotLine(Struct, frozen=True):
     """What is drawn of an integrator."""
 
     integrator: str
@@ -83,7 +83,7 @@ class Chart(Struct, frozen=True):
     """What is drawn of a scenario."""
 
     quantity: Quantity
-    lines: tuple[Line, ...]
+    lines: tuple[PlotLine, ...]
     timed: bool
     """Whether any cost was measured."""
 
@@ -132,7 +132,7 @@ def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
         number = KNOWN.index(name) if name in KNOWN else len(KNOWN) + others.index(name)
         largest = stable.get(name)
         lines.append(
-            Line(
+            PlotLine(
                 name,
                 number,
                 tuple(sorted(line, key=lambda one: -rows[one.row].setting.timestep)),
@@ -159,12 +159,12 @@ def _positive(value: float | None) -> bool:
     return value is not None and 0 < value < math.inf
 
 
-def _kind(setting: Setting) -> tuple[str, int, str]:
+def _kind(setting: MeasuredSetting) -> tuple[str, int, str]:
     """All of a setting but integrator and timestep."""
     return setting.solver, setting.iterations, setting.cone
 
 
-def usual_setting(rows: Sequence[WorkPrecisionRow]) -> Setting | None:
+def usual_setting(rows: Sequence[WorkPrecisionRow]) -> MeasuredSetting | None:
     """One with the solver, iterations and cone of the scene itself; of most rows where it has none.
 
     `None` where there are no rows.
@@ -224,7 +224,7 @@ def seconds_text(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g} s"
 
 
-def setting_text(setting: Setting, like: Setting | None = None) -> str:
+def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
     """A setting in words; solver, iterations and cone only where they differ from those of `like`.
 
     All that there is where nothing is given.
@@ -233,7 +233,7 @@ def setting_text(setting: Setting, like: Setting | None = None) -> str:
     return ", ".join([*parts, *solving_parts(setting, like)])
 
 
-def solving_parts(setting: Setting, like: Setting | None = None) -> list[str]:
+def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> list[str]:
     """Solver, iterations and cone of a setting in words; see `setting_text`."""
     parts = []
     if setting.solver and (like is None or setting.solver != like.solver):
@@ -279,7 +279,7 @@ def described(report: ScenarioReport, found: Chart) -> tuple[str, str]:
     return title, " ".join(parts)
 
 
-def _range(line: Line) -> str:
+def _range(line: PlotLine) -> str:
     points = [*line.points, *line.others]
     errors = [p.error for p in points if p.error is not None]
     costs = [p.cost for p in points]
@@ -315,7 +315,7 @@ def point_title(report: ScenarioReport, found: Chart, point: Point) -> str:
     return " · ".join(parts)
 
 
-def lane_text(line: Line) -> str:
+def lane_text(line: PlotLine) -> str:
     """What was lost of an integrator, and where it is stable."""
     if line.stable == 0:
         return f"{line.integrator} is never stable"

@@ -44,7 +44,7 @@ class RecordError(Exception):
         self.message = message
 
 
-class Failure(Struct, frozen=True):
+class ReportFailure(Struct, frozen=True):
     """Why a recorded report cannot be checked, or written."""
 
     message: str

@@ -1,7 +1,7 @@
 """Blocks and inlines as Markdown that needs no course: CommonMark with tables, footnotes and `$`.
 
-Entry points: `write_blocks`, `write_inlines`, `write_footnotes`; `Context`, which says where links
-lead and what our own blocks become.
+Entry points: `write_blocks`, `write_inlines`, `write_footnotes`; `MarkdownContext`, which says
+where links lead and what our own blocks become.
 
 1. A text that stands in the source as it reads is written as it stands there: it was read as text
    once, between the same neighbours. Any other (with escapes or entities in it, or out of JSON) has
@@ -79,7 +79,7 @@ from coursebuild.render.look import OwnBlock
 from coursebuild.render.markup import escape, is_tight
 
 
-class Context(Protocol):
+class MarkdownContext(Protocol):
     """What depends on where the Markdown goes."""
 
     def href(self, target: Target) -> str:
@@ -112,7 +112,9 @@ Same: TypeAlias = dict[int, tuple[object, str]]
 is held so that it stays its own."""
 
 
-def write_blocks(blocks: Iterable[Block], context: Context, same: Same | None = None) -> str:
+def write_blocks(
+    blocks: Iterable[Block], context: MarkdownContext, same: Same | None = None
+) -> str:
     """Blocks one after the other, an empty line between two, without the last line end.
 
     Where the same document is written for several contexts that show the same numbers, `same` is
@@ -121,13 +123,15 @@ def write_blocks(blocks: Iterable[Block], context: Context, same: Same | None = 
     return _Writer(context, same).blocks(blocks)
 
 
-def write_inlines(inlines: tuple[Inline, ...], context: Context, same: Same | None = None) -> str:
+def write_inlines(
+    inlines: tuple[Inline, ...], context: MarkdownContext, same: Same | None = None
+) -> str:
     """Inlines in one line, such as a title."""
     return _Writer(context, same).title(inlines)
 
 
 def write_footnotes(
-    footnotes: Iterable[Footnote], context: Context, same: Same | None = None
+    footnotes: Iterable[Footnote], context: MarkdownContext, same: Same | None = None
 ) -> str:
     """The definitions of footnotes, which are referred to as `[^1]`."""
     return "\n\n".join(
@@ -146,7 +150,7 @@ _LAST_MARKS = pattern(r"(^|\s)(#+)$")
 
 
 class _Writer:
-    def __init__(self, context: Context, same: Same | None) -> None:
+    def __init__(self, context: MarkdownContext, same: Same | None) -> None:
         self.context = context
         self._same = same
         self._asked = False

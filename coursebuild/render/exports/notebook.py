@@ -47,7 +47,7 @@ _DEEPEST = 3
 """Headings down to this level begin a cell."""
 
 
-class Cell(Struct, frozen=True):
+class NotebookCell(Struct, frozen=True):
     """A cell: Markdown, or a script with what it printed."""
 
     section: str
@@ -63,7 +63,7 @@ class Notebook(Struct, frozen=True):
 
     head: str
     """Markdown of the first cell."""
-    cells: tuple[Cell, ...]
+    cells: tuple[NotebookCell, ...]
     python: str
     """Version of the interpreter that ran the scripts."""
     words: tuple[tuple[str, str], ...]
@@ -83,7 +83,7 @@ def notebook(inputs: PageInputs, page: PageContext, base_url: str, same: Same) -
     if document.footnotes:
         notes = (hang(f"{n.number}. ", context.blocks(n.blocks)) for n in document.footnotes)
         title = f"## {context.words('markup.footnotes')}"
-        cells.append(Cell("footnotes", "\n\n".join((title, *notes))))
+        cells.append(NotebookCell("footnotes", "\n\n".join((title, *notes))))
         for note in document.footnotes:
             cells += _nested(context, "footnotes", note.blocks)
     keys = ("before", "install", "setup", "setup_none", "left_out")
@@ -98,16 +98,16 @@ def _whole(base_url: str, path: str, href: str) -> str:
     return urljoin(f"{base_url.rstrip('/')}/{urls.encode(path)}", href)
 
 
-def _cells(context: Plain, blocks: Iterable[Block]) -> Iterator[Cell]:
+def _cells(context: Plain, blocks: Iterable[Block]) -> Iterator[NotebookCell]:
     section = "start"
     waiting: list[Block] = []
     joined = context.page.joined
     done = {id(one) for some in joined.values() for one in some}
 
-    def told() -> Iterator[Cell]:
+    def told() -> Iterator[NotebookCell]:
         text = write_blocks(waiting, context, context.same)
         if text:
-            yield Cell(section, text)
+            yield NotebookCell(section, text)
         waiting.clear()
 
     for block in blocks:
@@ -128,14 +128,14 @@ def _cells(context: Plain, blocks: Iterable[Block]) -> Iterator[Cell]:
     yield from told()
 
 
-def _nested(context: Plain, section: str, blocks: tuple[Block, ...]) -> Iterator[Cell]:
+def _nested(context: Plain, section: str, blocks: tuple[Block, ...]) -> Iterator[NotebookCell]:
     """The scripts inside a block, each in a cell after it."""
     for block in walk_blocks(blocks):
         if isinstance(block, Script):
             yield from _script_cells(context, section, block)
 
 
-def _script_cells(context: Plain, section: str, block: Script) -> Iterator[Cell]:
+def _script_cells(context: Plain, section: str, block: Script) -> Iterator[NotebookCell]:
     """A script, and what is to be said of its outputs."""
     recordings = context.page.joined.get(block.span.start, ())
     run = context.page.shown.runs.get(block.path)
@@ -150,9 +150,9 @@ def _script_cells(context: Plain, section: str, block: Script) -> Iterator[Cell]
             told.append(context.recording(recording))
     if block.norun:
         told.insert(0, context.words("exports.norun"))
-    yield Cell(section, _magic(block) + block.code.text, block.path, output)
+    yield NotebookCell(section, _magic(block) + block.code.text, block.path, output)
     if told:
-        yield Cell(section, "\n\n".join(told))
+        yield NotebookCell(section, "\n\n".join(told))
 
 
 def _magic(block: Script) -> str:

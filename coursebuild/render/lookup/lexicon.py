@@ -36,7 +36,7 @@ from coursebuild.model import (
     walk_blocks,
     walk_inlines,
 )
-from coursebuild.model.lexicon import Piece
+from coursebuild.model.lexicon import DefinitionPart
 from coursebuild.render import formulas as typeset
 from coursebuild.render.equations import numbered
 from coursebuild.render.look import Look
@@ -118,20 +118,20 @@ def _pieces(
     following: Block | None,
     html: Callable[[tuple[Inline, ...]], str],
     context: _Excerpted,
-) -> Iterator[Piece]:
+) -> Iterator[DefinitionPart]:
     """A sentence, cut at its displayed formulas."""
     line: list[Inline] = []
     for inline in sentence:
         if isinstance(inline, Math) and inline.display:
-            yield Piece(html(tuple(line)).strip())
-            yield Piece(str(context.display(inline.tex.text, 0)), display=True)
+            yield DefinitionPart(html(tuple(line)).strip())
+            yield DefinitionPart(str(context.display(inline.tex.text, 0)), display=True)
             line = []
         else:
             line.append(inline)
     if line:
-        yield Piece(html(tuple(line)).strip())
+        yield DefinitionPart(html(tuple(line)).strip())
     if isinstance(following, MathBlock) and following.tex.text and runs_on(sentence):
-        yield Piece(str(context.display(following.tex.text, 0)), display=True)
+        yield DefinitionPart(str(context.display(following.tex.text, 0)), display=True)
 
 
 def _sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:

@@ -49,7 +49,7 @@ _NUMBER = re.compile(r"[0-9]{1,5}")
 _LANGUAGE = re.compile(r"[A-Za-z]{1,8}(?:-[A-Za-z0-9]{1,8})*")
 
 
-class Places(Struct, frozen=True):
+class FlowPlaces(Struct, frozen=True):
     """Where addresses of a drawn page lead, seen from a file of the package."""
 
     link: Callable[[str], str | None]
@@ -61,7 +61,7 @@ class Places(Struct, frozen=True):
 class Flow:
     """Brings texts into the package, one after the other."""
 
-    def __init__(self, places: Places) -> None:
+    def __init__(self, places: FlowPlaces) -> None:
         self._places = places
         self.lost: list[str] = []
         """What was not kept, a sentence each, without repeats."""

@@ -32,14 +32,14 @@ from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_ht
 from coursebuild.model import Document, document_blocks
 from coursebuild.render import urls
 from coursebuild.render.context import PageContext
-from coursebuild.render.packages.flow import Flow, Places
+from coursebuild.render.packages.flow import Flow, FlowPlaces
 from coursebuild.render.packages.formulas import NAMESPACE as MATHML
 from coursebuild.render.packages.processing import (
     EXPLANATION,
     FEEDBACK,
     RESPONSE,
     SCORE,
-    Parts,
+    ResponseParts,
     compared,
     declared,
     double,
@@ -113,7 +113,7 @@ class _Writer:
         self.base_url = base_url
         self.language = language
         self.pictures: dict[str, None] = {}
-        self.flow = Flow(Places(self._link, self._picture))
+        self.flow = Flow(FlowPlaces(self._link, self._picture))
 
     def item(self, question: AnyQuestion) -> MadeItem | None:
         """The item, or nothing where the question has no answer."""
@@ -152,7 +152,7 @@ class _Writer:
         score.set("normalMaximum", "1")
         return score, element("outcomeDeclaration", declared(FEEDBACK, "multiple", "identifier"))
 
-    def _body(self, question: AnyQuestion, parts: Parts) -> Element:
+    def _body(self, question: AnyQuestion, parts: ResponseParts) -> Element:
         body = element("itemBody", {}, *self._blocks(question.text), *parts.before)
         for number, hint in enumerate(question.hints, 1):
             title = self.page.tools.words("package.hint", n=number)
@@ -209,7 +209,7 @@ class _Writer:
 
     # --- kinds of questions
 
-    def _parts(self, question: AnyQuestion) -> Parts | None:
+    def _parts(self, question: AnyQuestion) -> ResponseParts | None:
         match question:
             case ChoiceQuestion():
                 return self._choice(question)
@@ -224,7 +224,7 @@ class _Writer:
             case _:
                 assert_never(question)
 
-    def _choice(self, question: ChoiceQuestion) -> Parts:
+    def _choice(self, question: ChoiceQuestion) -> ResponseParts:
         names = [letter(index) for index in range(len(question.options))]
         choices = [
             element("simpleChoice", {"identifier": name}, *self._text(option.text))
@@ -239,7 +239,7 @@ class _Writer:
         given = {"responseIdentifier": RESPONSE, "shuffle": "false", "maxChoices": most}
         cardinality = "multiple" if question.several else "single"
         right = [names[index] for index in question.answers]
-        return Parts(
+        return ResponseParts(
             response(cardinality, "identifier", right),
             (element("choiceInteraction", given, *choices),),
             before=(self._said("package.choose_all"),) if question.several else (),
@@ -248,7 +248,7 @@ class _Writer:
             chosen=bool(said),
         )
 
-    def _numeric(self, question: NumericQuestion) -> Parts:
+    def _numeric(self, question: NumericQuestion) -> ResponseParts:
         field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
         field.set("expectedLength", "12")
         line = element("p", {}, field)
@@ -260,9 +260,11 @@ class _Writer:
             how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
             return element("equal", how, *compared())
 
-        return Parts(response("single", "float", [double(question.answer)]), (line,), test=test)
+        return ResponseParts(
+            response("single", "float", [double(question.answer)]), (line,), test=test
+        )
 
-    def _output(self, question: OutputQuestion) -> Parts | None:
+    def _output(self, question: OutputQuestion) -> ResponseParts | None:
         answer = output_line(self.page, question.script, question.line)
         if answer is None:
             self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
@@ -271,17 +273,17 @@ class _Writer:
         size = str(min(max(len(answer), 12), 80))
         field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
         field.set("expectedLength", size)
-        return Parts(
+        return ResponseParts(
             response("single", "string", [answer]),
             (element("p", {}, field),),
             before=(asked,),
             test=lambda: element("stringMatch", {"caseSensitive": "true"}, *compared()),
         )
 
-    def _open(self, question: OpenQuestion) -> Parts:
+    def _open(self, question: OpenQuestion) -> ResponseParts:
         reference = [self._said("package.reference"), *self._blocks(question.reference)]
         given = {"responseIdentifier": RESPONSE, "expectedLines": "6"}
-        return Parts(
+        return ResponseParts(
             response("single", "string", ()),
             (
                 element("rubricBlock", {"view": "scorer"}, *reference),
@@ -289,7 +291,7 @@ class _Writer:
             ),
         )
 
-    def _order(self, question: OrderQuestion) -> Parts:
+    def _order(self, question: OrderQuestion) -> ResponseParts:
         shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
         names = {index: letter(place) for place, index in enumerate(shown)}
         choices = [
@@ -300,7 +302,7 @@ class _Writer:
         ]
         right = [names[index] for index in range(len(question.items))]
         given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
-        return Parts(
+        return ResponseParts(
             response("ordered", "identifier", right),
             (element("orderInteraction", given, *choices),),
             before=(self._said("package.order"),),

@@ -1,7 +1,7 @@
 """What differs between items, and how a response becomes points and feedback.
 
-Entry points: `Parts`; `processing`, the response processing of an item; `response` and `feedback`,
-which declare and show what it is about.
+Entry points: `ResponseParts`; `processing`, the response processing of an item; `response` and
+`feedback`, which declare and show what it is about.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ RESPONSE, SCORE, FEEDBACK, EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLA
 """Names of the variables, and of the feedback that everyone gets."""
 
 
-class Parts(Struct, frozen=True):
+class ResponseParts(Struct, frozen=True):
     """What differs between the kinds of questions."""
 
     response: Element
@@ -60,7 +60,7 @@ def feedback(name: str, content: list[Element], title: str = "") -> Element:
     return element("modalFeedback", given | ({"title": title} if title else {}), *content)
 
 
-def processing(parts: Parts, says: list[str]) -> Element:
+def processing(parts: ResponseParts, says: list[str]) -> Element:
     """The points, and what is said."""
     made = element("responseProcessing")
     if parts.test is not None:

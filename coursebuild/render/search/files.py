@@ -20,7 +20,7 @@ from msgspec import Struct
 from coursebuild.render import urls
 from coursebuild.render.compressed import COPIES, copy_of
 from coursebuild.render.search import index
-from coursebuild.render.search.index import Numbers, Plan
+from coursebuild.render.search.index import IndexPlan, Numbers
 from coursebuild.render.search.page import call
 from coursebuild.results import CachedFile
 
@@ -29,7 +29,7 @@ _QUALITY = 5
 """Of Brotli: the tenth would be a seventh less for ten times the time."""
 
 
-class Entry(Struct, frozen=True):
+class IndexEntry(Struct, frozen=True):
     """A page that is searched."""
 
     path: str
@@ -62,7 +62,7 @@ class SearchFiles:
 
     def __init__(
         self,
-        entries: Sequence[Entry],
+        entries: Sequence[IndexEntry],
         words: Mapping[str, str],
         text: Callable[[str], bytes],
         terms: Callable[[str], bytes],
@@ -79,7 +79,7 @@ class SearchFiles:
         """
         self._entries, self._words = entries, words
         self._text, self._terms, self._shelf = text, terms, shelf
-        self._plan = Plan.of(len(entries))
+        self._plan = IndexPlan.of(len(entries))
         members: list[list[int]] = [[] for _ in range(self._plan.buckets)]
         for number, entry in enumerate(entries):
             members[self._plan.bucket(entry.path)].append(number)

@@ -1,6 +1,7 @@
 """The index of a course: terms and the pages that have them, in many small files.
 
-Entry points: `Plan`, how many files there are; `sort_terms` and `shard`, by which they are made.
+Entry points: `IndexPlan`, how many files there are; `sort_terms` and `shard`, by which they are
+made.
 
 A query loads the file of each of its words, and no other. Terms that begin alike stand in one file,
 so that the beginning of a word finds it. A third kind of file has the terms alone: by these a
@@ -34,7 +35,7 @@ _MOST_SHARDS = 1024
 _DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 
 
-class Plan(Struct, frozen=True):
+class IndexPlan(Struct, frozen=True):
     """How an index is cut: by the number of pages alone."""
 
     buckets: int
@@ -44,7 +45,7 @@ class Plan(Struct, frozen=True):
     """Shards of terms alone."""
 
     @classmethod
-    def of(cls, pages: int) -> Plan:
+    def of(cls, pages: int) -> IndexPlan:
         """For a number of pages; all are powers of two."""
         terms = min(_MOST_SHARDS, _below(pages / _PAGES_A_SHARD))
         return cls(_below(pages / _PAGES_A_BUCKET), terms, _below(terms / 8))
@@ -84,7 +85,7 @@ def _hash(text: str) -> int:
 _placed = functools.lru_cache(maxsize=1 << 14)(_hash)
 
 
-def sort_terms(plan: Plan, pages: Iterable[bytes]) -> list[bytes]:
+def sort_terms(plan: IndexPlan, pages: Iterable[bytes]) -> list[bytes]:
     """Sort the terms of a bucket's pages, given in the order of the course, into slices."""
     found: list[dict[str, str]] = [{} for _ in range(plan.shards)]
     pages_of: defaultdict[str, list[str]] = defaultdict(list)

@@ -11,9 +11,9 @@ import json
 from coursebuild.model import Document
 from coursebuild.render.characters import visible
 from coursebuild.render.lesson import LessonHead
-from coursebuild.render.page_inputs import Highlighted, PageInputs, Shown, ShownBench
+from coursebuild.render.page_inputs import Highlighted, PageInputs, ShownBench, ShownDocument
 from coursebuild.render.search.sections import document_sections
-from coursebuild.render.search.values import PageText, Piece, Searched, Section
+from coursebuild.render.search.values import PageText, Searched, Section, SectionPiece
 from coursebuild.render.search.words import TERMS, runs
 
 _LEFT_OUT = frozenset({"home", "notfound", "search"})
@@ -66,12 +66,14 @@ def page_text(inputs: PageInputs, document: Document | None, body: str) -> PageT
     name = head.id if isinstance(head, LessonHead) else ""
     lead = (inputs.description, *(head.objectives if isinstance(head, LessonHead) else ()))
     if document is not None:
-        known = inputs.shown or Shown()
+        known = inputs.shown or ShownDocument()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}
         measured = {at: _scenario(shown) for at, shown in known.benches.items()}
         return PageText(inputs.title, name, document_sections(document, lead, labels, measured))
     code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
-    pieces = [Piece("text", text) for text in lead if text] + [Piece("code", t) for t in code if t]
+    pieces = [SectionPiece("text", text) for text in lead if text] + [
+        SectionPiece("code", t) for t in code if t
+    ]
     return PageText(inputs.title, name, (Section("", "", 0, tuple(pieces)), *_drawn(inputs, body)))
 
 

@@ -55,7 +55,7 @@ from coursebuild.model.inlines import CodeSpan
 from coursebuild.patterns import pattern
 from coursebuild.render.html_tree import HtmlContent, parse_html
 from coursebuild.render.search.tex import plain_formula
-from coursebuild.render.search.values import Kind, Piece, Section
+from coursebuild.render.search.values import Kind, Section, SectionPiece
 
 _TAG = pattern(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
@@ -94,7 +94,7 @@ class SectionReader:
 
     def _begin(self, anchor: str, heading: str, level: int) -> None:
         self._anchor, self._heading, self._level = anchor, heading, level
-        self._pieces: list[Piece] = []
+        self._pieces: list[SectionPiece] = []
         self._also: dict[str, None] = {}
 
     def ended(self) -> tuple[Section, ...]:
@@ -108,7 +108,7 @@ class SectionReader:
         """A piece of the section, unless there is nothing in it."""
         text = text.strip("\n").rstrip() if kind in ("code", "output") else _line(text)
         if text:
-            self._pieces.append(Piece(kind, text))
+            self._pieces.append(SectionPiece(kind, text))
 
     def blocks(self, blocks: Iterable[Block]) -> None:
         """Blocks in order."""
@@ -244,7 +244,7 @@ class _Reader:
     def __init__(self) -> None:
         self.done: list[Section] = []
         self._head: tuple[str, str, int] = ("", "", 0)
-        self._pieces: list[Piece] = []
+        self._pieces: list[SectionPiece] = []
         self._text: list[str] = []
 
     def read(self, content: Iterable[HtmlContent]) -> None:
@@ -277,7 +277,7 @@ class _Reader:
         """What was said since the last line is one."""
         text = self._said()
         if text:
-            self._pieces.append(Piece("text", text))
+            self._pieces.append(SectionPiece("text", text))
 
     def end_section(self) -> None:
         """What stands between two headings is a section, unless there is nothing."""

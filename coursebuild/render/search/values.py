@@ -1,6 +1,6 @@
 """What a page is found by.
 
-Entry points: `PageText`, `Section`, `Piece`; `Searched`, the same as bytes.
+Entry points: `PageText`, `Section`, `SectionPiece`; `Searched`, the same as bytes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from msgspec import Struct
 Kind = Literal["text", "code", "formula", "output"]
 
 
-class Piece(Struct, frozen=True):
+class SectionPiece(Struct, frozen=True):
     """A paragraph, a listing, a formula, an output."""
 
     kind: Kind
@@ -28,7 +28,7 @@ class Section(Struct, frozen=True):
     heading: str
     level: int
     """Of its heading, from 1; 0 where there is none."""
-    pieces: tuple[Piece, ...]
+    pieces: tuple[SectionPiece, ...]
     also: tuple[str, ...] = ()
     """Texts that it is found by and that are not shown: names of TeX commands, of files."""
 

@@ -11,7 +11,7 @@ from coursebuild.model import Document
 from coursebuild.render.draft import Draft
 from coursebuild.render.library import Library
 from coursebuild.render.page_list import page_list
-from coursebuild.render.search.files import Entry, SearchFiles
+from coursebuild.render.search.files import IndexEntry, SearchFiles
 from coursebuild.render.search.page import searched
 from coursebuild.render.search.page_inputs import search_words
 from coursebuild.render.search.values import Searched
@@ -29,11 +29,11 @@ def search_files(
 ) -> Iterator[OutputFile]:
     """The files for pages, each with what it is found by."""
     found: dict[str, Searched] = {}
-    entries: list[Entry] = []
+    entries: list[IndexEntry] = []
     for draft, by in pages:
         if by is not None:
             found[draft.path] = by
-            entries.append(Entry(draft.path, draft.kind, draft.title, by.name, by.digest))
+            entries.append(IndexEntry(draft.path, draft.kind, draft.title, by.name, by.digest))
     files = SearchFiles(
         entries,
         search_words(library),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import pytest
 
-from coursebuild.numerics.detector import Status
+from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.reports.diet import IDENTICAL
 from support.surveys import PATH, PENDULUM, fixed, found, names, opened, scene, tried
 
@@ -14,7 +14,7 @@ def test_a_model_without_anything_in_vain() -> None:
     model, survey = tried(scene())
     assert survey.findings == () and survey.edits == () and survey.stale == ()
     assert survey.fixed is None and survey.slim is None
-    assert [one.judgement.status for one in survey.seen] == [Status.OK]
+    assert [one.judgement.status for one in survey.seen] == [RunStatus.OK]
     assert fixed(model, survey) == scene()
 
 
@@ -213,7 +213,7 @@ def test_from_a_scenario_that_diverges_nothing_is_claimed() -> None:
     text = scene(world, head=head, rest='<sensor><clock name="t"/></sensor>')
     text = text.replace("</mujoco>", '<keyframe><key name="go" qpos="1"/></keyframe></mujoco>')
     _, survey = tried(text, quick=False)
-    assert survey.seen[0].judgement.status is not Status.OK
+    assert survey.seen[0].judgement.status is not RunStatus.OK
     assert survey.findings == () and survey.edits == ()
 
 

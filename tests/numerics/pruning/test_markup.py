@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.numerics.pruning.edits import (
-    Edit,
+    ModelEdit,
     apply_edits,
     drop_attribute,
     drop_numbers,
@@ -14,14 +14,14 @@ from coursebuild.numerics.pruning.edits import (
     set_attributes,
     set_options,
 )
-from coursebuild.numerics.pruning.markup import Document, MarkupError, parse_markup, place_of
+from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup, place_of
 
 
-def document(text: str) -> Document:
+def document(text: str) -> Markup:
     return parse_markup("models/a.xml", text.encode())
 
 
-def after(text: str, *edits: Edit) -> str:
+def after(text: str, *edits: ModelEdit) -> str:
     return apply_edits(text.encode(), edits).decode()
 
 
@@ -240,17 +240,21 @@ def test_options_and_flags(
 
 def test_removals_that_follow_each_other_are_one() -> None:
     edits = [
-        Edit("a", 4, 6, b""),
-        Edit("a", 0, 4, b""),
-        Edit("a", 6, 6, b"x"),
-        Edit("b", 6, 7, b""),
+        ModelEdit("a", 4, 6, b""),
+        ModelEdit("a", 0, 4, b""),
+        ModelEdit("a", 6, 6, b"x"),
+        ModelEdit("b", 6, 7, b""),
     ]
-    assert merge_edits(edits) == (Edit("a", 0, 6, b""), Edit("a", 6, 6, b"x"), Edit("b", 6, 7, b""))
+    assert merge_edits(edits) == (
+        ModelEdit("a", 0, 6, b""),
+        ModelEdit("a", 6, 6, b"x"),
+        ModelEdit("b", 6, 7, b""),
+    )
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:
-    edits = (Edit("a", 0, 4, b"x"), Edit("a", 2, 6, b"y"))
+    edits = (ModelEdit("a", 0, 4, b"x"), ModelEdit("a", 2, 6, b"y"))
     with pytest.raises(ValueError, match="two changes overlap at byte 2 of a"):
         apply_edits(b"0123456789", edits)
-    inside = (Edit("a", 2, 6, b""), Edit("a", 3, 4, b"y"))
+    inside = (ModelEdit("a", 2, 6, b""), ModelEdit("a", 3, 4, b"y"))
     assert apply_edits(b"0123456789", inside) == b"016789"

@@ -1,6 +1,6 @@
 """Which questions a document asks, as the lists of lessons name them for the page's script.
 
-Entry points: `asked(document)`, for one document; `AskedBy`, for all of a course.
+Entry points: `quiz_index(document)`, for one document; `QuizIndex`, for all of a course.
 
 From it the script knows, without another page, how many questions a lesson has, whether all are
 answered right, and where to find one that is to be reviewed.
@@ -14,11 +14,11 @@ from urllib.parse import quote
 
 from coursebuild.model import Document, FeatureBlock, document_blocks
 
-AskedBy: TypeAlias = Mapping[str, str]
+QuizIndex: TypeAlias = Mapping[str, str]
 """By the path of the document; those that ask nothing are left out."""
 
 
-def asked(document: Document) -> str:
+def quiz_index(document: Document) -> str:
     """`ID:KEY,KEY ID:KEY`: each quiz with the keys of its questions; ids are percent-encoded."""
     blocks = (block for block in document_blocks(document) if isinstance(block, FeatureBlock))
     quizzes = (keys for block in blocks if (keys := block.progress_keys()) is not None)
@@ -26,5 +26,5 @@ def asked(document: Document) -> str:
 
 
 def count(text: str) -> int:
-    """How many questions `asked` names."""
+    """How many questions `quiz_index` names."""
     return sum(len(part.partition(":")[2].split(",")) for part in text.split(" ")) if text else 0

@@ -1,6 +1,6 @@
 """Where a course is, by strings and stat alone: a run with nothing to do loads no more than this.
 
-Entry point: `course_above`.
+Entry point: `find_course_root`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ MAP = "content/course.toml"
 """By this file a folder is a course."""
 
 
-def course_above(start: str) -> str | None:
+def find_course_root(start: str) -> str | None:
     """The nearest folder from `start` (links resolved) upwards that has a course map."""
     folder = os.path.realpath(start)
     while True:
