@@ -13,7 +13,7 @@ from coursebuild.diagnostics import Diagnostic, Severity
 from coursebuild.report.plain import json_text, plain
 from coursebuild.report.sensitivity import sensitivity_value
 from coursebuild.report.terminal import Style
-from coursebuild.report.text import diagnostic_text
+from coursebuild.report.text import diagnostic_text, location
 from coursebuild.report.values import LabLine, Report, ScriptLine
 from coursebuild.rules import RULES
 from coursebuild.source import Span
