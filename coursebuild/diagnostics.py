@@ -98,10 +98,7 @@ class Parsed(Struct, Generic[T_co], frozen=True):
 
 
 def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """The known name that is most like `name`, if any is alike enough (ties.
-
-    The first in sorted order).
-    """
+    """The known name that is most like `name`, if any is alike enough; of several the first."""
     import difflib
 
     found = difflib.get_close_matches(name, sorted(set(known)), n=1, cutoff=cutoff)

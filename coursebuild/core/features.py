@@ -117,8 +117,8 @@ def features() -> tuple[Feature, ...]:
 def use_course_features(found: Iterable[Feature], digest: str) -> None:
     """Set the features that the course at hand brings itself, and a hash of their code."""
     global _of_course, _digest
-    for rule in (rule for feature in _of_course for rule in feature.rules):
-        RULES.pop(rule.name, None)
+    for name in _rules_of(_of_course):
+        RULES.pop(name, None)
     _of_course, _digest = _sorted(found), digest
     _by_fence.cache_clear()
     _by_block.cache_clear()
@@ -134,6 +134,12 @@ def clash(added: Feature, known: Iterable[Feature]) -> str:
     known = tuple(known)
     if any(feature.name == added.name for feature in known):
         return f"two features are called `{added.name}`"
+    rules = {rule.name for rule in added.rules} & (RULES.keys() - _rules_of(_of_course))
+    if rules:
+        return f"there is a rule `{min(rules)}` already"
+    unseen = [kind for kind in added.fences if kind.block.summary is FeatureBlock.summary]
+    if added.check is not None and unseen:
+        return f"its check would see no `{unseen[0].name}`, whose block has no `summary`"
     read = {*CORE_FENCES, *(kind.name for feature in known for kind in feature.fences)}
     twice = [kind.name for kind in added.fences if kind.name in read]
     return f"the fence `{twice[0]}` is read already" if twice else ""
@@ -184,7 +190,9 @@ def installed_features() -> tuple[Feature, ...]:
     for point in _entry_points():
         feature = point.load()
         if not isinstance(feature, Feature):
-            raise RuntimeError(f"the entry point {point.value} is no feature")
+            raise RuntimeError(
+                f"the entry point {point.value} is no feature: write `{point.module}:FEATURE`"
+            )
         if reason := clash(feature, found):
             raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")
         found.append(feature)
@@ -197,17 +205,30 @@ def _entry_points() -> tuple[EntryPoint, ...]:
 
 
 @functools.cache
-def _package_lines() -> tuple[str, ...]:
-    """A line for each file of the modules that packages offer as features."""
-    lines: list[str] = []
+def package_paths() -> tuple[str, ...]:
+    """The folders, or single files, of the packages that offer features."""
+    found: set[str] = set()
     for point in _entry_points():
-        spec = importlib.util.find_spec(point.module)
-        for folder in (spec.submodule_search_locations or ()) if spec else ():
-            for file in sorted(Path(folder).rglob("*")):
-                if file.is_file() and "__pycache__" not in file.parts:
-                    status = file.stat()
-                    lines.append(f"{file}\0{status.st_size}\0{status.st_mtime_ns}")
+        spec = importlib.util.find_spec(point.module.partition(".")[0])
+        if spec is not None:
+            found.update(spec.submodule_search_locations or (spec.origin or "",))
+    return tuple(sorted(found - {""}))
+
+
+@functools.cache
+def _package_lines() -> tuple[str, ...]:
+    """A line for each file of these packages."""
+    lines: list[str] = []
+    for path in map(Path, package_paths()):
+        for file in sorted(path.rglob("*")) if path.is_dir() else (path,):
+            if file.is_file() and "__pycache__" not in file.parts:
+                status = file.stat()
+                lines.append(f"{file}\0{status.st_size}\0{status.st_mtime_ns}")
     return tuple(lines)
+
+
+def _rules_of(found: Iterable[Feature]) -> set[str]:
+    return {rule.name for feature in found for rule in feature.rules}
 
 
 def _sorted(found: Iterable[Feature]) -> tuple[Feature, ...]:

@@ -12,7 +12,6 @@ Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for 
 from __future__ import annotations
 
 import enum
-import functools
 import hashlib
 import importlib
 import sys
@@ -187,7 +186,6 @@ def _builder(names: list[str], source: Source | None) -> Callable[[list[Any]], A
     return build
 
 
-@functools.cache
 def _maker(name: str) -> Callable[..., Any]:
     """What makes a value of the class of a name."""
     module, _, inner = name.partition(":")

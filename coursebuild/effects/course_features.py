@@ -6,6 +6,7 @@ Entry point: `load_course_features`. They are as trusted as the course's scripts
 from __future__ import annotations
 
 import hashlib
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -40,8 +41,9 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
 
 
 def _run(named: CourseFeature, code: bytes) -> Feature | Diagnostic:
-    module = ModuleType(named.path.removesuffix(".py").replace("/", "."))
+    module = ModuleType(f"course_{named.path.removesuffix('.py').replace('/', '.')}")
     module.__file__ = named.path
+    sys.modules[module.__name__] = module  # where kept values of its classes look for these
     try:
         exec(compile(code, named.path, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever an author's code raises

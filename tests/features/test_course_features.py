@@ -107,6 +107,14 @@ def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder
             "features/shout.py: two features are called `quiz`",
         ),
         (
+            SHOUT.replace('Rule("shout"', 'Rule("output-drift"'),
+            "features/shout.py: there is a rule",
+        ),
+        (
+            SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'),
+            "features/shout.py: its check would see no `shout`, whose block has no `summary`",
+        ),
+        (
             SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'),
             "features/shout.py: the fence `lab` is read already",
         ),
@@ -142,9 +150,16 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
     page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
     code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     course.write("features/shout.py", code[0])
-    course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\nDo **this**.\n```\n")
+    task = '\n```task name="A & B"\nDo **this**.\n```\n'
+    course.write("content/lessons/1.1-one.md", f"## Hello\n{task}")
     done = course.main("build")
     assert done.status == 0, done.out
-    assert '<div class="task"><p>Do <strong>this</strong>.</p></div>' in course.text(PAGE)
+    html = (
+        '<div class="task"><p><b>Task 1.</b> A &amp; B</p>\n<p>Do <strong>this</strong>.</p></div>'
+    )
+    assert html in course.text(PAGE)
+    course.write("content/lessons/1.1-one.md", f"## Hello\n{task}{task}")
+    for _ in range(2):  # the second time from what is kept
+        assert "error[task-name]: two tasks are called A & B\n" in course.main("check").out
     course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
-    assert course.main("check").out.startswith("error[task-empty]: this task says nothing\n")
+    assert course.main("check").out.startswith("error[task-name]: this task has no name\n")

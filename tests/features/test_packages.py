@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -94,6 +95,20 @@ def test_a_copy_in_markdown_has_what_other_readers_understand(course: Folder) ->
 def test_only_pages_with_tabs_load_their_script(course: Folder) -> None:
     assert "/tabs." in course.text(PAGE)
     assert "/tabs." not in course.text("public/index.html")
+
+
+def test_an_edit_of_an_installed_feature_is_seen(
+    tmp_path: Path, stores: Path, packages: Path
+) -> None:
+    copied = tmp_path / "packages"
+    shutil.copytree(packages, copied)
+    folder = Folder(tmp_path / "a course")
+    folder.fill([LESSON], stores)
+    assert run(folder, copied, "build").status == 0
+    script = copied / "coursebuild_tabs" / "__init__.py"
+    script.write_text(script.read_text().replace('class="tab-title"', 'class="tab-title new"'))
+    assert run(folder, copied, "build").status == 0
+    assert folder.text(PAGE).count('<p class="tab-title new">') == 3
 
 
 @pytest.mark.parametrize(

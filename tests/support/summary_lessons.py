@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from coursebuild.model import Course, Document
 from coursebuild.render.assets import Assets
 from coursebuild.render.lab_files import PublishedLabs
-from coursebuild.render.library import Library, document_scripts, lexicon_of, named_models, place
-from coursebuild.render.lookup.references import mentions
+from coursebuild.render.library import Library
 from coursebuild.results import Results
 from coursebuild.source import Source
 from coursebuild.syntax.document import parse_document
@@ -98,14 +97,4 @@ def assets() -> Assets:
 
 def library_of(course: Course, results: Results) -> Library:
     """What pages of a course of skeletons are made from."""
-    return Library.made(
-        course,
-        results,
-        assets(),
-        scripts_of=document_scripts,
-        models_of=named_models,
-        mentions_of=lambda document: mentions(document, course, lexicon_of(document, {})),
-        labs=PublishedLabs({}, ()),
-        formulas={},
-        verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
-    )
+    return Library.of(course, results, assets(), labs=PublishedLabs({}, ()))
