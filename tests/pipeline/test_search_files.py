@@ -97,7 +97,7 @@ def test_every_page_is_listed_in_the_order_of_the_course(folder: Folder) -> None
 def test_a_store_that_cannot_be_written_is_no_matter(folder: Folder) -> None:
     before = index(folder)
     store = folder.root / ".coursebuild"
-    for kind in ("search", "pages", "outlines"):
+    for kind in ("search", "pages", "summaries"):
         shutil.rmtree(store / kind)
         (store / kind).write_text("in the way")
     lesson = "content/lessons/1.7-l7.md"
