@@ -108,7 +108,7 @@ def test_an_edit_of_an_installed_feature_is_seen(
     script = copied / "coursebuild_tabs" / "__init__.py"
     script.write_text(script.read_text().replace('class="tab-title"', 'class="tab-title new"'))
     assert run(folder, copied, "build").status == 0
-    assert folder.text(PAGE).count('<p class="tab-title new">') == 3
+    assert '<p class="tab-title new">' in folder.text(PAGE)
 
 
 @pytest.mark.parametrize(
