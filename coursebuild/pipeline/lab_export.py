@@ -28,7 +28,7 @@ _MOST_STEPS = 20_000
 """How long a trial's main run is, unless the lab says so."""
 
 
-class Offer(Struct, frozen=True):
+class LabExport(Struct, frozen=True):
     """What a page offers to download, or why there is nothing."""
 
     script: tuple[str, str] | None
@@ -44,7 +44,7 @@ def exported(
     lab: tuple[str, str, Lab],
     main: dict[str, Any],
     parity: Parity | None,
-) -> Offer:
+) -> LabExport:
     """The script of a lab, given as the id of its document, its name and itself.
 
     `main` is the main run of its trial, `parity` how that compares with native MuJoCo.
@@ -56,11 +56,11 @@ def exported(
     )
     export = export_script(itself, metadata)
     if isinstance(export, str):
-        return Offer(None, export)
+        return LabExport(None, export)
     if main.get("recorded") is None:
-        return Offer(None, "the lab makes no step")
+        return LabExport(None, "the lab makes no step")
     reason = _checked(store, root, native, itself, export, main, parity)
-    return Offer(None, reason) if reason else Offer((export.name, export.text))
+    return LabExport(None, reason) if reason else LabExport((export.name, export.text))
 
 
 def _origin(course: Course, owner: str) -> str:

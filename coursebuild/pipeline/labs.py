@@ -47,7 +47,7 @@ from coursebuild.labs.verdict import (
 )
 from coursebuild.model import Course, Lab
 from coursebuild.pipeline.custom_labs import custom_lab
-from coursebuild.pipeline.lab_export import Offer, exported
+from coursebuild.pipeline.lab_export import LabExport, exported
 from coursebuild.pipeline.lab_inputs import SECONDS, SIMULATED, lab_inputs, tried_data
 from coursebuild.pipeline.lab_inputs import labs_of as labs_of
 from coursebuild.pipeline.lab_models import LabModel, model_of_lab, saved_model
@@ -182,7 +182,7 @@ class _Attempt(Struct, frozen=True):
         if parity is not None:
             found += parity_diagnostics(lab, parity)
         form = self._static(key, trial) if static and not found else None
-        offer = Offer(None) if found else self._export(trial, parity)
+        offer = LabExport(None) if found else self._export(trial, parity)
         own = () if lab.xml is not None else (self.model.path,)
         tried = LabTrial(not found, _is_lasting(reply), seconds, made)
         self.memory.note_lab(lab_inputs(lab, self.name), (*own, *self.model.files), tried)
@@ -275,10 +275,10 @@ class _Attempt(Struct, frozen=True):
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
-    def _export(self, trial: TrialReply, parity: Parity | None) -> Offer:
+    def _export(self, trial: TrialReply, parity: Parity | None) -> LabExport:
         """The script that does what the lab does."""
         if trial.main is None:
-            return Offer(None)
+            return LabExport(None)
         lab = self.owner, self.name, self.lab
         return exported(
             self.memory.store, self.root, self.engines.native, self.course, lab, trial.main, parity
@@ -345,7 +345,7 @@ def _parity(reply: dict[str, Any]) -> Parity | None:
     return Parity(run["steps"], run["timestep"], run["first"], run["relative"], run["exact"])
 
 
-def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: Offer) -> str:
+def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: LabExport) -> str:
     if parity is not None:
         return parity.describe()
     run = reply["main"]["parity"] if reply["main"] is not None else None

@@ -46,7 +46,7 @@ _IN_PLACE = ("output-drift", "binding-mismatch")
 """Rules whose mistakes a page shows where they are."""
 
 
-class Offer(Struct, frozen=True):
+class AcceptableOutput(Struct, frozen=True):
     """An edit that an author may accept."""
 
     edit: Edit
@@ -169,7 +169,7 @@ def _drift(session: Session, course: Course, verdict: Verdict, run: ScriptRun) -
     offered = _update(session, course, verdict, run)
     told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
     if isinstance(offered, Edit):
-        told["offer"] = Offer(offered).id
+        told["offer"] = AcceptableOutput(offered).id
     elif offered is not None:
         told["refused"] = offered.message
     return told
@@ -217,7 +217,7 @@ def _number(binding: NumberBinding, nth: int, told: Diagnostic) -> dict[str, Any
         "message": told.message,
         "label": told.label,
         "better": "" if edit is None else edit.text,
-        "offer": None if edit is None else Offer(edit).id,
+        "offer": None if edit is None else AcceptableOutput(edit).id,
     }
 
 
@@ -242,7 +242,7 @@ def accept(session: Session, path: str, id: str) -> str:
         return ""
 
 
-def _offers(session: Session, path: str) -> Iterator[Offer]:
+def _offers(session: Session, path: str) -> Iterator[AcceptableOutput]:
     document, course, library = session.files.document(path), session.course, session.library
     if document is None or course is None or library is None:
         return
@@ -251,7 +251,7 @@ def _offers(session: Session, path: str) -> Iterator[Offer]:
         if verdict is not None and verdict.status == "drift" and run is not None:
             edit = _update(session, course, verdict, run)
             if isinstance(edit, Edit):
-                yield Offer(edit)
+                yield AcceptableOutput(edit)
     for diagnostic in session.diagnostics():
         if diagnostic.rule == "binding-mismatch" and diagnostic.span.path == document.source.path:
-            yield from (Offer(edit) for edit in diagnostic.edits)
+            yield from (AcceptableOutput(edit) for edit in diagnostic.edits)

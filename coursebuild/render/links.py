@@ -259,7 +259,7 @@ def _srcset(value: str) -> Iterator[str]:
             yield part.split()[0]
 
 
-def noted(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def attribute_targets(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The ids and the addresses in an attribute of an element."""
     if name == "id" or (name == "name" and tag == "a"):
         return (value,), ()
@@ -290,7 +290,7 @@ def _read(html: str) -> _Page:
     for tag, attributes, line in reader.found:
         for name, value in attributes:
             if value is not None:
-                named, urls = noted(tag, name, value)
+                named, urls = attribute_targets(tag, name, value)
                 ids.update(named)
                 addresses += (_Address(url, line) for url in urls)
     return _Page(frozenset(ids), tuple(addresses))
@@ -312,7 +312,7 @@ def _quickly_read(html: str) -> _Page | None:
         if tag not in _ADDRESSES and ' id="' not in attributes:
             continue
         for name, value in _ATTRIBUTE.findall(attributes):
-            named, urls = noted(tag, name, unescape(value))
+            named, urls = attribute_targets(tag, name, unescape(value))
             ids.update(named)
             addresses += (_Address(url, 0) for url in urls)
     return _Page(frozenset(ids), tuple(addresses))

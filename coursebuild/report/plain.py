@@ -33,7 +33,7 @@ def plain(value: object, **names: str) -> Any:
             return {
                 "rule": value.rule,
                 "severity": value.severity.value,
-                **place(value.span),
+                **place_fields(value.span),
                 "message": value.message,
                 "label": value.label,
                 "help": value.help,
@@ -43,7 +43,9 @@ def plain(value: object, **names: str) -> Any:
             fields: dict[str, Any] = {}
             for name in value.__struct_fields__:
                 field = getattr(value, name)
-                fields |= place(field) if name == "span" else {names.get(name, name): plain(field)}
+                fields |= (
+                    place_fields(field) if name == "span" else {names.get(name, name): plain(field)}
+                )
             return fields
         case Mapping():
             return {key: plain(one) for key, one in value.items()}
@@ -57,7 +59,7 @@ def plain(value: object, **names: str) -> Any:
             return value
 
 
-def place(span: Span | None) -> dict[str, Any]:
+def place_fields(span: Span | None) -> dict[str, Any]:
     """Where something stands; all `None` where that is not known."""
     if span is None:
         return dict.fromkeys(("path", "line", "column", "end_line", "end_column"))

@@ -13,7 +13,7 @@ from coursebuild.syntax.info import parse_info, read_keys
 from coursebuild.syntax.mjcf import parse_mjcf
 from coursebuild.syntax.recording import stray_keys
 from coursebuild.syntax.script import parse_python
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 from coursebuild.syntax.texts import TextParser
 
 _HEAD_RULES = frozenset(
@@ -22,7 +22,7 @@ _HEAD_RULES = frozenset(
 """Mistakes that may have kept a block from being a script."""
 
 
-def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
+def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
     """The block of a fence that records no output."""
     if not fence.closed or fence.inner is not None:
         return _unclosed(fence, session)
@@ -53,7 +53,7 @@ def fence_block(fence: Fence, session: Session, texts: TextParser) -> Block:
             return fence.code()
 
 
-def _unclosed(fence: Fence, session: Session) -> CodeBlock:
+def _unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
     """What is inside may be anything, so that nothing is said about it."""
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
@@ -68,7 +68,7 @@ def _unclosed(fence: Fence, session: Session) -> CodeBlock:
     return fence.code()
 
 
-def _python(fence: Fence, session: Session) -> Block:
+def _python(fence: Fence, session: ParsingState) -> Block:
     parsed = parse_python(fence)
     session.diagnostics += parsed.diagnostics
     if isinstance(parsed.value, Script):
@@ -78,7 +78,7 @@ def _python(fence: Fence, session: Session) -> Block:
     return parsed.value
 
 
-def _bench(fence: Fence, session: Session) -> Block:
+def _bench(fence: Fence, session: ParsingState) -> Block:
     from coursebuild.syntax.bench import parse_bench
 
     parsed = parse_bench(fence)
@@ -86,7 +86,7 @@ def _bench(fence: Fence, session: Session) -> Block:
     return _nested(fence, session) if fence.nested else parsed.value
 
 
-def _lab(fence: Fence, session: Session, texts: TextParser) -> Block:
+def _lab(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
     info = parse_info(fence.info)
     session.diagnostics += info.diagnostics
     words = list(info.value.words)
@@ -104,7 +104,7 @@ def _lab(fence: Fence, session: Session, texts: TextParser) -> Block:
 
 
 def _of_feature(
-    kind: FenceKind[FeatureBlock], fence: Fence, session: Session, texts: TextParser
+    kind: FenceKind[FeatureBlock], fence: Fence, session: ParsingState, texts: TextParser
 ) -> Block:
     if fence.nested and not kind.nested:
         return _nested(fence, session)
@@ -113,7 +113,7 @@ def _of_feature(
     return parsed.value or fence.code()
 
 
-def _nested(fence: Fence, session: Session) -> CodeBlock:
+def _nested(fence: Fence, session: ParsingState) -> CodeBlock:
     message = f"a text of a quiz or lab cannot hold a {fence.kind}"
     session.report(diagnose("fence-info", fence.head, message))
     return fence.code()

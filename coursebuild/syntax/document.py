@@ -16,7 +16,7 @@ from coursebuild.model import Document
 from coursebuild.patterns import pattern
 from coursebuild.source import Excerpt, Source
 from coursebuild.syntax.places import misplaced
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 from coursebuild.syntax.spans import whole
 from coursebuild.syntax.tree import TextReader
 
@@ -34,7 +34,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. All mistakes
     are diagnostics, in the order of their places; the document holds all that could be read.
     """
-    session = Session(source, callouts, lesson)
+    session = ParsingState(source, callouts, lesson)
     base = _without_front_matter(whole(source), session)
     reader = TextReader(base, session, session.definitions, nested=False)
     blocks = reader.read()
@@ -44,7 +44,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     return Parsed(document, sort_diagnostics(session.diagnostics))
 
 
-def _without_front_matter(text: Excerpt, session: Session) -> Excerpt:
+def _without_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
     found = _YAML.match(text.text) or _TOML.match(text.text)
     if found is None:
         return text

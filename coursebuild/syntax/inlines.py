@@ -46,7 +46,7 @@ from coursebuild.syntax.headings import term_id
 from coursebuild.syntax.html import Balance, tags
 from coursebuild.syntax.markdown import definition_label, inline_tokens
 from coursebuild.syntax.mention import TextPiece, may_mention, plain, with_mentions
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 from coursebuild.syntax.spans import PositionedToken, locate
 from coursebuild.syntax.targets import check_scheme, classify
 from coursebuild.syntax.unread_math import unread_formula
@@ -76,7 +76,7 @@ class InlineReader:
         self,
         base: Excerpt,
         definitions: Definitions,
-        session: Session,
+        session: ParsingState,
         balance: Balance,
     ) -> None:
         self.base = base

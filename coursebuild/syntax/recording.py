@@ -16,7 +16,7 @@ from coursebuild.patterns import pattern
 from coursebuild.source import Span
 from coursebuild.syntax.fence import Fence, is_ours
 from coursebuild.syntax.info import FenceKeys, Word, parse_info, read_keys
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 
 _CAPTION = pattern(r"\s*Output\b.*:\s*", re.DOTALL)
 _NEAR_CAPTION = pattern(
@@ -57,7 +57,7 @@ def no_caption(fence: Span) -> Diagnostic:
 
 
 def record_fence(
-    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: Session
+    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: ParsingState
 ) -> Recording | None:
     """The recording whose body may be this fence."""
     if not fence.closed or fence.inner is not None:
@@ -85,7 +85,7 @@ def record_fence(
 
 
 def record_table(
-    caption: tuple[Inline, ...], caption_span: Span, table: Table, session: Session
+    caption: tuple[Inline, ...], caption_span: Span, table: Table, session: ParsingState
 ) -> Recording:
     """The recording whose body is a table."""
     span, script = caption_span.to(table.span), _script(caption_span, session)
@@ -115,7 +115,7 @@ def no_body(span: Span, what: str) -> Diagnostic:
     return diagnose("recording-body", span, message, help=help)
 
 
-def _script(caption_span: Span, session: Session) -> str | None:
+def _script(caption_span: Span, session: ParsingState) -> str | None:
     """The script that a recording belongs to."""
     if session.script is None and not session.script_wrong:
         message = "no script stands above this recorded output"

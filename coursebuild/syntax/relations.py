@@ -1,6 +1,6 @@
 """Checks of how fields hang together, which quizzes, labs and the course map share.
 
-Entry points: `given`, `one_of`, `repeated`.
+Entry points: `has_value`, `one_of`, `repeated`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from coursebuild.syntax.nodes import NullNode, ObjectNode
 from coursebuild.syntax.wording import short
 
 
-def given(node: ObjectNode, name: str) -> bool:
+def has_value(node: ObjectNode, name: str) -> bool:
     """Whether a field is there and is not null."""
     value = node.get(name)
     return value is not None and not isinstance(value, NullNode)
@@ -25,7 +25,7 @@ def one_of(
     node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
 ) -> Iterator[Diagnostic]:
     """One of the fields is needed and, with `only`, no more than one is taken."""
-    there = [name for name in names if given(node, name)]
+    there = [name for name in names if has_value(node, name)]
     if not there and not _misspelt(node, type, names):
         choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")

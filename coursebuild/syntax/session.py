@@ -1,6 +1,6 @@
 """What the readers of one document share: diagnostics, anchors, footnotes, the script above.
 
-Entry point: `Session`. A document is read once, from its first line to its last; texts inside
+Entry point: `ParsingState`. A document is read once, from its first line to its last; texts inside
 quizzes and labs are read where they stand.
 """
 
@@ -18,7 +18,7 @@ from coursebuild.syntax.headings import Anchors
 T = TypeVar("T")
 
 
-class Session:
+class ParsingState:
     """One reading of one document."""
 
     def __init__(self, source: Source, callouts: frozenset[str], lesson: bool) -> None:

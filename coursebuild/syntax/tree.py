@@ -56,7 +56,7 @@ from coursebuild.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 from coursebuild.syntax.spans import PositionedToken, SourceSlice, locate, normalized, trimmed
 from coursebuild.syntax.tables import read_table
 
@@ -65,7 +65,7 @@ class TextReader:
     """Reads one text; `nested` for a text of a quiz or lab."""
 
     def __init__(
-        self, base: Excerpt, session: Session, definitions: Definitions, *, nested: bool
+        self, base: Excerpt, session: ParsingState, definitions: Definitions, *, nested: bool
     ) -> None:
         self.base, self.session, self.nested = base, session, nested
         self.balance = Balance(session.report)
@@ -332,7 +332,7 @@ def _is_line(text: str) -> bool:
 class Texts:
     """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: ParsingState) -> None:
         self._session = session
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:

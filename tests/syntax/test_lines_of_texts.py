@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from coursebuild.model import Block
 from coursebuild.source import Excerpt, Source
-from coursebuild.syntax.session import Session
+from coursebuild.syntax.session import ParsingState
 from coursebuild.syntax.spans import normalized
 from coursebuild.syntax.tree import TextReader, Texts
 
@@ -37,7 +37,7 @@ def read(text: str, cut: int, *, whole: bool) -> tuple[tuple[Block, ...], object
     source = Source("content/x.md", f'"{text[:cut]}...{text[cut:]}"')
     pieces = ((0, 1), (cut, cut + 4)) if 0 < cut < len(text) else ((0, 1 if cut else 4),)
     excerpt = Excerpt(source, text, pieces)
-    session = Session(source, frozenset(), True)
+    session = ParsingState(source, frozenset(), True)
     if not whole:
         parsed = Texts(session).blocks(excerpt)
         return parsed.value, parsed.diagnostics
