@@ -22,8 +22,6 @@ import re
 from collections.abc import Iterator, Sequence
 from html import escape, unescape
 
-from msgspec import Struct
-
 from coursebuild.patterns import pattern
 
 LONG = 20
@@ -198,23 +196,6 @@ def _hold(html: str) -> str:
 # --- piece by piece
 
 
-class Woven(Struct, frozen=True):
-    """HTML, and where its formulas stand."""
-
-    texts: tuple[str, ...]
-    """What is around them: one more than there are formulas."""
-    formulas: tuple[str, ...] = ()
-    """Each from behind `<math` up to its end. Another may be in the texts."""
-
-    @property
-    def html(self) -> str:
-        """The whole."""
-        parts = [self.texts[0]]
-        for formula, text in zip(self.formulas, self.texts[1:], strict=True):
-            parts += ("<math", formula, "</math>", text)
-        return "".join(parts)
-
-
 def cut(html: str) -> tuple[list[str], list[str]] | None:
     """The texts around the formulas of a page, and what each formula is after `<math`, to its end.
 
@@ -244,7 +225,7 @@ def tight(inside: str, *, before: bool, after: bool) -> str:
     return inside
 
 
-def held(texts: Sequence[str], inside: Sequence[str]) -> list[str]:
+def kept_together(texts: Sequence[str], inside: Sequence[str]) -> list[str]:
     """The texts with what holds formulas together with what stands beside them: see 3."""
     texts = list(texts)
     last = -1

@@ -1,7 +1,6 @@
 """The text of a page as it will be published, and what the rest of the site must know of it.
 
-Entry points: `postprocess_html(html)`; `postprocess_parts(html, part)`, the same of a page and of
-its document's part of it.
+Entry point: `postprocess_html(html)`.
 
 1. Formulas are set to what stands beside them (`formulas.glue`), styles in single elements become
    classes (`styles.hoist`), and forbidden characters are made visible (`characters.visible`).
@@ -15,7 +14,7 @@ are looked at more closely, once for each of these questions.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from html import unescape
 
 from msgspec import Struct
@@ -23,12 +22,8 @@ from msgspec import Struct
 from coursebuild.patterns import pattern
 from coursebuild.render import formulas, links, styles
 from coursebuild.render.characters import RARE, visible
-from coursebuild.render.formulas import Woven
-from coursebuild.render.mathml import is_ours
 from coursebuild.render.shared import page_characters
 
-_FEW = 200
-"""Characters by which a part is found."""
 _REMEMBERED = 256
 """Formulas: a page says the same ones again and again, the next one others."""
 
@@ -52,44 +47,7 @@ def postprocess_html(html: str) -> ProcessedHtml:
     """A page that was just drawn, or a part of one that is whole elements."""
     html = str(html)  # `Markup` would escape what is put into it
     made = _quickly(html)
-    return _closely(html) if made is None else made[0]
-
-
-def postprocess_parts(html: str, part: str) -> tuple[ProcessedHtml, Woven]:
-    """A page, and a part of it by itself; the page is not looked at again for that.
-
-    Of the part it is known where those of its formulas stand that are `mathml.is_ours`.
-    """
-    html, part = str(html), str(part)
-    start = html.find(part[:_FEW])
-    before, after = html[:start], html[start + len(part) :]
-    if start >= 0 and html.startswith(part, start) and _stands_alone(part, after):
-        found = [made for piece in (before, part, after) if (made := _quickly(piece)) is not None]
-        if len(found) == 3:
-            return _together([made for made, _ in found]), found[1][1]
-    made = _quickly(part)
-    return postprocess_html(html), Woven((_closely(part).html,)) if made is None else made[1]
-
-
-def _stands_alone(part: str, after: str) -> bool:
-    """Whether no formula is set to something on the other side of an end of a part."""
-    begins, ends = part.startswith("<"), part.endswith((">", "\n"))
-    formulas = part.startswith("<math") or part.endswith("</math>") or after.startswith("<math")
-    return begins and ends and not formulas
-
-
-def _together(parts: Sequence[ProcessedHtml]) -> ProcessedHtml:
-    def all_of(field: Callable[[ProcessedHtml], frozenset[str]]) -> frozenset[str]:
-        return frozenset[str]().union(*map(field, parts))
-
-    return ProcessedHtml(
-        "".join(part.html for part in parts),
-        all_of(lambda part: part.text),
-        all_of(lambda part: part.mathematics),
-        all_of(lambda part: part.declarations),
-        all_of(lambda part: part.ids),
-        all_of(lambda part: part.addresses),
-    )
+    return _closely(html) if made is None else made
 
 
 def _closely(html: str) -> ProcessedHtml:
@@ -170,7 +128,9 @@ class _Notes:
         if name == "style":
             self.styled = True
         else:
-            ids, addresses = links.noted(tag, name, unescape(value) if "&" in value else value)
+            ids, addresses = links.attribute_targets(
+                tag, name, unescape(value) if "&" in value else value
+            )
             self.ids.update(ids)
             self.addresses.update(addresses)
 
@@ -186,22 +146,20 @@ class _Formula(Struct, frozen=True):
     """What is between the ends of a `math` element, processed."""
 
     inside: str
-    ours: bool
-    """See `mathml.is_ours`."""
     characters: frozenset[str]
     declarations: frozenset[str]
     ids: frozenset[str]
     addresses: frozenset[str]
 
 
-def _quickly(html: str) -> tuple[ProcessedHtml, Woven] | None:
+def _quickly(html: str) -> ProcessedHtml | None:
     """The same for a page that is written as nearly all are; `None` for others."""
     cut = formulas.cut(html)
     if cut is None:
         return None
     texts, inside = cut
     found = _formulas(texts, inside)
-    texts = formulas.held(texts, inside)
+    texts = formulas.kept_together(texts, inside)
     notes = _Notes()
     if found is None or not notes.take(_BETWEEN.join(texts)):
         return None
@@ -215,16 +173,17 @@ def _quickly(html: str) -> tuple[ProcessedHtml, Woven] | None:
         hoisted = [styles.hoist(text, plain=True) for text in texts]
         texts = [text for text, _ in hoisted]
         declarations.update(*(more for _, more in hoisted))
-    woven = _woven(texts, found)
-    made = ProcessedHtml(
-        woven.html,
+    parts = [texts[0]]
+    for one, text in zip(found, texts[1:], strict=True):
+        parts += ("<math", one.inside, "</math>", text)
+    return ProcessedHtml(
+        "".join(parts),
         frozenset(notes.characters),
         frozenset(mathematics),
         frozenset(declarations),
         frozenset(notes.ids),
         frozenset(notes.addresses),
     )
-    return made, woven
 
 
 def _formulas(texts: Sequence[str], inside: Sequence[str]) -> list[_Formula] | None:
@@ -251,16 +210,4 @@ def _formula(inside: str, before: bool, after: bool) -> _Formula | None:
         inside = whole.removeprefix("<math").removesuffix("</math>")
     characters = frozenset(c for c in notes.characters if not c.isascii())
     ids, addresses = frozenset(notes.ids), frozenset(notes.addresses)
-    return _Formula(inside, is_ours(inside), characters, declarations, ids, addresses)
-
-
-def _woven(texts: Sequence[str], found: Sequence[_Formula]) -> Woven:
-    """The opposite of `formulas.cut`."""
-    around, ours = [texts[0]], list[str]()
-    for one, text in zip(found, texts[1:], strict=True):
-        if one.ours:
-            around.append(text)
-            ours.append(one.inside)
-        else:
-            around[-1] += f"<math{one.inside}</math>{text}"
-    return Woven(tuple(around), tuple(ours))
+    return _Formula(inside, characters, declarations, ids, addresses)

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.render import characters, formulas, postprocess
-from coursebuild.render.mathml import is_ours
-from coursebuild.render.postprocess import postprocess_html, postprocess_parts
+from coursebuild.render.postprocess import postprocess_html
 
 FORMULAS = (
     *("<math><mi>x</mi></math>", '<math display="block"><mi>α</mi></math>'),
@@ -56,18 +55,6 @@ def test_html_of_templates_is_settled_as_any_text(html: str) -> None:
     made = postprocess_html(Markup(html))
     assert made == postprocess_html(html)
     assert type(made.html) is str
-    assert postprocess_parts(Markup(html), Markup(html)) == postprocess_parts(html, html)
-
-
-@given(PAGES, PAGES, PAGES)
-@example("a ", "<b><math><mo>=</mo></math>\n", "(<math><mi>x</mi></math>).")
-@example("<math><mi>x</mi></math>", "<p>", ",<math><mi>x</mi></math>")
-def test_a_part_is_settled_with_its_page(before: str, part: str, after: str) -> None:
-    html = before + part + after
-    made, woven = postprocess_parts(html, part)
-    assert (made, woven.html) == (postprocess_html(html), postprocess_html(part).html)
-    assert len(woven.texts) == len(woven.formulas) + 1
-    assert all(map(is_ours, woven.formulas))
 
 
 @given(st.text() | st.text(alphabet="<>/=\"' bidstyle-!&;#\n\u00a0m", max_size=60))
@@ -85,7 +72,7 @@ def test_formulas_are_glued_piece_by_piece_as_in_the_whole(html: str) -> None:
         formulas.tight(one, before=before[-1:].isspace(), after=after[:1].isspace())
         for before, one, after in beside
     ]
-    first, *others = formulas.held(texts, inside)
+    first, *others = formulas.kept_together(texts, inside)
     woven = (f"<math{one}</math>{text}" for one, text in zip(tight, others, strict=True))
     assert first + "".join(woven) == formulas.glue(html)
 
