@@ -1,1 +1,1 @@
-"""What every course needs; it knows no single feature."""
+"""What every course needs; features enter through `features`."""

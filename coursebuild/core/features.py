@@ -99,9 +99,9 @@ CORE_FENCES = ("bench", "lab", "mjcf", "python", "text")
 
 _INSTALLED_BY = {
     "io": "coursebuild with its io cards",
-    "mermaid": "coursebuild-mermaid",
+    "mermaid": "`plugins/mermaid` of coursebuild",
     "quiz": "coursebuild with its quizzes",
-    "tabs": "coursebuild-tabs",
+    "tabs": "`plugins/tabs` of coursebuild",
 }
 """What has to be installed for fences that a course written for coursebuild may have."""
 
