@@ -47,7 +47,7 @@ serve: $(VENV)/.site
 PYTEST = PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(BIN)/python -m pytest
 PARALLEL = -n $(WORKERS) --dist worksteal
 
-quick: $(VENV)/.dev
+quick: $(VENV)/.dev npm
 	@$(PYTEST) $(PARALLEL) -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
 
 test: $(VENV)/.dev npm system
