@@ -68,16 +68,17 @@ async function keepUp(place, store, first = () => {}) {
   const keep = storedChoice(document)
   const worker = await begun(navigator, root)
   let offered = false
-  const show = async () => {
-    if (offered) return
-    offered = true
-    await first()
+  const report = async ({ end, here, total, full, lost }) => {
+    if (!offered && (end || (await store.lists()).length > 0)) {
+      offered = true
+      await first()
+    }
+    say(place, fill(!end ? 'busy' : full ? 'full' : lost ? 'lost' : 'done', { n: here, total }))
   }
-  visit(window, worker, { keep, look: true }, async ({ end, here, total, full, lost }) => {
-    if ((await store.lists()).length > 0) await show()
-    if (!end) return say(place, fill('busy', { n: here, total }))
-    await show()
-    say(place, fill(full ? 'full' : lost ? 'lost' : 'done', { n: here, total }))
+  // One report after the other: the first ones have to wait for the store, and must not be said after the last.
+  let reported = Promise.resolve()
+  visit(window, worker, { keep, look: true }, (told) => {
+    reported = reported.then(() => report(told)).catch(({ message }) => say(place, fill('failed', { message })))
   })
 }
 
