@@ -292,11 +292,11 @@ def browsing() -> Iterator[Any]:
 
 def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
     """A line for each model."""
-    from coursebuild.effects.lab_engine import LabEngine
-    from coursebuild.effects.native import NativeEngine
-    from coursebuild.model import Lab
-    from coursebuild.source import Source
-    from coursebuild.syntax.document import parse_document
+    from coursebuild.core.model import Lab
+    from coursebuild.core.run.lab_engine import LabEngine
+    from coursebuild.core.run.native import NativeEngine
+    from coursebuild.core.syntax.document import parse_document
+    from coursebuild.core.text.source import Source
 
     with LabEngine() as engine, NativeEngine(folder) as saver:
         for i, (name, text) in enumerate(MODELS.items(), 1):

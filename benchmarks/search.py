@@ -45,7 +45,7 @@ from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
 
 QUERIES = ("inertia tensor", "gyroscope", "energy drift", "model", "quaternion rotation")
 WITHOUT = """
-import coursebuild.render.search.page as page
+import coursebuild.core.pages.search.page as page
 page.searched = lambda sheet, document, body: None
 """
 COMMAND = "import sys\n{patch}\nfrom coursebuild.cli import main\nsys.exit(main(sys.argv[1:]))"

@@ -22,29 +22,29 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.checks.formulas import course_formulas
+from coursebuild.core.checks.formulas import course_formulas
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files.resources import bundled_files, template_texts
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import Formula, MathError, Results
+from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.draft import Draft
+from coursebuild.core.pages.draw import draw
+from coursebuild.core.pages.folding import fold, imported
+from coursebuild.core.pages.fonts import FontJob, subset_font
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.pages.record import record
+from coursebuild.core.pages.site import SiteOptions, render_site
+from coursebuild.core.run.v8 import MathEngine
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.syntax.script import python_mistake
 from coursebuild.core.values import encode
-from coursebuild.effects.resources import bundled_files, template_texts
-from coursebuild.effects.v8 import MathEngine
-from coursebuild.model import Course
-from coursebuild.model.summary import without_prose
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import extract_scripts, run, verify
-from coursebuild.render.assets import Assets
-from coursebuild.render.draft import Draft
-from coursebuild.render.draw import draw
-from coursebuild.render.folding import fold, imported
-from coursebuild.render.fonts import FontJob, subset_font
-from coursebuild.render.library import Library
-from coursebuild.render.page_list import page_list
-from coursebuild.render.record import record
-from coursebuild.render.site import SiteOptions, render_site
-from coursebuild.results import Formula, MathError, Results
-from coursebuild.syntax.document import parse_document
-from coursebuild.syntax.script import python_mistake
 
 
 def timed(

@@ -62,11 +62,11 @@ _AHEAD = (
     "site/prepare_fonts.py",
     "site/prepare_icons.py",
     "site/prepare_templates.py",
-    "coursebuild/render/assets.py",
-    "coursebuild/render/compressed.py",
-    "coursebuild/render/cutting.py",
-    "coursebuild/render/fonts.py",
-    "coursebuild/render/templates.py",
+    "coursebuild/core/pages/assets.py",
+    "coursebuild/core/pages/compressed.py",
+    "coursebuild/core/pages/cutting.py",
+    "coursebuild/core/pages/fonts.py",
+    "coursebuild/core/pages/templates.py",
     "templates/icon.svg",
 )
 """What makes things ahead."""

@@ -1,4 +1,4 @@
-"""Compresses what pages of every course refer to: see `coursebuild/effects/prepared.py`.
+"""Compresses what pages of every course refer to: see `coursebuild/core/engine/prepared.py`.
 
     python site/prepare_copies.py FOLDER
 
@@ -12,10 +12,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.effects.resources import template_texts
-from coursebuild.render.assets import SCRIPTS, page_script
-from coursebuild.render.compressed import compressed_files
-from coursebuild.results import OutputFile
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages.assets import SCRIPTS, page_script
+from coursebuild.core.pages.compressed import compressed_files
 
 LABS = ("js/lab.js", "js/lab-worker.js")
 

@@ -1,4 +1,4 @@
-"""Cuts the fonts that come with the tool cut already: see `coursebuild/effects/prepared.py`.
+"""Cuts the fonts that come with the tool cut already: see `coursebuild/core/engine/prepared.py`.
 
     python site/prepare_fonts.py FOLDER [OLD]
 
@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from msgspec.structs import replace
 
-from coursebuild.render import cutting, fonts
+from coursebuild.core.pages import cutting, fonts
 
 OFTEN = (
     *range(0x20, 0x7F),

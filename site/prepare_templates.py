@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.effects.resources import template_texts
-from coursebuild.render.templates import compile_templates
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.pages.templates import compile_templates
 
 
 def main(bundle: Path) -> None:

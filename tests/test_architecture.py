@@ -17,16 +17,13 @@ PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
 
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"patterns"}),
-    frozenset({"source", "drawing"}),
-    frozenset({"rules"}),
-    frozenset({"diagnostics"}),
-    frozenset({"model"}),
-    frozenset({"results", "vocabulary", "numerics"}),
+    frozenset({"core.text", "core.drawing"}),
+    frozenset({"core.model"}),
+    frozenset({"numerics"}),
     frozenset({"core.features", "core.values"}),
-    frozenset(
-        {"syntax", "checks", "scripts", "labs", "render", "report", "effects", "core.engine"}
-    ),
+    frozenset({"core.syntax", "core.checks", "core.scripts", "core.pages", "core.files"}),
+    frozenset({"labs", "report", "core.engine"}),
+    frozenset({"core.run"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
     frozenset({"preview"}),
@@ -40,10 +37,10 @@ LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 PURE = (
-    *("syntax", "checks", "scripts", "labs", "render", "report", "model"),
-    *("drawing", "numerics"),
+    *("core.text", "core.drawing", "core.model", "core.syntax", "core.checks", "core.scripts"),
+    *("core.pages", "labs", "numerics", "report"),
 )
-NUMERICS_NEEDS = ("numerics", "model", "source", "drawing")
+NUMERICS_NEEDS = ("numerics", "core.model", "core.text", "core.drawing")
 """Measuring can be read alone."""
 IO_MODULES = {
     "os",
@@ -110,8 +107,6 @@ def is_allowed(own: str, name: str) -> bool:
     other = part(tuple(rest.split(".")))
     if own == "numerics":
         return other in NUMERICS_NEEDS
-    if {own, other} == {"core.engine", "effects"}:  # until all of the one has moved into the other
-        return True
     return other in ("", own, "__version__") or LEVEL[other] < LEVEL[own]
 
 
@@ -167,7 +162,7 @@ def test_asking_for_the_version_imports_nothing_heavy() -> None:
         "try: main(['--version'])\n"
         "except SystemExit: pass\n"
         "print(sorted(set(sys.modules) & {'numpy', 'mujoco', 'markdown_it', 'jinja2', 'pygments',"
-        " 'msgspec', 'coursebuild.effects.v8', 'fontTools', 'uharfbuzz', 'watchfiles'}))"
+        " 'msgspec', 'coursebuild.core.run.v8', 'fontTools', 'uharfbuzz', 'watchfiles'}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"

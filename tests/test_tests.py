@@ -153,11 +153,11 @@ ADVICE: dict[Rule, str] = {
 TO_MEND: dict[Rule, str] = {
     assertions_that_look_once: (
         "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py "
-        "render/test_browser.py"
+        "core/pages/test_browser.py"
     ),
     waits_for_time: "core/engine/test_workers.py",
     patches_of_private_names: (
-        "effects/test_examples.py effects/test_resources.py effects/test_write.py"
+        "core/files/test_examples.py core/files/test_resources.py core/files/test_write.py"
     ),
 }
 """Files that do not keep a rule yet; the lists only become shorter."""

@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _end(status: int, *, alone: bool) -> int:
     """End this process at once, if it is one command's: Python takes its time to clean up."""
     if alone:
-        from coursebuild.effects.exit_immediately import exit_immediately
+        from coursebuild.core.run.exit_immediately import exit_immediately
 
         atexit._run_exitfuncs()  # of others: what is left open is closed, as ever
         exit_immediately(status)

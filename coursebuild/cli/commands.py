@@ -203,7 +203,7 @@ def diet_command(arguments: argparse.Namespace) -> int:
 
 def schema_command(arguments: argparse.Namespace) -> int:
     """Print a JSON Schema."""
-    from coursebuild.syntax.schemas import json_schema, schema_roots
+    from coursebuild.core.syntax.schemas import json_schema, schema_roots
 
     names = sorted(schema_roots())
     if arguments.name not in names:

@@ -43,7 +43,7 @@ def write(text: str, status: int) -> int:
     except BrokenPipeError:  # the reader has seen enough; what was found is as it was
         _forget_stdout()
     except OSError as error:
-        from coursebuild.effects.errors import reason
+        from coursebuild.core.files.errors import reason
 
         _forget_stdout()
         return fail(WRONG, f"standard output cannot be written: {reason(error)}")

@@ -12,7 +12,7 @@ import gc
 from coursebuild.cli.arguments import parser
 from coursebuild.cli.interrupts import Terminated, heeded
 from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
-from coursebuild.effects.errors import EffectError, PublishRefusedError, UsageError
+from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import sys
 
 from coursebuild.cli.output import look
 from coursebuild.core.engine.up_to_date import unchanged
-from coursebuild.effects.course_root import find_course_root
+from coursebuild.core.files.course_root import find_course_root
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""What every course needs; features enter through `features`."""
+"""What every course needs, from the text up; features enter through `features`."""

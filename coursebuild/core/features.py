@@ -9,7 +9,7 @@ points `coursebuild.features` of any installed package, or in a file that the co
 docs/features.md says how to write one.
 
 What the core asks of a block after it was parsed are the methods of `FeatureBlock`
-(`coursebuild.model`), so that a checked course can be looked at without its features being loaded.
+(`core.model`), so that a checked course can be looked at without its features being loaded.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.model import Course, Document, FeatureBlock
-from coursebuild.results import ScriptRun
-from coursebuild.rules import RULES, Rule
+from coursebuild.core.model import Course, Document, FeatureBlock
+from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.rules import RULES, Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
-    from coursebuild.render.context import PageContext
-    from coursebuild.render.exports.plain import Plain
-    from coursebuild.render.search.sections import SectionReader
-    from coursebuild.syntax.fence import Fence
-    from coursebuild.syntax.texts import TextParser
+    from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.exports.plain import Plain
+    from coursebuild.core.pages.search.sections import SectionReader
+    from coursebuild.core.syntax.fence import Fence
+    from coursebuild.core.syntax.texts import TextParser
 
 B = TypeVar("B", bound=FeatureBlock)
 
@@ -72,7 +72,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     name: str
     fences: tuple[FenceKind[Any], ...] = ()
     rules: tuple[Rule, ...] = ()
-    """Mistakes that it can name, in addition to the catalogue (`coursebuild.rules`)."""
+    """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None

@@ -23,7 +23,7 @@ import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 Value = TypeVar("Value")
 
@@ -34,7 +34,9 @@ _FIRST_CLASS = 16
 _PLAIN = frozenset((type(None), bool, float, bytes))
 _LEAST, _MOST = -(1 << 63), 1 << 64
 """Numbers beyond these are texts in MessagePack."""
-_WITH_VALUES = tuple(f"coursebuild.{part}." for part in ("features", "model", "numerics", "render"))
+_WITH_VALUES = tuple(
+    f"coursebuild.{part}." for part in ("core.model", "core.pages", "features", "numerics")
+)
 """Where modules are that may have to be imported."""
 _DAMAGE = (
     *(

@@ -20,8 +20,8 @@ from typing import Any, Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.model import Lab, LabControl, LabPlot
-from coursebuild.source import Span
+from coursebuild.core.model import Lab, LabControl, LabPlot
+from coursebuild.core.text.source import Span
 
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a piece inside the lab's JSON: `("controls", 2, "set")`."""

@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from msgspec import Struct
 from tree_sitter import Node
 
+from coursebuild.core.model import Lab, LabControl
 from coursebuild.labs import export_text as text
 from coursebuild.labs.export_text import ExportMetadata
 from coursebuild.labs.javascript import UntranslatableError, parse_statements
@@ -32,7 +33,6 @@ from coursebuild.labs.python_statements import (
     translate_statements,
 )
 from coursebuild.labs.python_values import Code, Type
-from coursebuild.model import Lab, LabControl
 
 _PLACE = re.compile(r"\{\{control:\d+\}\}")
 _RESERVED = "SECONDS XML DIVERGED WORD current seconds xml diverged word".split()

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from msgspec import Struct
 
+from coursebuild.core.model import Lab, LabControl
 from coursebuild.labs.python_values import Code, Type
-from coursebuild.model import Lab, LabControl
 
 _WIDTH = 88
 _LONGEST = 100

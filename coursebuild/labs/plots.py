@@ -14,11 +14,11 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from coursebuild.drawing.marks import apart
-from coursebuild.drawing.marks import markup_text as _text
-from coursebuild.drawing.scales import tick_texts as tick_texts
-from coursebuild.drawing.scales import ticks as ticks
-from coursebuild.model import LabPlot, LabTrace
+from coursebuild.core.drawing.marks import apart
+from coursebuild.core.drawing.marks import markup_text as _text
+from coursebuild.core.drawing.scales import tick_texts as tick_texts
+from coursebuild.core.drawing.scales import ticks as ticks
+from coursebuild.core.model import LabPlot, LabTrace
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
 _TOP, _BOTTOM = 12.0, 38.0

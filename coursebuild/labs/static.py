@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coursebuild.core.model import Lab
+from coursebuild.core.model.results import StaticForm
 from coursebuild.labs.light import light_of
 from coursebuild.labs.picture import FreeCamera, draw
 from coursebuild.labs.plots import plot_svg
 from coursebuild.labs.reply import unpack_arrays
 from coursebuild.labs.scenery import scene_solids
 from coursebuild.labs.textures import SKY, texture_of
-from coursebuild.model import Lab
-from coursebuild.results import StaticForm
 
 _WIDTH = 640
 _FROM_AFAR = 1000.0

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.core.model import Lab
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Span
 from coursebuild.labs.compile import Entry, LabCode
 from coursebuild.labs.reply import TrialFailure, TrialReply
-from coursebuild.model import Lab
-from coursebuild.source import Span
 
 PARITY_RTOL = 1e-9
 """How far (relative) the two engines may be apart over the first second, unless a lab says."""

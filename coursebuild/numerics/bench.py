@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from coursebuild.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import FrontPoint, PlacedPoint, front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.model.scenarios import DeclaredScenario
+from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.numerics.engine import (
     EngineStates,
     compiled,

@@ -28,7 +28,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.model.scenarios import DeclaredScenario
+from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.numerics.cases import closed_motion
 from coursebuild.numerics.detector import RunJudgement, RunStatus
 from coursebuild.numerics.engine import (

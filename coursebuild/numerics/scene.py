@@ -18,14 +18,14 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.model.scenarios import (
+from coursebuild.core.model.scenarios import (
     Declarations,
     DeclaredScenario,
     Visible,
     keyframe_scenarios,
 )
+from coursebuild.core.text.source import Span
 from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.source import Span
 
 DURATION = 2.0
 """Seconds of a scenario that does not say how long it takes."""

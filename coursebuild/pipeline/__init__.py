@@ -1,4 +1,4 @@
-"""The commands: stages joined with effects.
+"""The commands: the stages joined.
 
 Entry points: `check`, `build`, `update`, `extract`, `explain`, `serve`, `stability`. Each takes the
 course's root and options, tells a `Progress` what it does, and gives what it found, most of them as

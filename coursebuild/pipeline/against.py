@@ -4,7 +4,7 @@ Entry point: `against(options, names, version)`.
 
 1. The scripts run here, or ran: what one of them uses is known from its run.
 2. They run in an environment with the other version and otherwise the same packages (see
-   `effects.environments`). Results are remembered by the versions, like those of here.
+   `core.run.environments`). Results are remembered by the versions, like those of here.
 3. Those that do something else run once more there, and in a fresh environment with the version of
    here: what this shows is told (see `scripts.against`).
 4. The models and MJCF blocks are compiled there.
@@ -16,25 +16,25 @@ from collections.abc import Sequence
 
 from msgspec import Struct, field
 
-from coursebuild.checks.compiled import mjcf_texts
-from coursebuild.diagnostics import Severity
-from coursebuild.effects.environments import environment, needed, other_version
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.surroundings import OtherEnvironment
-from coursebuild.effects.versions import engine_version, python_version
-from coursebuild.model import Course
+from coursebuild.core.checks.compiled import mjcf_texts
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.run.environments import environment, needed, other_version
+from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.scripts.against import RunStanding, is_comparable, judgement, run_standings
+from coursebuild.core.scripts.dependencies import Kind
+from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.scripts.failures import failure
+from coursebuild.core.text.diagnostics import Severity
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import compile_models, extract_scripts, run
 from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
-from coursebuild.results import ScriptRun
-from coursebuild.scripts.against import RunStanding, is_comparable, judgement, run_standings
-from coursebuild.scripts.dependencies import Kind
-from coursebuild.scripts.extract import Extraction, extract
-from coursebuild.scripts.failures import failure
 
 
 def against(options: Options, names: tuple[str, ...], version: str) -> AgainstReport:
@@ -152,7 +152,7 @@ class _Work(Struct):
         fresh: bool = False,
     ) -> dict[str, RunStanding]:
         """How the scripts do there, by path."""
-        from coursebuild.effects.runner import ScriptServer
+        from coursebuild.core.run.runner import ScriptServer
 
         options = self.options
         memory = Memory(options.root, options.store, fresh=fresh, place=place)
@@ -162,7 +162,7 @@ class _Work(Struct):
 
     def _models(self, place: OtherEnvironment) -> tuple[ModelLine, ...]:
         """Of each model and MJCF block that compiles here, whether it does there."""
-        from coursebuild.effects import mjcf
+        from coursebuild.core.run import mjcf
 
         texts = mjcf_texts(self.course)
         if not self.course.models and not texts:

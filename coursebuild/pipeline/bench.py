@@ -19,10 +19,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
-from coursebuild.effects.errors import EffectError, reason
-from coursebuild.effects.write import write_atomic
-from coursebuild.model.scenarios import Bands
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.write import write_atomic
+from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import (

@@ -16,8 +16,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.publish import check_out, publish
-from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.effects.locks import project_lock
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.model.results import FileList, Results, SiteFile
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.pipeline.check import no_lessons, scripts_ahead
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
@@ -28,22 +29,21 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report
-from coursebuild.results import FileList, Results, SiteFile
 
 if TYPE_CHECKING:
-    from coursebuild.effects.prewarm import RunAll
-    from coursebuild.model import Course
+    from coursebuild.core.model import Course
+    from coursebuild.core.run.prewarm import RunAll
     from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
 
 _FOLLOWING = (
-    "coursebuild.checks.course",
-    "coursebuild.scripts.bound_numbers",
+    "coursebuild.core.checks.course",
+    "coursebuild.core.scripts.bound_numbers",
     "coursebuild.pipeline.site",
-    "coursebuild.render.exports.files",
-    "coursebuild.render.reader",
-    "coursebuild.render.search.files",
+    "coursebuild.core.pages.exports.files",
+    "coursebuild.core.pages.reader",
+    "coursebuild.core.pages.search.files",
 )
 """What is needed when the course was read."""
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, Severity, diagnose
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.prewarm import RunAll, prewarmed_runner
-from coursebuild.model import Course, Status
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.model import Course, Status
+from coursebuild.core.run.prewarm import RunAll, prewarmed_runner
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import judge
@@ -26,10 +27,9 @@ from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import plural
-from coursebuild.scripts.extract import extract
 
 if TYPE_CHECKING:
-    from coursebuild.model.sensitivity import Sensitivity
+    from coursebuild.core.model.sensitivity import Sensitivity
     from coursebuild.pipeline.shards import Shard
 
 
@@ -116,8 +116,8 @@ def _sensitivity(
     course: Course, options: Options, progress: Progress, verified: Verified, chosen: Selection
 ) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
     """Which printed digits hold, and the warnings of those that do not."""
+    from coursebuild.core.scripts.sensitivity import noise
     from coursebuild.pipeline.sensitivity import measure
-    from coursebuild.scripts.sensitivity import noise
 
     by_path = {run.path: run for run in verified.results.runs}
     ran = [extraction for extraction in extract(course).value if extraction.path in by_path]

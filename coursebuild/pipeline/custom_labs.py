@@ -10,13 +10,13 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.effects.native import NativeEngine
-from coursebuild.effects.read import read_bytes
-from coursebuild.model import Course, Lab
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model import Course, Lab
+from coursebuild.core.model.results import CompileResult, LabResult
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.pipeline.lab_models import model_of_course, saved_model
 from coursebuild.pipeline.remember import Memory
-from coursebuild.results import CompileResult, LabResult
 
 
 def custom_lab(

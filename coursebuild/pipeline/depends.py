@@ -5,8 +5,8 @@ Entry point: `depends_on(course, results)`.
 
 from __future__ import annotations
 
-from coursebuild.model import Course
-from coursebuild.results import Outcome, Results
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import Outcome, Results
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 """What is installed is looked at in any case."""

@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, sort_diagnostics
-from coursebuild.effects.code import code_digest
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.machine import machine
-from coursebuild.effects.read import read_course
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.read import read_course
+from coursebuild.core.run.code import code_digest
+from coursebuild.core.run.machine import machine
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.numerics.reports.records import ReportFailure, diet_path, encode_diet
 from coursebuild.pipeline.diet_model import CannotError, DietModel

@@ -16,16 +16,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.mjcf import model_files
-from coursebuild.effects.read import CourseFiles, read_bytes
-from coursebuild.effects.write import write_atomic
-from coursebuild.model import Declarations, MjcfModel
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import CourseFiles, read_bytes
+from coursebuild.core.files.write import write_atomic
+from coursebuild.core.model import Declarations, MjcfModel
+from coursebuild.core.run.mjcf import model_files
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source, Span
 from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
-from coursebuild.source import Source, Span
 
 if TYPE_CHECKING:
     from coursebuild.numerics.pruning.ablation import Survey

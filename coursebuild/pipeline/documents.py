@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.steps import step_key
+from coursebuild.core.model import Course, Declarations, Document
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
-from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.model import Course, Declarations, Document
 from coursebuild.pipeline.fingerprints import course_fingerprint
 from coursebuild.pipeline.tasks import (
     SUMMARIES,
@@ -32,12 +33,11 @@ from coursebuild.pipeline.tasks import (
     Request,
     Task,
 )
-from coursebuild.source import Source
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
+    from coursebuild.core.pages.record import PageRecord
     from coursebuild.pipeline.reading import PageReader
-    from coursebuild.render.record import PageRecord
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
@@ -113,7 +113,7 @@ class Documents:
         state = (self.fingerprint(course) or "").encode()
         if state and self._store.get(_CHECKED, key, local=True) == state:
             return ()
-        from coursebuild.checks.course import check_course
+        from coursebuild.core.checks.course import check_course
 
         found = check_course(course)
         if state and not found:
@@ -172,7 +172,7 @@ class Documents:
         """The course that a map describes, and what is wrong in it."""
 
         def parse(source: Source) -> Parsed[Course | None]:
-            from coursebuild.syntax.coursemap import parse_course_map
+            from coursebuild.core.syntax.coursemap import parse_course_map
 
             return parse_course_map(source)
 
@@ -182,7 +182,7 @@ class Documents:
         """What a file beside a model declares, and what is wrong in it."""
 
         def parse(source: Source) -> Parsed[Declarations | None]:
-            from coursebuild.syntax.scenarios import parse_declarations
+            from coursebuild.core.syntax.scenarios import parse_declarations
 
             return parse_declarations(source)
 

@@ -11,9 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
-from coursebuild.diagnostics import nearest
-from coursebuild.effects.mjcf import parts
-from coursebuild.model import (
+from coursebuild.core.model import (
     Bench,
     Course,
     Document,
@@ -31,13 +29,8 @@ from coursebuild.model import (
     local_file,
     walk_inlines,
 )
-from coursebuild.numerics.reports.records import bench_path
-from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
-from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.remember import Memory
-from coursebuild.report.explained import Explained, Explanation, State
-from coursebuild.scripts.dependencies import (
+from coursebuild.core.run.mjcf import parts
+from coursebuild.core.scripts.dependencies import (
     Inputs,
     Kind,
     described,
@@ -45,8 +38,15 @@ from coursebuild.scripts.dependencies import (
     sought_files,
     state_changes,
 )
-from coursebuild.scripts.extract import extract, jobs
-from coursebuild.scripts.remembered import BindingRecord
+from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.scripts.remembered import BindingRecord
+from coursebuild.core.text.diagnostics import nearest
+from coursebuild.numerics.reports.records import bench_path
+from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.remember import Memory
+from coursebuild.report.explained import Explained, Explanation, State
 
 
 def explain(options: Options, name: str) -> Explanation:

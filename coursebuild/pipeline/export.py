@@ -19,22 +19,32 @@ from typing import Literal, TypeAlias, assert_never
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.values import decode, encode
-from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.archives import (
+from coursebuild.core.engine.archives import (
     begins_with,
     check_target,
     holds,
     write_archive,
     write_single,
 )
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.prepared import prepared_folder
-from coursebuild.effects.read import read_bytes
-from coursebuild.effects.resources import Bundle, template_texts
+from coursebuild.core.engine.prepared import prepared_folder
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.model import Block, Course, document_blocks
+from coursebuild.core.model.results import CachedFile, OutputFile, Results, SiteFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.exports import book, epub
+from coursebuild.core.pages.exports.whole_course import WholeCourse
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.packages import qti, scorm
+from coursebuild.core.pages.packages.items import Loss, MadeQuiz
+from coursebuild.core.pages.page_list import PageEntry, page_list
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source
+from coursebuild.core.values import decode, encode
 from coursebuild.features.quiz.model import Quiz
-from coursebuild.model import Block, Course, document_blocks
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
@@ -43,17 +53,7 @@ from coursebuild.pipeline.pages import page_key
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.site import Site, site_files
 from coursebuild.pipeline.tasks import ITEMS, Ask, Draw, Later
-from coursebuild.render import urls
-from coursebuild.render.assets import Assets
-from coursebuild.render.exports import book, epub
-from coursebuild.render.exports.whole_course import WholeCourse
-from coursebuild.render.library import Library
-from coursebuild.render.packages import qti, scorm
-from coursebuild.render.packages.items import Loss, MadeQuiz
-from coursebuild.render.page_list import PageEntry, page_list
 from coursebuild.report import Report
-from coursebuild.results import CachedFile, OutputFile, Results, SiteFile
-from coursebuild.source import Source
 
 Kind: TypeAlias = Literal["epub", "page", "qti", "scorm"]
 NAMES: dict[Kind, str] = {

@@ -8,12 +8,16 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from coursebuild.diagnostics import Diagnostic, Edit, Severity
-from coursebuild.effects.examples import Obstacle
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.read import read_bytes
-from coursebuild.effects.write import check_writable, write_atomic
-from coursebuild.model import Course
+from coursebuild.core.files.examples import Obstacle
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.write import check_writable, write_atomic
+from coursebuild.core.model import Course
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.scripts.extract import adopted, block_text
+from coursebuild.core.scripts.extract import extract as extract_course
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
+from coursebuild.core.text.source import Source
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
@@ -21,10 +25,6 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.update import changed_text
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts
 from coursebuild.report import Report
-from coursebuild.scripts.edit import apply_edits
-from coursebuild.scripts.extract import adopted, block_text
-from coursebuild.scripts.extract import extract as extract_course
-from coursebuild.source import Source
 
 
 def extract(options: Options, *, adopt: bool = False) -> Report:

@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from coursebuild.core.values import fingerprint
-from coursebuild.effects.tool import tool_digest
-from coursebuild.model import (
+from coursebuild.core.engine.tool import tool_digest
+from coursebuild.core.model import (
     Course,
     Document,
     HtmlBlock,
@@ -24,9 +23,10 @@ from coursebuild.model import (
     document_blocks,
     walk_inlines,
 )
+from coursebuild.core.model.results import Results
+from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.values import fingerprint
 from coursebuild.numerics.reports import Reports
-from coursebuild.results import Results
-from coursebuild.source import Excerpt, Source, Span
 
 _SHOWN: dict[type, Callable[[Any], object]] = {
     Span: lambda span: None,

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from fnmatch import fnmatchcase
 
-from coursebuild.diagnostics import Diagnostic, Severity, sort_diagnostics
-from coursebuild.model import Course, Silence
+from coursebuild.core.model import Course, Silence
+from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.report import LabLine, Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")

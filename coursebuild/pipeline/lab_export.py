@@ -15,13 +15,13 @@ from typing import Any
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.effects.native import NativeEngine, NativeError
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.model import Course, Lab
+from coursebuild.core.run.native import NativeEngine, NativeError
+from coursebuild.core.run.versions import engine_version
 from coursebuild.labs import export_check
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
 from coursebuild.labs.export_text import ExportMetadata
 from coursebuild.labs.verdict import PARITY_RTOL, Parity
-from coursebuild.model import Course, Lab
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
@@ -135,7 +135,7 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
 @functools.lru_cache(maxsize=1)
 def _digest() -> str:
     """A hash of how a script is run and held against the lab."""
-    from coursebuild.effects import native_worker
+    from coursebuild.core.run import native_worker
 
     files = (native_worker.__file__, export_check.__file__)
     return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()

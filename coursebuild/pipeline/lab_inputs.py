@@ -10,13 +10,13 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from coursebuild.effects.lab_files import engine_digest
-from coursebuild.effects.native import native_digest
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.model import Course, Lab, document_blocks
+from coursebuild.core.run.lab_files import engine_digest
+from coursebuild.core.run.native import native_digest
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.scripts.extract import owners
 from coursebuild.labs.compile import LabModule, compile_lab
-from coursebuild.model import Course, Lab, document_blocks
-from coursebuild.scripts.dependencies import Inputs
-from coursebuild.scripts.extract import owners
 
 SIMULATED = "simlab"
 """The kind of labs that are tried; others are of the course's own."""

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.effects.mjcf import model_files
-from coursebuild.effects.native import NativeEngine
-from coursebuild.effects.versions import engine_version
-from coursebuild.model import Course, Lab
+from coursebuild.core.model import Course, Lab
+from coursebuild.core.model.results import CompileResult
+from coursebuild.core.run.mjcf import model_files
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.run.versions import engine_version
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.remember_models import need_of
-from coursebuild.results import CompileResult
 
 
 class LabModel(Struct, frozen=True):

@@ -27,11 +27,13 @@ from typing import Any, Self, TypeAlias, TypeVar
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.effects.lab_files import engine_digest
-from coursebuild.effects.native import NativeEngine, NativeError, native_digest
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.model import Course, Lab
+from coursebuild.core.model.results import CompileResult, LabResult, StaticForm
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.lab_files import engine_digest
+from coursebuild.core.run.native import NativeEngine, NativeError, native_digest
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.labs import export_check
 from coursebuild.labs.compile import LabCode, LabModule, compile_lab, pieces
 from coursebuild.labs.reply import TrialReply, read_trial
@@ -45,7 +47,6 @@ from coursebuild.labs.verdict import (
     shallow_diagnostics,
     trial_diagnostics,
 )
-from coursebuild.model import Course, Lab
 from coursebuild.pipeline.custom_labs import custom_lab
 from coursebuild.pipeline.lab_export import LabExport, exported
 from coursebuild.pipeline.lab_inputs import SECONDS, SIMULATED, lab_inputs, tried_data
@@ -54,7 +55,6 @@ from coursebuild.pipeline.lab_models import LabModel, model_of_lab, saved_model
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import LabTrial, Memory
-from coursebuild.results import CompileResult, LabResult, StaticForm
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.

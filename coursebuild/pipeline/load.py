@@ -3,7 +3,7 @@
 Entry point: `load(root)`; `parse` may remember what it parsed before, and `ahead` be told first of
 all that will be parsed.
 
-1. Read everything (`effects.read`), parse `content/course.toml`. Where the map is broken the
+1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
    lessons are parsed all the same, so that all mistakes are told in one run.
 2. Attach its document to each lesson and page; compare what the map names with what is there.
 3. Check the course as a whole.
@@ -19,13 +19,13 @@ from typing import Protocol, TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
-from coursebuild.effects.course_features import load_course_features
-from coursebuild.effects.read import CourseFiles, read_course, read_sources
-from coursebuild.effects.versions import engine_version
-from coursebuild.model import Course, Declarations, Document, Lesson, Level, Page, Status
-from coursebuild.source import Source
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.files.course_features import load_course_features
+from coursebuild.core.files.read import CourseFiles, read_course, read_sources
+from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.core.text.source import Source
 
 MAP = "content/course.toml"
 
@@ -71,15 +71,15 @@ def load(
     """Read and parse everything below `root`."""
     read = read_course(root)
     if parse is None:
-        from coursebuild.syntax.document import parse_document
+        from coursebuild.core.syntax.document import parse_document
 
         parse = parse_document
     if course_map is None:
-        from coursebuild.syntax.coursemap import parse_course_map
+        from coursebuild.core.syntax.coursemap import parse_course_map
 
         course_map = parse_course_map
     if check is None:
-        from coursebuild.checks.course import check_course
+        from coursebuild.core.checks.course import check_course
 
         check = check_course
     found = list(read.diagnostics)
@@ -164,7 +164,7 @@ class _Loader:
         if not self.files.declarations:
             return ()
         if parse is None:
-            from coursebuild.syntax.scenarios import parse_declarations
+            from coursebuild.core.syntax.scenarios import parse_declarations
 
             parse = parse_declarations
         for source in self.files.declarations:

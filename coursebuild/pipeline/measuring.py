@@ -19,8 +19,8 @@ import mujoco
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.errors import EffectError
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.observe import touched_pairs
@@ -112,7 +112,7 @@ def with_card(
     Raises:
         EffectError: an engine cannot be loaded.
     """
-    from coursebuild.effects.mjcf import parts
+    from coursebuild.core.run.mjcf import parts
 
     source = scene.model.source
     with silent():  # what it warns of, it would write into the working directory
@@ -137,9 +137,9 @@ def with_card(
 
 def _browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
     """Simulated time over the time it takes in WebAssembly; `None` where no run came to an end."""
-    from coursebuild.effects.lab_engine import LabEngine
-    from coursebuild.effects.native import NativeEngine, NativeError
-    from coursebuild.effects.v8 import StoppedError
+    from coursebuild.core.run.lab_engine import LabEngine
+    from coursebuild.core.run.native import NativeEngine, NativeError
+    from coursebuild.core.run.v8 import StoppedError
 
     source, timestep = scene.model.source, scene.facts.timestep
     data = {"id": "speed", "title": "", "key": None if scenario.keyframe < 0 else scenario.keyframe}

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.prepared import prepared_cut, prepared_source
 from coursebuild.core.engine.steps import step_key
-from coursebuild.effects.prepared import prepared_cut, prepared_source
 
 if TYPE_CHECKING:
-    from coursebuild.render.fonts import FontJob
-    from coursebuild.scripts.binding_memory import BindingEvidence, LazyInputs
+    from coursebuild.core.pages.fonts import FontJob
+    from coursebuild.core.scripts.binding_memory import BindingEvidence, LazyInputs
 
 _FONTS, _BINDINGS = "fonts", "bindings"
 
@@ -29,7 +29,7 @@ def kept_font(store: Memo, job: FontJob) -> bytes:
 
 def cut_font(job: FontJob) -> bytes:
     """A font cut now, from a smaller font where one has all that it needs."""
-    from coursebuild.render.fonts import VERSION, subset_font
+    from coursebuild.core.pages.fonts import VERSION, subset_font
 
     source = prepared_source(job.data, job.characters, VERSION)
     return subset_font(job if source is None else replace(job, data=source))
@@ -61,7 +61,7 @@ class KeptBindings:
 
     def before(self, inputs: LazyInputs) -> BindingEvidence:
         """Not kept: what is said of a course does not depend on what was said of it before."""
-        from coursebuild.scripts.binding_memory import BindingEvidence  # fonts need it not
+        from coursebuild.core.scripts.binding_memory import BindingEvidence  # fonts need it not
 
         return BindingEvidence()
 

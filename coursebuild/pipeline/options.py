@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import SIZE, Memo
-from coursebuild.diagnostics import did_you_mean, nearest
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.errors import UsageError as UsageError
-from coursebuild.effects.read import find_root
-from coursebuild.model import Course, Lesson, Page, Status
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import UsageError as UsageError
+from coursebuild.core.files.read import find_root
+from coursebuild.core.model import Course, Lesson, Page, Status
+from coursebuild.core.text.diagnostics import did_you_mean, nearest
 
 if TYPE_CHECKING:
-    from coursebuild.effects.prewarm import RunAll
+    from coursebuild.core.run.prewarm import RunAll
 
 
 class Options(Struct, frozen=True):
@@ -109,7 +109,7 @@ def open_executor(where: str) -> str:
     Raises:
         UsageError: no scripts can run there.
     """
-    from coursebuild.effects.dask_runner import is_dask
+    from coursebuild.core.run.dask_runner import is_dask
 
     if not is_dask(where):
         raise UsageError(f"--executor: {where!r} is no place to run scripts: dask://HOST:PORT")

@@ -14,9 +14,9 @@ import sys
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.steps import step_key
-from coursebuild.render.links import has
-from coursebuild.render.record import PageRecord
-from coursebuild.render.shared import PageFacts
+from coursebuild.core.pages.links import has
+from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.shared import PageFacts
 
 _KIND = "keys"
 

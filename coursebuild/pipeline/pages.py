@@ -25,25 +25,25 @@ from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.steps import step_key
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import CachedFile
+from coursebuild.core.pages.frame import Frames, Names
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.links import has
+from coursebuild.core.pages.own_pages import own_pages
+from coursebuild.core.pages.page_list import PageEntry, page_list
+from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.search.files import IndexEntry
+from coursebuild.core.pages.shared import PageFacts
+from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
-from coursebuild.model import Course
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.pipeline.page_index import Facts, PageKeys
 from coursebuild.pipeline.tasks import BYPRODUCTS, PAGES, Draw, KeptPage, Later, Task
-from coursebuild.render.frame import Frames, Names
-from coursebuild.render.library import Library
-from coursebuild.render.links import has
-from coursebuild.render.own_pages import own_pages
-from coursebuild.render.page_list import PageEntry, page_list
-from coursebuild.render.record import PageRecord
-from coursebuild.render.search.files import IndexEntry
-from coursebuild.render.shared import PageFacts
-from coursebuild.results import CachedFile
-from coursebuild.source import key_of
 
 if TYPE_CHECKING:
-    from coursebuild.render.exports.files import PageByproducts
+    from coursebuild.core.pages.exports.files import PageByproducts
 
 
 class _Wanted(Struct, frozen=True):
@@ -169,7 +169,7 @@ class Pages:
         return self._byproducts[1]
 
     def _byproducts_of(self, path: str) -> PageByproducts:
-        from coursebuild.render.exports.files import PageByproducts
+        from coursebuild.core.pages.exports.files import PageByproducts
 
         page = self._at(path)
         found = decode(self._store.peek(BYPRODUCTS, page.key), PageByproducts)

@@ -23,17 +23,25 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.checks.formulas import document_formulas, formula_findings
+from coursebuild.core.checks.formulas import document_formulas, formula_findings
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import typesetter_digest
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.model import Document, Script, document_blocks
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.lookup.lexicon import lexicon, misdeclared
+from coursebuild.core.pages.record import PageRecord, record
+from coursebuild.core.pages.templates import templates_of
+from coursebuild.core.pages.tools import Tools, mark_now
+from coursebuild.core.pages.zips import imports
+from coursebuild.core.run.versions import package_version
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.prepared import prepared_folder
-from coursebuild.effects.resources import template_texts
-from coursebuild.effects.tool import typesetter_digest
-from coursebuild.effects.versions import package_version
-from coursebuild.model import Document, Script, document_blocks
-from coursebuild.model.summary import without_prose
 from coursebuild.pipeline.fingerprints import document_fingerprint
 from coursebuild.pipeline.tasks import (
     BYPRODUCTS,
@@ -50,17 +58,9 @@ from coursebuild.pipeline.tasks import (
     Request,
     Task,
 )
-from coursebuild.render.assets import strings_for
-from coursebuild.render.lookup.lexicon import lexicon, misdeclared
-from coursebuild.render.record import PageRecord, record
-from coursebuild.render.templates import templates_of
-from coursebuild.render.tools import Tools, mark_now
-from coursebuild.render.zips import imports
-from coursebuild.results import Formula, MathError
-from coursebuild.source import key_of
 
 if TYPE_CHECKING:
-    from coursebuild.effects.v8 import MathEngine
+    from coursebuild.core.run.v8 import MathEngine
 
 _MATHML, _CODE = "mathml", "code"
 """Kinds of entries in the store. One has the formulas of a text: one for each formula would take as
@@ -83,15 +83,15 @@ class _Whole(Struct, frozen=True):
 
 
 _HEAVY = (
-    "coursebuild.effects.v8",
-    "coursebuild.render.draw",
-    "coursebuild.render.exports.files",
-    "coursebuild.render.highlight",
-    "coursebuild.render.lesson",
-    "coursebuild.render.pages",
-    "coursebuild.render.search.page",
-    "coursebuild.syntax.document",
-    "coursebuild.syntax.lab",
+    "coursebuild.core.run.v8",
+    "coursebuild.core.pages.draw",
+    "coursebuild.core.pages.exports.files",
+    "coursebuild.core.pages.highlight",
+    "coursebuild.core.pages.lesson",
+    "coursebuild.core.pages.pages",
+    "coursebuild.core.pages.search.page",
+    "coursebuild.core.syntax.document",
+    "coursebuild.core.syntax.lab",
     "coursebuild.features.quiz.parse",
 )
 
@@ -100,14 +100,14 @@ def prepare_to_read(sample: Task) -> None:
     """Import and make what reading and drawing need, so that copies of this process share it."""
     for name in _HEAVY:
         importlib.import_module(name)
-    from coursebuild.syntax.document import parse_document
+    from coursebuild.core.syntax.document import parse_document
 
     # Much is made only when it is needed for the first time.
     read = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
     mark_now("python", 'f"{x}"\n')
     imports("x\n")
     if document_formulas(read):
-        from coursebuild.effects.v8 import start
+        from coursebuild.core.run.v8 import start
 
         start()
 
@@ -207,7 +207,7 @@ class PageReader:
             self._room += len(known[0].source.text)
             if known[0].key == task.key:
                 return known[1]
-        from coursebuild.syntax.document import parse_document
+        from coursebuild.core.syntax.document import parse_document
 
         parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
         formulas = document_formulas(parsed.value)
@@ -229,7 +229,7 @@ class PageReader:
         return found
 
     def _started(self) -> MathEngine:
-        from coursebuild.effects.v8 import MathEngine
+        from coursebuild.core.run.v8 import MathEngine
 
         if self._engine is None:
             self._engine = MathEngine()
@@ -244,7 +244,7 @@ class PageReader:
 
     def page(self, request: Draw) -> tuple[PageRecord, str]:
         """A page and its body, of which neither the search nor other files are to know yet."""
-        from coursebuild.render.draw import draw
+        from coursebuild.core.pages.draw import draw
 
         with self._lock:
             document, tools = None, self._tools_for(request.language)
@@ -255,9 +255,9 @@ class PageReader:
             return record(draw(request.inputs, document, tools), request.base_url)
 
     def _drawn(self, request: Draw) -> Drawn:
-        from coursebuild.render.draw import draw_whole
-        from coursebuild.render.exports.files import page_byproducts
-        from coursebuild.render.search.page import searched
+        from coursebuild.core.pages.draw import draw_whole
+        from coursebuild.core.pages.exports.files import page_byproducts
+        from coursebuild.core.pages.search.page import searched
 
         whole = self._whole(request.task) if request.task is not None else None
         tools = self._tools_for(request.language)
@@ -283,7 +283,7 @@ class PageReader:
 
     def _ask(self, request: Draw) -> bytes:
         """The items of a page's quizzes, and what they cannot hold."""
-        from coursebuild.render.packages.items import page_quizzes
+        from coursebuild.core.pages.packages.items import page_quizzes
 
         assert request.task is not None
         whole = self._whole(request.task)

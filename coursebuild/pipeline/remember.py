@@ -22,13 +22,13 @@ from typing import assert_never
 
 from msgspec import Struct
 
+from coursebuild.core.engine.digests import Clock, Digests, changed_since
 from coursebuild.core.engine.memo import Memo
-from coursebuild.effects.conditions import conditions, places
-from coursebuild.effects.digests import Clock, Digests, changed_since
-from coursebuild.effects.packages import Installed
-from coursebuild.effects.surroundings import OtherEnvironment
-from coursebuild.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.scripts.dependencies import (
+from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.core.run.conditions import conditions, places
+from coursebuild.core.run.packages import Installed
+from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.scripts.dependencies import (
     Dependency,
     Inputs,
     Kind,
@@ -44,7 +44,7 @@ from coursebuild.scripts.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.scripts.remembered import REMEMBERED, BindingRecord, from_bytes, to_bytes
+from coursebuild.core.scripts.remembered import REMEMBERED, BindingRecord, from_bytes, to_bytes
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32

@@ -1,6 +1,6 @@
 """Compiled models, remembered: MuJoCo starts only for what changed.
 
-Entry point: `compile_all`, as `effects.mjcf.compile_all`.
+Entry point: `compile_all`, as `core.run.mjcf.compile_all`.
 
 What a model is compiled of besides its own text (included files, meshes, textures, attached models,
 and where these were looked for) is worked out when it is compiled; the result, an error too, holds
@@ -19,14 +19,14 @@ from pathlib import Path, PurePosixPath
 
 import msgspec
 
+from coursebuild.core.engine.digests import Clock, changed_since
 from coursebuild.core.engine.memo import Memo
-from coursebuild.effects import mjcf, mjcf_worker, mujoco_files
-from coursebuild.effects.digests import Clock, changed_since
-from coursebuild.effects.versions import engine_version
-from coursebuild.model import MjcfModel
+from coursebuild.core.model import MjcfModel
+from coursebuild.core.model.results import CompileResult
+from coursebuild.core.run import mjcf, mjcf_worker, mujoco_files
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import Kind, Need
 from coursebuild.pipeline.remember import States
-from coursebuild.results import CompileResult
-from coursebuild.scripts.dependencies import Kind, Need
 
 _KIND = "models"
 _OWN_FAULT = "MuJoCo's compiler "

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from coursebuild.effects.errors import EffectError, reason
-from coursebuild.effects.read import read_bytes
-from coursebuild.effects.write import resolve_inside, write_atomic
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.write import resolve_inside, write_atomic
 from coursebuild.numerics.reports.records import FOLDER, RecordError, ReportFailure
 
 _T = TypeVar("_T")

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.code import code_digest
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.machine import machine
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.run.code import code_digest
+from coursebuild.core.run.machine import machine
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import Machine, ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress

@@ -19,15 +19,21 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.checks.scenarios import check_scenarios
-from coursebuild.diagnostics import Diagnostic, diagnose, did_you_mean, nearest, sort_diagnostics
-from coursebuild.effects.mjcf import compile_models, model_files, readable_error
-from coursebuild.effects.read import CourseFiles, read_course
-from coursebuild.model import Declarations, MjcfModel, Visible
+from coursebuild.core.checks.scenarios import check_scenarios
+from coursebuild.core.files.read import CourseFiles, read_course
+from coursebuild.core.model import Declarations, MjcfModel, Visible
+from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.run.mjcf import compile_models, model_files, readable_error
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    diagnose,
+    did_you_mean,
+    nearest,
+    sort_diagnostics,
+)
+from coursebuild.core.text.source import Source, Span
 from coursebuild.pipeline.options import UsageError
-from coursebuild.results import CompileResult, ModelFacts
-from coursebuild.source import Source, Span
-from coursebuild.syntax.scenarios import parse_declarations
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 

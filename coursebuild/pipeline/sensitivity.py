@@ -3,7 +3,7 @@
 Entry point: `measure(course, options, progress, scripts, runs, documents)`.
 
 Of scripts that use MuJoCo and whose output is recorded and as recorded, four runs are made with
-their initial states moved (`effects.initial_state_perturbation`), each with three times the time
+their initial states moved (`core.run.initial_state_perturbation`), each with three times the time
 limit. They are remembered like other runs.
 """
 
@@ -12,16 +12,16 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Sequence
 
-from coursebuild.effects.runner import ScriptServer
-from coursebuild.model import Course, Recording, document_blocks
-from coursebuild.model.sensitivity import RUNS, Sensitivity
+from coursebuild.core.model import Course, Recording, document_blocks
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.sensitivity import RUNS, Sensitivity
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import run
-from coursebuild.results import Outcome, ScriptRun
-from coursebuild.scripts.extract import Extraction
-from coursebuild.scripts.sensitivity import sensitivity, worth_moving
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 

@@ -19,8 +19,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.effects.errors import EffectError, reason
-from coursebuild.effects.write import write_atomic
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.write import write_atomic
 from coursebuild.pipeline.options import UsageError
 
 _MOST = 10_000

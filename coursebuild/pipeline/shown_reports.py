@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, nearest
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.read import read_bytes
-from coursebuild.effects.versions import engine_version
-from coursebuild.model import Course
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model import Course
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Reports
-from coursebuild.source import Source
 
 if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.numerics.reports.bench import SceneReport

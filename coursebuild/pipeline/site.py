@@ -19,36 +19,36 @@ import msgspec
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from coursebuild.core.engine.digests import Digests
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.prepared import prepared_copy, prepared_folder
 from coursebuild.core.engine.steps import step_key
-from coursebuild.diagnostics import Diagnostic, diagnose
-from coursebuild.effects.digests import Digests
-from coursebuild.effects.packages import distributions, library_files
-from coursebuild.effects.prepared import prepared_copy, prepared_folder
-from coursebuild.effects.read import read_bytes
-from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.model import Course
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
+from coursebuild.core.pages import meta, urls, zips
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.compressed import COPIES, compressed_files, kept_copy
+from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.offline import file_list, offline_files
+from coursebuild.core.pages.page_list import PageEntry
+from coursebuild.core.pages.search.files import SearchFiles
+from coursebuild.core.pages.search.page_inputs import search_words
+from coursebuild.core.pages.shared import PageFacts, common_characters
+from coursebuild.core.run.packages import distributions, library_files
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Excerpt, Source, key_of, text_digest
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.memoized import kept_font
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import Pages
 from coursebuild.pipeline.tasks import all_imports
-from coursebuild.render import meta, urls, zips
-from coursebuild.render.assets import Assets
-from coursebuild.render.compressed import COPIES, compressed_files, kept_copy
-from coursebuild.render.frame import Names
-from coursebuild.render.library import Library
-from coursebuild.render.offline import file_list, offline_files
-from coursebuild.render.page_list import PageEntry
-from coursebuild.render.search.files import SearchFiles
-from coursebuild.render.search.page_inputs import search_words
-from coursebuild.render.shared import PageFacts, common_characters
-from coursebuild.results import CachedFile, FileList, OutputFile, Results, SiteFile
-from coursebuild.source import Excerpt, Source, key_of, text_digest
 
 if TYPE_CHECKING:
-    from coursebuild.render.fonts import FontJob
+    from coursebuild.core.pages.fonts import FontJob
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
@@ -170,7 +170,7 @@ class SiteMaker:
     def _make_shared(
         self, facts: PageFacts, cut: Callable[[FontJob], bytes]
     ) -> tuple[Names, dict[str, bytes]]:
-        from coursebuild.render.shared import shared_files
+        from coursebuild.core.pages.shared import shared_files
 
         made, names = shared_files(self.assets, cut, facts)
         copies = self._copies(file for file in made if file.path != names.style)
@@ -263,7 +263,7 @@ class SiteMaker:
     # --- what the site gives away
 
     def _exports(self, pages: Pages, taken: frozenset[str]) -> Iterator[SiteFile]:
-        from coursebuild.render.exports.files import ExportContext, Exports
+        from coursebuild.core.pages.exports.files import ExportContext, Exports
 
         return Exports(
             self.library, pages, ExportContext(self._packed, self._imports, taken)
@@ -358,7 +358,7 @@ def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
     """Links of the built pages that lead nowhere; most are found in the sources already."""
-    from coursebuild.render.links import check_links
+    from coursebuild.core.pages.links import check_links
 
     pages = {
         file.path: file.data if isinstance(file, OutputFile) else file.make()

@@ -17,10 +17,10 @@ import time
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import nearest
-from coursebuild.effects.code import code_digest
-from coursebuild.effects.versions import engine_version, package_version, python_version
-from coursebuild.model.scenarios import Bands
+from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.run.code import code_digest
+from coursebuild.core.run.versions import engine_version, package_version, python_version
+from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import (

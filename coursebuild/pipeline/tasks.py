@@ -14,16 +14,16 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.engine.steps import step_key
+from coursebuild.core.model import Document
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.search.values import Searched
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Document
-from coursebuild.render.page_inputs import PageInputs
-from coursebuild.render.record import PageRecord
-from coursebuild.render.search.values import Searched
-from coursebuild.source import Source
 
 if TYPE_CHECKING:
-    from coursebuild.render.exports.files import PageByproducts
+    from coursebuild.core.pages.exports.files import PageByproducts
 
 SUMMARIES, PAGES, BYPRODUCTS, ITEMS = "summaries", "pages", "byproducts", "items"
 """Kinds of entries in the store. They stay on this machine, where they are made soon enough."""

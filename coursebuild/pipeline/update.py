@@ -22,13 +22,19 @@ from collections.abc import Collection, Mapping, Sequence
 
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, Edit, Severity, diagnose
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.prewarm import RunAll
-from coursebuild.effects.runner import ScriptServer
-from coursebuild.effects.write import check_writable, write_atomic
-from coursebuild.model import Course, Recording, document_blocks
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.write import check_writable, write_atomic
+from coursebuild.core.model import Course, Recording, document_blocks
+from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
+from coursebuild.core.run.prewarm import RunAll
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.scripts.compare import verify as compare_all
+from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.scripts.findings import binding_history, script_findings
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity, diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
@@ -36,12 +42,6 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts, run, script_lines
 from coursebuild.report import Report
-from coursebuild.results import Outcome, ScriptRun, Verdict
-from coursebuild.scripts.compare import verify as compare_all
-from coursebuild.scripts.edit import apply_edits, updated_body
-from coursebuild.scripts.extract import Extraction, extract
-from coursebuild.scripts.findings import binding_history, script_findings
-from coursebuild.source import Source
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -132,8 +132,8 @@ def _noise(
     progress: Progress,
 ) -> list[Diagnostic]:
     """Warnings of digits that were recorded and are noise, of the scripts whose output changed."""
+    from coursebuild.core.scripts.sensitivity import noise
     from coursebuild.pipeline.sensitivity import measure
-    from coursebuild.scripts.sensitivity import noise
 
     ran = {one.path: one for one in first if one.path in changed}
     scripts = [extraction for extraction in extract(now).value if extraction.path in ran]

@@ -19,20 +19,13 @@ from typing import TYPE_CHECKING, assert_never
 
 from msgspec import Struct, field
 
-from coursebuild.checks.compiled import check_compiled, mjcf_texts
+from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import check_runs
-from coursebuild.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.effects.errors import OutsideProjectError
-from coursebuild.effects.examples import Blocked, Obstacle, write_examples
-from coursebuild.effects.versions import engine_version, python_version
-from coursebuild.effects.write import remove_leftovers
-from coursebuild.model import Course, FeatureBlock, Lab, document_blocks, document_has
-from coursebuild.pipeline.memoized import KeptBindings
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.remember import Memory, longest_first
-from coursebuild.report import LabLine, ScriptLine
-from coursebuild.results import (
+from coursebuild.core.files.errors import OutsideProjectError
+from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
+from coursebuild.core.files.write import remove_leftovers
+from coursebuild.core.model import Course, FeatureBlock, Lab, document_blocks, document_has
+from coursebuild.core.model.results import (
     CompileResult,
     LabResult,
     Outcome,
@@ -41,17 +34,24 @@ from coursebuild.results import (
     ScriptRun,
     Verdict,
 )
-from coursebuild.scripts.binding_memory import BindingMemory
-from coursebuild.scripts.bindings import document_bindings
-from coursebuild.scripts.compare import verify as compare_all
-from coursebuild.scripts.dependencies import Inputs
-from coursebuild.scripts.divergence import is_lost
-from coursebuild.scripts.extract import Extraction, extract, jobs
-from coursebuild.scripts.findings import script_findings
+from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.scripts.binding_memory import BindingMemory
+from coursebuild.core.scripts.bindings import document_bindings
+from coursebuild.core.scripts.compare import verify as compare_all
+from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.scripts.divergence import is_lost
+from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.pipeline.memoized import KeptBindings
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.remember import Memory, longest_first
+from coursebuild.report import LabLine, ScriptLine
 
 if TYPE_CHECKING:
-    from coursebuild.effects.prewarm import RunAll
-    from coursebuild.effects.runner import RunEvent
+    from coursebuild.core.run.prewarm import RunAll
+    from coursebuild.core.run.runner import RunEvent
     from coursebuild.pipeline.shards import Shard
 
 
@@ -131,7 +131,7 @@ def verify(
     if kept is not None:
         kept.save()
     if memory.differing:
-        from coursebuild.scripts.repeat import repeat_findings
+        from coursebuild.core.scripts.repeat import repeat_findings
 
         found += repeat_findings(course, chosen, memory.differing)
     found += check_runs(course, runs)
@@ -305,7 +305,7 @@ def _run(
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
         return ()
-    from coursebuild.effects.runner import RunFinished, RunStarted, run_scripts
+    from coursebuild.core.run.runner import RunFinished, RunStarted, run_scripts
 
     count = sum(not job.norun for job in todo)
     if not count:
@@ -329,7 +329,7 @@ def _run(
     with progress.stage(stage, count):
         ordered = longest_first(todo, seconds)
         if options.executor is not None:
-            from coursebuild.effects.dask_runner import run_on_dask
+            from coursebuild.core.run.dask_runner import run_on_dask
 
             runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
         else:
@@ -385,7 +385,7 @@ def compile_models(
     texts = mjcf_texts(course)
     if not course.models and not texts:
         return (), ()
-    from coursebuild.effects import mjcf
+    from coursebuild.core.run import mjcf
     from coursebuild.pipeline.remember_models import compile_all
 
     stage = functools.partial(progress.stage, "compiling models")

@@ -17,17 +17,17 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.effects.errors import EffectError
-from coursebuild.model import Document
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model import Document
+from coursebuild.core.model.results import OutputFile, SiteFile
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.frame import Frames
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import DemandedPage, demanded_page
 from coursebuild.pipeline.site import Site, SiteMaker
-from coursebuild.render.assets import Assets
-from coursebuild.render.frame import Frames
-from coursebuild.render.library import Library
-from coursebuild.render.page_list import PageEntry, page_list
-from coursebuild.results import OutputFile, SiteFile
 
 _DRAWN = 64
 """Pages whose text is kept in memory."""

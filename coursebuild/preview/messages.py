@@ -21,10 +21,9 @@ from typing import Any
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic, Edit, Severity
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.write import write_atomic
-from coursebuild.model import (
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.write import write_atomic
+from coursebuild.core.model import (
     Course,
     Document,
     NumberBinding,
@@ -32,13 +31,14 @@ from coursebuild.model import (
     Script,
     document_blocks,
 )
+from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
+from coursebuild.core.scripts.bindings import document_bindings
+from coursebuild.core.scripts.diff import DiffRow, diff_rows
+from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
 from coursebuild.pipeline.judge import judge
 from coursebuild.preview.session import Session
 from coursebuild.report import Report
-from coursebuild.results import Outcome, ScriptRun, Verdict
-from coursebuild.scripts.bindings import document_bindings
-from coursebuild.scripts.diff import DiffRow, diff_rows
-from coursebuild.scripts.edit import apply_edits, updated_body
 
 _MOST = 60
 """Mistakes that a page is told of."""

@@ -20,10 +20,13 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.runner import RunStoppedError, ScriptServer
-from coursebuild.model import Course
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import ScriptRun, Verdict
+from coursebuild.core.run.runner import RunStoppedError, ScriptServer
+from coursebuild.core.scripts.binding_memory import BindingHistory
+from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -32,9 +35,6 @@ from coursebuild.pipeline.verify import run, verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.session import Session, is_same_script
 from coursebuild.report import Style, render_report
-from coursebuild.results import ScriptRun, Verdict
-from coursebuild.scripts.binding_memory import BindingHistory
-from coursebuild.scripts.extract import Extraction, extract
 
 QUIET = 0.15
 """Seconds without a save after which the work begins."""

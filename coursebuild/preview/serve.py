@@ -15,8 +15,9 @@ import gc
 import sys
 import threading
 
-from coursebuild.effects.exit_immediately import exit_immediately
-from coursebuild.effects.resources import Bundle
+from coursebuild.core.files.resources import Bundle
+from coursebuild.core.pages.assets import page_script
+from coursebuild.core.run.exit_immediately import exit_immediately
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
@@ -24,7 +25,6 @@ from coursebuild.preview.saves import follow
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from coursebuild.preview.watcher import FolderWatcher
-from coursebuild.render.assets import page_script
 
 _GARBAGE = 200_000
 """Objects after which those in cycles are looked for: a preview lives long."""

@@ -18,14 +18,21 @@ from typing import Generic, TypeVar
 
 from msgspec.structs import replace
 
-from coursebuild.checks.course import check_document
-from coursebuild.checks.links import Places, places
-from coursebuild.diagnostics import Diagnostic, Severity
-from coursebuild.effects.prepared import prepared_folder
-from coursebuild.effects.read import read_sources
-from coursebuild.effects.resources import Bundle, template_texts
-from coursebuild.effects.versions import engine_version, python_version
-from coursebuild.model import Course, Document, Lesson, Page
+from coursebuild.core.checks.course import check_document
+from coursebuild.core.checks.links import Places, places
+from coursebuild.core.engine.prepared import prepared_folder
+from coursebuild.core.files.read import read_sources
+from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.model import Course, Document, Lesson, Page
+from coursebuild.core.model.results import Outcome, Results, ScriptRun
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.lab_files import LabFiles, PublishedLabs, lab_files
+from coursebuild.core.pages.library import Library, Owner, named_models, owners
+from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.scripts.compare import verify as compare
+from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.lab_inputs import labs_of
@@ -35,13 +42,6 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified
 from coursebuild.preview.files import Files
-from coursebuild.render import urls
-from coursebuild.render.assets import Assets
-from coursebuild.render.lab_files import LabFiles, PublishedLabs, lab_files
-from coursebuild.render.library import Library, Owner, named_models, owners
-from coursebuild.results import Outcome, Results, ScriptRun
-from coursebuild.scripts.compare import verify as compare
-from coursebuild.scripts.extract import Extraction, extract, jobs
 
 T = TypeVar("T")
 

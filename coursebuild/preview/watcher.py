@@ -18,7 +18,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from coursebuild.effects.errors import EffectError, reason
+from coursebuild.core.files.errors import EffectError, reason
 
 FOLDERS = ("content", "features", "models", "mjcourse")
 LOOK = 0.200

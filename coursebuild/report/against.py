@@ -9,7 +9,8 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic
+from coursebuild.core.model.results import Change, DriftKind
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.plain import json_text, plain
 from coursebuild.report.terminal import (
     BOLD,
@@ -23,7 +24,6 @@ from coursebuild.report.terminal import (
 )
 from coursebuild.report.text import location
 from coursebuild.report.values import plural
-from coursebuild.results import Change, DriftKind
 
 _COLOURS = {"same": GREEN, "changed": RED, "fails": RED}
 _NAMED = 20

@@ -9,14 +9,14 @@ import json
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.source import Span
 from coursebuild.report.plain import json_text, plain
 from coursebuild.report.sensitivity import sensitivity_value
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text, location
 from coursebuild.report.values import LabLine, Report, ScriptLine
-from coursebuild.rules import RULES
-from coursebuild.source import Span
 
 
 def to_json(report: Report) -> str:

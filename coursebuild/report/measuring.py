@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from coursebuild.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report.plain import json_text

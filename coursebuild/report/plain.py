@@ -13,8 +13,8 @@ from typing import Any
 
 from msgspec import Struct
 
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.source import Span
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import Span
 
 
 def json_text(value: object) -> str:

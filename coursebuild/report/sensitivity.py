@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, assert_never
 
-from coursebuild.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
+from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.report.plain import plain
 from coursebuild.report.terminal import FAINT, GREEN, YELLOW, Style
 from coursebuild.report.text import location

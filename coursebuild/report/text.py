@@ -10,7 +10,8 @@ Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`.
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import (
     BLUE,
     BOLD,
@@ -24,7 +25,6 @@ from coursebuild.report.terminal import (
     visible_lines,
 )
 from coursebuild.report.values import LabLine, Report, ScriptLine, plural, summary_line
-from coursebuild.source import Span
 
 
 def to_text(report: Report, style: Style) -> str:

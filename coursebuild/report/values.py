@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
 
 if TYPE_CHECKING:
-    from coursebuild.model.sensitivity import Sensitivity
+    from coursebuild.core.model.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from coursebuild.effects.resources import bundled_files
+from coursebuild.core.files.resources import bundled_files
+from coursebuild.core.pages.assets import page_script
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
-from coursebuild.render.assets import page_script
 from support.lab_course import PAGE
 from support.lab_page import comes, lab, until, watched
 from support.scratch_course import Folder

@@ -13,10 +13,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from coursebuild.effects.v8 import MathEngine
-from coursebuild.features.io.model import Io
-from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, OrderQuestion, Quiz
-from coursebuild.model import (
+from coursebuild.core.model import (
     CodeBlock,
     CodeSpan,
     Course,
@@ -37,12 +34,15 @@ from coursebuild.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.render.urls import lesson_path, page_path
-from coursebuild.results import Formula
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model.results import Formula
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.urls import lesson_path, page_path
+from coursebuild.core.run.v8 import MathEngine
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+from coursebuild.features.io.model import Io
+from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, OrderQuestion, Quiz
 from support.built_sites import Site
 
 pytestmark = pytest.mark.browser

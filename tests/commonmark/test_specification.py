@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import pytest
 
-from coursebuild.render.plain import plain_html
-from coursebuild.source import Source
-from coursebuild.syntax.document import parse_document
+from coursebuild.core.pages.plain import plain_html
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 
 ROOT = Path(__file__).parents[2]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"

@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
+from coursebuild.core.model import Heading, Text
+from coursebuild.core.model.equations import DisplayFormula
+from coursebuild.core.text.diagnostics import Severity, diagnose
+from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import decode, encode, fingerprint
-from coursebuild.diagnostics import Severity, diagnose
-from coursebuild.model import Heading, Text
-from coursebuild.model.equations import DisplayFormula
-from coursebuild.source import Excerpt, Source, Span
 
 SOURCE = Source("content/a.md", "# One\n\ntwo\n")
 SPAN = SOURCE.span(2, 5)
@@ -94,14 +94,14 @@ class Trap(enum.Enum):
         ("builtins:eval", ["1"]),
         ("builtins:tuple", [[]]),
         ("subprocess:Popen", ["true"]),
-        ("coursebuild.source:Source.span", [1]),
+        ("coursebuild.core.text.source:Source.span", [1]),
         ("coursebuild.core.values:decode", [b""]),
         ("coursebuild.features.__main__:x", []),
         ("coursebuild.cli.commands:build_command", [1]),
         ("no.such.module:X", []),
-        ("coursebuild.model.blocks:NoSuch", []),
-        ("coursebuild.model.blocks:Heading", []),
-        ("coursebuild.model.blocks:Mode", ["NO_SUCH"]),
+        ("coursebuild.core.model.blocks:NoSuch", []),
+        ("coursebuild.core.model.blocks:Heading", []),
+        ("coursebuild.core.model.blocks:Mode", ["NO_SUCH"]),
         ("", []),
     ],
 )

@@ -23,9 +23,9 @@ from xml.etree import ElementTree
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.rules import RULES
-from coursebuild.syntax.schemas import json_schema
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.syntax.schemas import json_schema
+from coursebuild.core.text.rules import RULES
 from support.markdown_files import DOCS, Fence, code_spans, fences, write_files
 from support.scratch_course import Folder
 

@@ -16,9 +16,9 @@ SHOUT = '''"""Text in capitals."""
 from markupsafe import Markup, escape
 
 from coursebuild.core.features import Feature, FenceKind
-from coursebuild.diagnostics import Parsed, diagnose
-from coursebuild.model import FeatureBlock
-from coursebuild.rules import Rule
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.model import FeatureBlock
+from coursebuild.core.text.rules import Rule
 
 
 class Shout(FeatureBlock, frozen=True):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.effects.lab_engine import LabEngine
+from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.labs.compile import LabCode, LabModule, compile_lab, pieces
 from support.lab_values import make_lab
 

@@ -13,9 +13,12 @@ from typing import Any, TypeAlias
 
 import pytest
 
-from coursebuild.effects.mjcf import compile_all
-from coursebuild.effects.native import NativeEngine
-from coursebuild.effects.v8 import Isolate
+from coursebuild.core.model.results import LabResult
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.lab_files import lab_files
+from coursebuild.core.run.mjcf import compile_all
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.run.v8 import Isolate
 from coursebuild.labs.export import Export, export_script, file_name, filled, initial_values
 from coursebuild.labs.export_text import ExportMetadata
 from coursebuild.pipeline import lab_export
@@ -23,11 +26,8 @@ from coursebuild.pipeline.labs import Engines, try_labs
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import lab_lines
-from coursebuild.render.assets import Assets
-from coursebuild.render.lab_files import lab_files
 from coursebuild.report import Style
 from coursebuild.report.text import lab_line
-from coursebuild.results import LabResult
 from support.lab_values import BALL, OpenEngines, make_lab
 
 pytestmark = pytest.mark.engine

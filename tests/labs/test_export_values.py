@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.effects.v8 import Isolate
+from coursebuild.core.run.v8 import Isolate
 from coursebuild.labs.python_library import LIBRARY, helpers
 from coursebuild.labs.python_statements import translate_expression, translate_statements
 from coursebuild.labs.python_values import Type

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from coursebuild.core.model import LabPlot, LabTrace
 from coursebuild.labs.plots import plot_svg, tick_texts, ticks
-from coursebuild.model import LabPlot, LabTrace
 from support.lab_values import make_lab
 
 SPAN = make_lab().span

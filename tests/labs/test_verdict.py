@@ -6,6 +6,9 @@ import json
 
 import pytest
 
+from coursebuild.core.model import Lab, document_blocks
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.labs.compile import pieces
 from coursebuild.labs.reply import TrialFailure, TrialReply, read_trial
@@ -17,9 +20,6 @@ from coursebuild.labs.verdict import (
     reset_diagnostics,
     trial_diagnostics,
 )
-from coursebuild.model import Lab, document_blocks
-from coursebuild.source import Source
-from coursebuild.syntax.document import parse_document
 from support.lab_values import BALL, make_lab
 
 LINES = """{

@@ -7,12 +7,12 @@ import functools
 import mujoco
 import pytest
 
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.scene import scenes
-from coursebuild.source import Source
-from coursebuild.syntax.scenarios import parse_declarations
 from support.bench_runs import FAMILY, MODELS, of_problem, orders, row
 
 pytestmark = pytest.mark.site

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.model.scenarios import Bands
+from coursebuild.core.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
 from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.drawing.marks import Box, apart, clear_place, markup_text, text_width
-from coursebuild.drawing.scales import decades, log_ticks, number_text, power_text
+from coursebuild.core.drawing.marks import Box, apart, clear_place, markup_text, text_width
+from coursebuild.core.drawing.scales import decades, log_ticks, number_text, power_text
 from coursebuild.numerics.reports.strokes import cross, dash, mark
 
 

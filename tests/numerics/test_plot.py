@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.drawing.marks import text_width
+from coursebuild.core.drawing.marks import text_width
 from coursebuild.numerics.reports.bench import ScenarioReport, StableRow
 from coursebuild.numerics.reports.plot import STYLE, plot_svg
 from coursebuild.numerics.reports.points import chart, quantities, telling

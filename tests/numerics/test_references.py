@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model.vocabulary import CLOSED_FORMS
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.engine import EngineStates
 from coursebuild.numerics.forward import forward_states, tends_to
 from coursebuild.numerics.integrate import NoConvergenceError, bulirsch_stoer
@@ -17,9 +20,6 @@ from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import Known, know
 from coursebuild.numerics.scene import SceneError, scenes
-from coursebuild.source import Source
-from coursebuild.syntax.scenarios import parse_declarations
-from coursebuild.vocabulary import CLOSED_FORMS
 
 pytestmark = pytest.mark.site
 

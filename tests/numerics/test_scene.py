@@ -10,10 +10,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coursebuild.model import Declarations
+from coursebuild.core.model import Declarations
+from coursebuild.core.syntax.scenarios import parse_declarations, whole
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes, thickness
-from coursebuild.source import Source
-from coursebuild.syntax.scenarios import parse_declarations, whole
 
 ARM = """\
 <mujoco>

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from coursebuild.render.packages.flow import Flow, FlowPlaces
-from coursebuild.render.packages.xml import document, element
+from coursebuild.core.pages.packages.flow import Flow, FlowPlaces
+from coursebuild.core.pages.packages.xml import document, element
 from support.archives import formula_mistakes
 from support.hostile_html import HOSTILE
 from support.qti_rules import MATHML, QTI, mistakes

@@ -9,7 +9,7 @@ from urllib.parse import unquote
 import pytest
 from lxml import etree
 
-from coursebuild.render.packages.xml import identifier
+from coursebuild.core.pages.packages.xml import identifier
 from support.archives import (
     Package,
     entries,

@@ -11,8 +11,8 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from lxml import etree
 
-from coursebuild.render.links import check_links
-from coursebuild.results import OutputFile
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages.links import check_links
 from support.archives import Package, entries, mistakes, referred, scorm_schema
 from support.question_zoo import ANY, quiz
 from support.scratch_course import GOOD, Folder

@@ -182,5 +182,5 @@ def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
 
 
 def test_wheel_holds_the_scripts_of_the_engines(root: Path, archive: zipfile.ZipFile) -> None:
-    for path in (root / "coursebuild" / "effects").glob("*.js"):
-        assert archive.read(f"coursebuild/effects/{path.name}") == path.read_bytes()
+    for path in (root / "coursebuild" / "core" / "run").glob("*.js"):
+        assert archive.read(f"coursebuild/core/run/{path.name}") == path.read_bytes()

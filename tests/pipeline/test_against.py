@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.run.versions import engine_version
 from support.scratch_course import Done, Folder, block, ended, wait_until_alone
 
 pytestmark = pytest.mark.site

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.bench import bench
 from coursebuild.pipeline.options import UsageError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects.machine import machine
+from coursebuild.core.run.machine import machine
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.pipeline.measuring import with_card
 from coursebuild.pipeline.scenes import find_scenes

@@ -11,23 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.checks.course import check_course
+from coursebuild.core.checks.course import check_course
+from coursebuild.core.model import Course, Document
+from coursebuild.core.model.results import Outcome, Results, ScriptRun
+from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.lookup.lexicon import lexicon
+from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.text.source import Source
 from coursebuild.core.values import fingerprint
-from coursebuild.model import Course, Document
-from coursebuild.model.summary import without_prose
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.fingerprints import (
     course_fingerprint,
     document_fingerprint,
     results_fingerprint,
 )
-from coursebuild.render.lookup.lexicon import lexicon
-from coursebuild.render.page_list import page_list
-from coursebuild.results import Outcome, Results, ScriptRun
-from coursebuild.scripts.compare import verify
-from coursebuild.scripts.extract import extract
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
 from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
 
 pytestmark = pytest.mark.site
@@ -148,7 +148,7 @@ import sys
 {first}
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.numerics.reports import Reports
-from coursebuild.results import Outcome, Results, ScriptRun
+from coursebuild.core.model.results import Outcome, Results, ScriptRun
 run = ScriptRun("a.py", Outcome.OK, 0, "one", "", 0.0)
 print(results_fingerprint(Results((run,), (), (), (), "3", "3"), Reports()))
 """

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from coursebuild.effects.errors import EffectError
-from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.effects.native import NativeEngine
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.native import NativeEngine
 from coursebuild.pipeline import labs as pipeline_labs
 from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
 from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from coursebuild.effects.runner import ScriptServer
-from coursebuild.results import ScriptJob, ScriptRun
+from coursebuild.core.model.results import ScriptJob, ScriptRun
+from coursebuild.core.run.runner import ScriptServer
 from support.live_course import Builds, Live, differences, share
 from support.live_course import builds as builds
 from support.live_course import live as live

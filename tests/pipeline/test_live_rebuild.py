@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from coursebuild.effects.errors import EffectError
+from coursebuild.core.files.errors import EffectError
 from coursebuild.preview import rebuild
 from support.live_course import Builds, Live, differences
 from support.live_course import builds as builds

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.model.results import CachedFile, OutputFile
 from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.progress import Progress
-from coursebuild.results import CachedFile, OutputFile
 from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.site

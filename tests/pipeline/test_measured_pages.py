@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.run.versions import engine_version
 from coursebuild.numerics.reports.records import (
     STABILITY_PATH,
     bench_path,

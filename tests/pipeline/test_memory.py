@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.core.model.results import Outcome, ScriptJob, Trace
 from coursebuild.pipeline.remember import longest_first
-from coursebuild.results import Outcome, ScriptJob, Trace
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.results import Outcome, Trace
+from coursebuild.core.model.results import Outcome, Trace
 from support.fake_runs import JOB, LOOKED, PATH, Desk
 
 

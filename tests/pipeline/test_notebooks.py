@@ -12,12 +12,12 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from coursebuild.model import Recording, document_blocks
-from coursebuild.scripts.compare import compare
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model import Recording, document_blocks
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 from support.scratch_course import ROOT, Folder, block
 
 pytestmark = pytest.mark.slow

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from coursebuild.effects.conditions import _SAYS_NOTHING
-from coursebuild.effects.surroundings import _PASSED_ON
+from coursebuild.core.run.conditions import _SAYS_NOTHING
+from coursebuild.core.run.surroundings import _PASSED_ON
 from support.scratch_course import FIRST, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
@@ -49,7 +49,7 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
     assert done.stderr == (
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
         "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
-        "'coursebuild.effects', 'coursebuild.effects.course_root']\n"
+        "'coursebuild.core.run', 'coursebuild.core.files.course_root']\n"
     )
 
 
@@ -63,9 +63,9 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
         "rare = {'mujoco', 'numpy', 'pygments', 'fontTools', 'asyncio',"
-        " 'subprocess', 'coursebuild.effects.v8', 'coursebuild.numerics.reports.bench',"
-        " 'coursebuild.numerics.reports.points', 'coursebuild.render.cutting',"
-        " 'coursebuild.render.figures', 'coursebuild.render.exports.fromhtml',"
+        " 'subprocess', 'coursebuild.core.run.v8', 'coursebuild.numerics.reports.bench',"
+        " 'coursebuild.numerics.reports.points', 'coursebuild.core.pages.cutting',"
+        " 'coursebuild.core.pages.figures', 'coursebuild.core.pages.exports.fromhtml',"
         " 'coursebuild.report.machine'};"
         "print(sorted(rare & set(sys.modules)), file=sys.stderr); sys.exit(status)"
     )
@@ -77,7 +77,7 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     assert done.stderr == "[]\n"
     folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 2$.\n")
     done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
-    assert "coursebuild.effects.v8" in done.stderr
+    assert "coursebuild.core.run.v8" in done.stderr
 
 
 @pytest.mark.parametrize("wrong", [["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"]])

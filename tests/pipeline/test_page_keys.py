@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.checks.course import check_course
+from coursebuild.core.checks.course import check_course
 from coursebuild.core.engine.memo import Memo
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Course
+from coursebuild.core.model import Course
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.page_index import PageKeys
@@ -74,7 +74,7 @@ def test_a_course_in_which_nothing_was_wrong_is_checked_again_when_it_looks_diff
             loaded = load(tmp_path, *given, documents.check)
         return [diagnostic.rule for diagnostic in loaded.diagnostics]
 
-    monkeypatch.setattr("coursebuild.checks.course.check_course", noted)
+    monkeypatch.setattr("coursebuild.core.checks.course.check_course", noted)
     write("content/course.toml", HEAD + LESSON.format("1.1") + LESSON.format("1.2"))
     write("content/lessons/1.1-l.md", "## A\n\nSee [b](lesson:1.2#b).\n")
     write("content/lessons/1.2-l.md", "## B\n\nWords.\n")

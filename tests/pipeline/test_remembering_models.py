@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.effects import mjcf
-from coursebuild.model import MjcfModel
+from coursebuild.core.model import MjcfModel
+from coursebuild.core.model.results import CompileResult
+from coursebuild.core.run import mjcf
+from coursebuild.core.text.source import Source
 from coursebuild.pipeline.remember_models import compile_all
-from coursebuild.results import CompileResult
-from coursebuild.source import Source
 
 pytestmark = pytest.mark.site
 

@@ -9,12 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.checks.compiled import mjcf_texts
-from coursebuild.checks.course import check_course
-from coursebuild.core.values import decode, encode, fingerprint
-from coursebuild.features.quiz.checks import check_output_lines
-from coursebuild.features.quiz.model import Quiz
-from coursebuild.model import (
+from coursebuild.core.checks.compiled import mjcf_texts
+from coursebuild.core.checks.course import check_course
+from coursebuild.core.model import (
     Course,
     Document,
     Lab,
@@ -25,18 +22,21 @@ from coursebuild.model import (
     document_blocks,
     document_has,
 )
-from coursebuild.model.summary import without_prose
+from coursebuild.core.model.results import Outcome, Results, ScriptRun
+from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.lookup.lexicon import lexicon
+from coursebuild.core.pages.shown import shown
+from coursebuild.core.pages.urls import Place
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.text.source import Source
+from coursebuild.core.values import decode, encode, fingerprint
+from coursebuild.features.quiz.checks import check_output_lines
+from coursebuild.features.quiz.model import Quiz
 from coursebuild.pipeline.tasks import DocumentSummary
-from coursebuild.render.library import Library
-from coursebuild.render.lookup.lexicon import lexicon
-from coursebuild.render.shown import shown
-from coursebuild.render.urls import Place
-from coursebuild.results import Outcome, Results, ScriptRun
-from coursebuild.scripts.compare import verify
-from coursebuild.scripts.extract import extract
-from coursebuild.scripts.findings import script_findings
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
 from support.scratch_course import ROOT
 from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
 

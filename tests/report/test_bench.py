@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import diagnose
+from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports.bench import RowVerdict, SceneCard, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.points import seconds_text, setting_text
@@ -22,7 +23,6 @@ from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import bench_values
 from coursebuild.report.measuring import checked_text, failure_text, measured_json, measured_text
 from coursebuild.report.terminal import Column, cells, table
-from coursebuild.source import Source
 from support.bench_reports import awkward, lost, row, scenario, scene, setting, swing
 
 EXPECTED = Path(__file__).parent

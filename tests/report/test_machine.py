@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ElementTree
 
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Note, diagnose
+from coursebuild.core.text.diagnostics import Note, diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.report import LabLine, Report, ScriptLine, Style, Summary, render_report
-from coursebuild.source import Source
 
 SOURCE = Source("content/lessons/1.1-a,b.md", "first\nwr\x00ng <&> here\n")
 ERROR = diagnose(

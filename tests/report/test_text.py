@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic, Note, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, sort_diagnostics
+from coursebuild.core.text.source import Source
 from coursebuild.report import (
     LabLine,
     Report,
@@ -12,7 +13,6 @@ from coursebuild.report import (
     diagnostic_text,
     render_report,
 )
-from coursebuild.source import Source
 
 
 def shown(diagnostic: Diagnostic, width: int = 100) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.effects.native import NativeEngine
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.native import NativeEngine
 
 pytestmark = pytest.mark.engine
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import mujoco
 
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scene
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
-from coursebuild.source import Source
-from coursebuild.syntax.scenarios import parse_declarations
 
 MODELS = Path(__file__).parents[2] / "models"
 FAMILY = ("Euler", "implicit", "implicitfast", "discrete")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Parsed
-from coursebuild.model import Course
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
+from coursebuild.core.model import Course
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Source
 from support.positioned_nodes import shown
 
 

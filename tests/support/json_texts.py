@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Parsed
-from coursebuild.source import Excerpt, Source
-from coursebuild.syntax.json_text import parse_json
-from coursebuild.syntax.nodes import Node
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.nodes import Node
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Excerpt, Source
 
 
 def parse(text: str) -> Parsed[Node | None]:

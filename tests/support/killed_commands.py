@@ -17,12 +17,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import coursebuild.pipeline.build
-import coursebuild.pipeline.extract
-import coursebuild.pipeline.update
-import coursebuild.render.fonts
-import coursebuild.render.site
-import coursebuild.render.zips  # noqa: F401  # loaded once, for all children
 from coursebuild.cli import main
 from coursebuild.core.engine import publish as publishing
 

@@ -23,10 +23,10 @@ from typing import Any
 from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import check_out, publish
-from coursebuild.effects.examples import write_examples
-from coursebuild.effects.locks import project_lock
-from coursebuild.effects.write import write_atomic
-from coursebuild.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.files.examples import write_examples
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.write import write_atomic
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 
 CALLS = ("fsync", "rename", "replace", "link", "symlink", "unlink", "rmdir", "mkdir")
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC

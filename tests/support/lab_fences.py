@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Parsed
-from coursebuild.model import Block, Inline, Lab, Paragraph, Text
-from coursebuild.source import Excerpt, Source, Span
-from coursebuild.syntax.lab import parse_lab
+from coursebuild.core.model import Block, Inline, Lab, Paragraph, Text
+from coursebuild.core.syntax.lab import parse_lab
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Excerpt, Source, Span
 from support.positioned_nodes import shown
 
 

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.effects.native import NativeEngine
+from coursebuild.core.model import Lab
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 from coursebuild.labs.compile import compile_lab
-from coursebuild.model import Lab
 from coursebuild.pipeline.labs import Engines
-from coursebuild.source import Source
-from coursebuild.syntax.document import parse_document
 
 BALL = (
     "<mujoco><worldbody><body name='ball'><freejoint/><geom name='g' size='.1'/>"

@@ -10,14 +10,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import Course, Document, MjcfModel
-from coursebuild.results import ModelFacts
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
-from coursebuild.syntax.scenarios import parse_declarations
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model import Course, Document, MjcfModel
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import Source
 
 KINDS = frozenset(kind.name for kind in CALLOUTS)
 LESSON = """

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.measuring import CompiledScene
 from coursebuild.pipeline.options import Options

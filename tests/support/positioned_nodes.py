@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.syntax.nodes import (
+from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
     DateNode,
@@ -13,6 +12,7 @@ from coursebuild.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
+from coursebuild.core.text.diagnostics import Diagnostic
 
 
 def shown(diagnostics: tuple[Diagnostic, ...]) -> list[str]:

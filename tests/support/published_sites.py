@@ -9,7 +9,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.results import CachedFile, SiteFile
+from coursebuild.core.model.results import CachedFile, SiteFile
 
 SPARE = ".coursebuild/published/spare"
 

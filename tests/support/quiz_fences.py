@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from coursebuild.diagnostics import Parsed, diagnose
+from coursebuild.core.model import Block, Inline, Paragraph, Text
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.features.quiz.parse import parse_quiz
-from coursebuild.model import Block, Inline, Paragraph, Text
-from coursebuild.source import Excerpt, Source, Span
 from support.positioned_nodes import shown
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.effects.versions import engine_version
+from coursebuild.core.run.versions import engine_version
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.records import (
     STABILITY_PATH,

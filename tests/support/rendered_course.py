@@ -8,7 +8,7 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.model import (
+from coursebuild.core.model import (
     Course,
     Document,
     Math,
@@ -19,11 +19,7 @@ from coursebuild.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.render import Assets, FontJob, SiteOptions, render_site
-from coursebuild.render.context import PageContext
-from coursebuild.render.library import Library
-from coursebuild.render.urls import Place, lesson_path
-from coursebuild.results import (
+from coursebuild.core.model.results import (
     CompileResult,
     Formula,
     ModelFacts,
@@ -32,10 +28,14 @@ from coursebuild.results import (
     ScriptRun,
     Verdict,
 )
-from coursebuild.source import Source
-from coursebuild.syntax.coursemap import parse_course_map
-from coursebuild.syntax.document import parse_document
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages import Assets, FontJob, SiteOptions, render_site
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.urls import Place, lesson_path
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 
 ROOT = Path(__file__).parents[2]
 

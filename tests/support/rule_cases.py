@@ -28,9 +28,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared import shared_cache
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.effects.lab_engine import LabEngine
-from coursebuild.effects.runner import ScriptServer
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.labs import try_labs
 from coursebuild.pipeline.load import load

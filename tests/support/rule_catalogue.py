@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from coursebuild.rules import RULES, Rule
+from coursebuild.core.text.rules import RULES, Rule
 
 _LINES = 16
 """How much of a file an example shows."""

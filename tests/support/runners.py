@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.effects import runner
-from coursebuild.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.run import runner
 
 SOURCE_TREE = Path(runner.__file__).parents[2]
 Run = Callable[..., ScriptRun]
@@ -19,8 +19,8 @@ both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=
 TOOL = """
 import sys
 from pathlib import Path
-from coursebuild.effects.runner import run_scripts
-from coursebuild.results import ScriptJob
+from coursebuild.core.run.runner import run_scripts
+from coursebuild.core.model.results import ScriptJob
 jobs = [ScriptJob(f"examples/x.py", (), 60.0, (), False)] * int(sys.argv[2])
 try:
     fork = sys.argv[3] == "True"

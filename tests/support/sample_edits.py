@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic, Edit
-from coursebuild.model import Comparison, Filter, Recording
-from coursebuild.scripts.compare import compare
-from coursebuild.scripts.edit import apply_edits, updated_body
+from coursebuild.core.model import Comparison, Filter, Recording
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from support.sample_lessons import EXACT, document, recording, recordings, told
 
 

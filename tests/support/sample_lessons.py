@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterator
 from decimal import Decimal
 
-from coursebuild.diagnostics import Diagnostic
-from coursebuild.model import (
+from coursebuild.core.model import (
     Block,
     Cell,
     CodeSpan,
@@ -31,8 +30,9 @@ from coursebuild.model import (
     Table,
     Text,
 )
-from coursebuild.results import Outcome, ScriptRun
-from coursebuild.source import Excerpt, Source, Span
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 EXACT = Comparison()
 DIGITS = Comparison(Mode.DIGITS)

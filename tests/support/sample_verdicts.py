@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from coursebuild.model import Comparison, Filter
-from coursebuild.results import Change, DriftKind, Verdict
-from coursebuild.scripts.compare import compare
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.scripts.compare import compare
 from support.sample_lessons import EXACT, recording
 
 

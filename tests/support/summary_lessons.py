@@ -6,14 +6,14 @@ import functools
 
 from msgspec.structs import replace
 
-from coursebuild.model import Course, Document
-from coursebuild.render.assets import Assets
-from coursebuild.render.lab_files import PublishedLabs
-from coursebuild.render.library import Library
-from coursebuild.results import Results
-from coursebuild.source import Source
-from coursebuild.syntax.document import parse_document
-from coursebuild.vocabulary import CALLOUTS
+from coursebuild.core.model import Course, Document
+from coursebuild.core.model.results import Results
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.lab_files import PublishedLabs
+from coursebuild.core.pages.library import Library
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 from support.scratch_course import ROOT, block
 
 KINDS = frozenset(kind.name for kind in CALLOUTS)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import mujoco
 
-from coursebuild.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.pruning.ablation import Order, Survey, survey
 from coursebuild.numerics.pruning.compare import cases
 from coursebuild.numerics.pruning.model_text import ModelText, open_model

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import fields
 
-from coursebuild.diagnostics import Diagnostic, Parsed
-from coursebuild.model import (
+from coursebuild.core.model import (
     Block,
     Comparison,
     Document,
@@ -20,7 +19,8 @@ from coursebuild.model import (
     Meaning,
     Table,
 )
-from coursebuild.source import Excerpt, Span
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.source import Excerpt, Span
 
 HIDDEN = {"span", "children", "blocks", "items", "header", "rows"}
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from coursebuild.effects.locks import make_private_folder
+from coursebuild.core.files.locks import make_private_folder
 
 FOLDER = ".coursebuild/published"
 """Where a course has its manifests."""

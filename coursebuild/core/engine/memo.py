@@ -30,8 +30,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import msgspec
 
-from coursebuild.effects.errors import reason
-from coursebuild.effects.locks import make_private_folder
+from coursebuild.core.files.errors import reason
+from coursebuild.core.files.locks import make_private_folder
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.shared import SharedCache

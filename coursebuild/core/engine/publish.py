@@ -41,10 +41,10 @@ from coursebuild.core.engine.manifest import (
     marker,
 )
 from coursebuild.core.engine.site_files import write_file, writing
-from coursebuild.effects.errors import EffectError, PublishRefusedError, reason
-from coursebuild.effects.locks import folder_lock
-from coursebuild.patterns import pattern
-from coursebuild.results import FileFacts, FileList, OutputFile, SiteFile
+from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
+from coursebuild.core.files.locks import folder_lock
+from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
+from coursebuild.core.text.patterns import pattern
 
 _NO_PATH = pattern(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """A part of a path that is empty or stands for a folder, a control character, a backslash."""

@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol, TypeVar
 from urllib.parse import unquote, urlsplit
 
-from coursebuild.effects.errors import EffectError, reason
+from coursebuild.core.files.errors import EffectError, reason
 
 _VERSION = "coursebuild-1"
 """A folder in the shared place; to be changed with what entries look like."""

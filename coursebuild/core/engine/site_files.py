@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coursebuild.core.engine.manifest import ManifestEntry
-from coursebuild.results import OutputFile, SiteFile
+from coursebuild.core.model.results import OutputFile, SiteFile
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers

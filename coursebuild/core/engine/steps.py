@@ -7,8 +7,8 @@ anything differs there is another key, and what lies under the old one is not fo
 
 from __future__ import annotations
 
+from coursebuild.core.engine.tool import tool_digest
 from coursebuild.core.values import fingerprint
-from coursebuild.effects.tool import tool_digest
 
 
 def step_key(name: str, *values: object) -> str:

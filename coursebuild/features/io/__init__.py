@@ -11,9 +11,9 @@ from coursebuild.features.io.model import Io
 from coursebuild.features.io.parse import parse_io
 
 if TYPE_CHECKING:
-    from coursebuild.render.context import PageContext
-    from coursebuild.render.exports.plain import Plain
-    from coursebuild.render.search.sections import SectionReader
+    from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.exports.plain import Plain
+    from coursebuild.core.pages.search.sections import SectionReader
 
 
 def draw(page: PageContext, card: Io) -> Markup:

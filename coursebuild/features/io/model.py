@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.model import FeatureBlock, Inline
+from coursebuild.core.model import FeatureBlock, Inline
 
 
 class Io(FeatureBlock, frozen=True):

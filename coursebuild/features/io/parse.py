@@ -6,15 +6,15 @@ the lines after it continue it. All three must be there, once, in this order.
 
 from __future__ import annotations
 
-from coursebuild.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
+from coursebuild.core.model import Inline
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.info import parse_info, read_keys
+from coursebuild.core.syntax.spans import joined, trimmed
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.io.model import Io
-from coursebuild.model import Inline
-from coursebuild.patterns import pattern
-from coursebuild.source import Excerpt, Span
-from coursebuild.syntax.fence import Fence
-from coursebuild.syntax.info import parse_info, read_keys
-from coursebuild.syntax.spans import joined, trimmed
-from coursebuild.syntax.texts import TextParser
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
 _LABEL = pattern(r"\s*(INPUT|PROCESS|OUTPUT):")

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from coursebuild.diagnostics import Diagnostic, Note, diagnose, did_you_mean
+from coursebuild.core.model import Course, Document, Heading, document_blocks, document_scripts
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.features.quiz.model import Quiz
-from coursebuild.model import Course, Document, Heading, document_blocks, document_scripts
-from coursebuild.results import Outcome, ScriptRun
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, assert_never
 
+from coursebuild.core.model import Heading, plain_text
+from coursebuild.core.pages.exports.marks import escaped, fence, hang
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -17,11 +19,9 @@ from coursebuild.features.quiz.model import (
     Quiz,
 )
 from coursebuild.features.quiz.page import letter, output_line
-from coursebuild.model import Heading, plain_text
-from coursebuild.render.exports.marks import escaped, fence, hang
 
 if TYPE_CHECKING:
-    from coursebuild.render.exports.plain import Plain
+    from coursebuild.core.pages.exports.plain import Plain
 
 
 def quiz_markdown(writer: Plain, block: Quiz) -> str:

@@ -11,8 +11,8 @@ from typing import TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.model import Block, FeatureBlock, Inline, Lab
-from coursebuild.source import Span
+from coursebuild.core.model import Block, FeatureBlock, Inline, Lab
+from coursebuild.core.text.source import Span
 
 
 class Choice(Struct, frozen=True):

@@ -17,6 +17,8 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.model import Comparison, Heading, Mode, Recording, document_blocks, plain_text
+from coursebuild.core.model.results import Outcome
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -26,11 +28,9 @@ from coursebuild.features.quiz.model import (
     OutputQuestion,
     Quiz,
 )
-from coursebuild.model import Comparison, Heading, Mode, Recording, document_blocks, plain_text
-from coursebuild.results import Outcome
 
 if TYPE_CHECKING:
-    from coursebuild.render.context import PageContext
+    from coursebuild.core.pages.context import PageContext
 
 
 class Option(Struct, frozen=True):

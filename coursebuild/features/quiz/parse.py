@@ -17,7 +17,17 @@ from typing import assert_never
 
 from msgspec.structs import replace
 
-from coursebuild.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.syntax.decode import Decoding, decode
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.info import parse_info, read_keys
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.syntax.prose import Prose
+from coursebuild.core.syntax.relations import repeated
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.wording import JSON
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.quiz.keys import QuestionKeys
 from coursebuild.features.quiz.model import (
     AnyQuestion,
@@ -39,16 +49,6 @@ from coursebuild.features.quiz.schema import (
     Predict,
     QuizFile,
 )
-from coursebuild.source import Excerpt, Span
-from coursebuild.syntax.decode import Decoding, decode
-from coursebuild.syntax.fence import Fence
-from coursebuild.syntax.info import parse_info, read_keys
-from coursebuild.syntax.json_text import parse_json
-from coursebuild.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
-from coursebuild.syntax.prose import Prose
-from coursebuild.syntax.relations import repeated
-from coursebuild.syntax.texts import TextParser
-from coursebuild.syntax.wording import JSON
 
 TOLERANCE = 0.02
 """Of the answer's size, where a numeric question gives no tolerance."""
@@ -151,7 +151,7 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
-        from coursebuild.syntax.lab_checks import check_lab
+        from coursebuild.core.syntax.lab_checks import check_lab
 
         yield from check_lab(sim, decoding.structs)
 
@@ -203,7 +203,7 @@ def _question(
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
-                from coursebuild.syntax.lab import sim_lab
+                from coursebuild.core.syntax.lab import sim_lab
 
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             options = _choices(node, fields.options, prose)

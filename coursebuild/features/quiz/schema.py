@@ -11,8 +11,8 @@ from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
-from coursebuild.syntax.lab_schema import SimLab
+from coursebuild.core.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
+from coursebuild.core.syntax.lab_schema import SimLab
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
 """Of an option; that it is one is checked in `quiz`."""

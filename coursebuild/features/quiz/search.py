@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from coursebuild.features.quiz.model import ChoiceQuestion, OrderQuestion, Quiz
 
 if TYPE_CHECKING:
-    from coursebuild.render.search.sections import SectionReader
+    from coursebuild.core.pages.search.sections import SectionReader
 
 
 def index_quiz(reader: SectionReader, quiz: Quiz) -> None:

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, peaks
 from coursebuild.numerics.engine import advance, initial_data
 from coursebuild.numerics.problem import Scenario, Setup, whole_number

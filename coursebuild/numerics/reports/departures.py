@@ -18,7 +18,7 @@ from typing import TypeAlias, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.model.scenarios import Bands
+from coursebuild.core.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,

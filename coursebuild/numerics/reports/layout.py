@@ -11,8 +11,8 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from coursebuild.drawing.marks import markup_text, shortened, text_width
-from coursebuild.drawing.scales import log_ticks
+from coursebuild.core.drawing.marks import markup_text, shortened, text_width
+from coursebuild.core.drawing.scales import log_ticks
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.points import Chart, PlotLine, Point, lane_text
 

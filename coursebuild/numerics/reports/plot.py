@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from coursebuild.drawing.marks import Box, apart, clear_place, markup_text, text_width
-from coursebuild.drawing.scales import number_text
+from coursebuild.core.drawing.marks import Box, apart, clear_place, markup_text, text_width
+from coursebuild.core.drawing.scales import number_text
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.layout import (
     NARROW,

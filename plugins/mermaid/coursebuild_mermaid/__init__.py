@@ -13,16 +13,16 @@ import mmdr
 from markupsafe import Markup
 
 from coursebuild.core.features import Feature, FenceKind
-from coursebuild.diagnostics import Parsed, diagnose
-from coursebuild.model import FeatureBlock
-from coursebuild.render.context import PageContext
-from coursebuild.render.exports.marks import fence as code_block
-from coursebuild.render.exports.plain import Plain
-from coursebuild.render.search.sections import SectionReader
-from coursebuild.rules import Rule
-from coursebuild.syntax.fence import Fence
-from coursebuild.syntax.info import parse_info, read_keys
-from coursebuild.syntax.texts import TextParser
+from coursebuild.core.model import FeatureBlock
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.exports.marks import fence as code_block
+from coursebuild.core.pages.exports.plain import Plain
+from coursebuild.core.pages.search.sections import SectionReader
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.info import parse_info, read_keys
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.rules import Rule
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 

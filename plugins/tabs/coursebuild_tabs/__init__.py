@@ -13,15 +13,15 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind
-from coursebuild.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.model import Block, FeatureBlock
-from coursebuild.render.context import PageContext
-from coursebuild.render.exports.plain import Plain
-from coursebuild.render.search.sections import SectionReader
-from coursebuild.rules import Rule
-from coursebuild.source import Span
-from coursebuild.syntax.fence import Fence
-from coursebuild.syntax.texts import TextParser
+from coursebuild.core.model import Block, FeatureBlock
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.exports.plain import Plain
+from coursebuild.core.pages.search.sections import SectionReader
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.rules import Rule
+from coursebuild.core.text.source import Span
 
 TITLE = re.compile(r"===[ \t]+(?P<title>\S.*?)[ \t]*$", re.MULTILINE)
 """A line that begins a tab."""

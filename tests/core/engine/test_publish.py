@@ -18,8 +18,8 @@ from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.exchange import exchange
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import check_out, publish
-from coursebuild.effects.errors import EffectError, PublishRefusedError
-from coursebuild.results import OutputFile
+from coursebuild.core.files.errors import EffectError, PublishRefusedError
+from coursebuild.core.model.results import OutputFile
 
 
 def site(text: str, *more: str) -> list[OutputFile]:
@@ -305,7 +305,7 @@ BUILD = """
 import sys
 from pathlib import Path
 from coursebuild.core.engine import publish
-from coursebuild.results import OutputFile
+from coursebuild.core.model.results import OutputFile
 root, name, way = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
 if way == "renames":
     publish.exchange = lambda a, b: False

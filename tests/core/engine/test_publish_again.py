@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import root as root
 from support.published_sites import texts
 

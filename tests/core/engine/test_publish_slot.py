@@ -13,9 +13,9 @@ import pytest
 from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.effects import locks
-from coursebuild.effects.errors import EffectError
-from coursebuild.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.files import locks
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
 from support.published_sites import links as links
 from support.published_sites import pages as pages

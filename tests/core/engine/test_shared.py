@@ -15,7 +15,7 @@ import pytest
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared import FolderPlace, SharedCache, shared_cache
-from coursebuild.effects.errors import EffectError
+from coursebuild.core.files.errors import EffectError
 
 KEY = hashlib.sha256(b"a key").hexdigest()
 GROUP = hashlib.sha256(b"a group").hexdigest()

@@ -245,7 +245,7 @@ def test_a_name_that_would_not_fit_a_line_is_not_kept(root: Path) -> None:
 
 def test_looking_imports_next_to_nothing() -> None:
     code = (
-        "import sys; import coursebuild.cli, coursebuild.effects.course_root\n"
+        "import sys; import coursebuild.cli, coursebuild.core.files.course_root\n"
         "print(sorted(m for m in sys.modules if m.startswith('coursebuild.')))\n"
         "large = {'argparse', 'collections', 'contextlib', 'pathlib', 're', 'typing'}\n"
         "print(sorted(large & set(sys.modules)))\n"
@@ -260,6 +260,6 @@ def test_looking_imports_next_to_nothing() -> None:
     assert done.stdout.splitlines() == [
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
         "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
-        "'coursebuild.effects', 'coursebuild.effects.course_root']",
+        "'coursebuild.core.files', 'coursebuild.core.files.course_root']",
         "[]",
     ]

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine.workers import Workers, can_fork
-from coursebuild.effects.errors import EffectError
+from coursebuild.core.files.errors import EffectError
 
 pytestmark = pytest.mark.site
 

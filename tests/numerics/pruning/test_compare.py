@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import TOLERANCE, Case, cases, compare, watch
 from coursebuild.numerics.pruning.mapping import Gone, Mapping, fits, mapping_without, transfer
-from coursebuild.source import Source
-from coursebuild.syntax.scenarios import parse_declarations
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>

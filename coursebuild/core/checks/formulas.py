@@ -1,0 +1,69 @@
+"""Formulas: which ones a course has, and where those that do not parse stand.
+
+Entry points: `course_formulas(course)`, `check_formulas(course, typeset)`; `document_formulas` and
+`formula_findings` for one document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from coursebuild.core.model import (
+    Course,
+    Document,
+    Math,
+    MathBlock,
+    block_inlines,
+    document_blocks,
+    walk_inlines,
+)
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Excerpt
+
+
+def _uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
+    """Every formula that says something; an empty one is the parser's to report."""
+    for block in document_blocks(document):
+        if isinstance(block, MathBlock):
+            if block.tex.text.strip():
+                yield Formula(block.tex.text, True), block.tex
+            continue
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Math) and inline.tex.text.strip():
+                yield Formula(inline.tex.text, inline.display), inline.tex
+
+
+def course_formulas(course: Course) -> tuple[Formula, ...]:
+    """Each different formula of the course, in order of first use."""
+    return tuple(dict.fromkeys(f for d in course.documents for f in document_formulas(d)))
+
+
+def document_formulas(document: Document) -> tuple[Formula, ...]:
+    """The same of one document."""
+    return tuple(dict.fromkeys(formula for formula, _ in _uses(document)))
+
+
+def check_formulas(
+    course: Course, typeset: Mapping[Formula, str | MathError]
+) -> tuple[Diagnostic, ...]:
+    """One diagnostic for each place where a formula that does not parse stands."""
+    return tuple(d for document in course.documents for d in formula_findings(document, typeset))
+
+
+def formula_findings(
+    document: Document, typeset: Mapping[Formula, str | MathError]
+) -> tuple[Diagnostic, ...]:
+    """The same of one document."""
+    found: list[Diagnostic] = []
+    if not any(isinstance(result, MathError) for result in typeset.values()):
+        return ()
+    for formula, tex in _uses(document):
+        result = typeset[formula]
+        if not isinstance(result, MathError):
+            continue
+        size = len(tex.text)
+        at = min(result.position, max(size - 1, 0)) if result.position is not None else None
+        span = tex.span() if at is None else tex.span(at, max(at + 1, min(size, at + 1)))
+        found.append(diagnose("math-syntax", span, f"the formula does not parse: {result.message}"))
+    return tuple(found)

@@ -1,0 +1,343 @@
+"""Links and mentions of the sources: every one leads somewhere.
+
+Entry points: `places(course)`; `document_links`, for one document.
+
+1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
+   each document.
+2. Walk each document's inlines and compare.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from typing import TypeAlias, assert_never
+from urllib.parse import SplitResult, unquote, urlsplit
+
+from msgspec import Struct
+
+from coursebuild.core.checks.model_places import model_place
+from coursebuild.core.model import (
+    Course,
+    Document,
+    ExampleTarget,
+    FeatureBlock,
+    Heading,
+    HtmlBlock,
+    Image,
+    LessonTarget,
+    LevelTarget,
+    Link,
+    MjcfModel,
+    ModelTarget,
+    PageTarget,
+    RawInline,
+    Recording,
+    Script,
+    Target,
+    Term,
+    TermTarget,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    document_inlines,
+    line_anchor,
+    linked_lines,
+    listing_anchor,
+    local_file,
+    output_anchor,
+    resolve,
+    walk_inlines,
+)
+from coursebuild.core.model.equations import equation_ids
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Span
+
+AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
+_Name: TypeAlias = (
+    LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
+)
+
+_HTML_ID = pattern(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ANCHOR = pattern(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
+
+
+class Places(Struct, frozen=True):
+    """Everything that a link may lead to."""
+
+    lessons: Mapping[str, Document | None]
+    levels: frozenset[str]
+    pages: Mapping[str, Document | None]
+    models: Mapping[str, MjcfModel]
+    scenarios: Mapping[str, tuple[str, ...]]
+    """Those that models declare, by the model's name."""
+    scripts: frozenset[str]
+    files: frozenset[str]
+    terms: Mapping[str, Span]
+    """Where each is defined, by its id; of two places the first."""
+
+
+def places(
+    course: Course,
+    scripts: Iterable[str] | None = None,
+    terms: Mapping[str, Span] | None = None,
+) -> Places:
+    """What the course offers as targets; `scripts` are their paths, where they are known.
+
+    So are `terms`: where each is defined.
+    """
+    if scripts is None:
+        blocks = (block for document in course.documents for block in document_blocks(document))
+        scripts = (block.path for block in blocks if isinstance(block, Script))
+    return Places(
+        {lesson.id: lesson.document for lesson in course.lessons},
+        frozenset(level.id for level in course.levels),
+        {page.id: page.document for page in course.pages},
+        {model.name: model for model in course.models},
+        {d.model: tuple(one.name for one in d.scenarios) for d in course.declarations},
+        frozenset(scripts),
+        frozenset(course.files),
+        _all_terms(course.documents) if terms is None else terms,
+    )
+
+
+def _all_terms(documents: Iterable[Document]) -> dict[str, Span]:
+    found: dict[str, Span] = {}
+    for document in documents:
+        for id, span in defined_terms(document).items():
+            found.setdefault(id, span)
+    return found
+
+
+def defined_terms(document: Document) -> dict[str, Span]:
+    """The terms that a document defines, and where first."""
+    found: dict[str, Span] = {}
+    for inline in document_inlines(document):
+        if isinstance(inline, Term):
+            found.setdefault(inline.id, inline.span)
+    return found
+
+
+def anchors(document: Document) -> frozenset[str]:
+    """The ids that a link may name in a document.
+
+    Headings, quizzes, listings, outputs, formulas, terms, and ids written in raw HTML; of lines,
+    see `_is_line`.
+    """
+    outputs: dict[str, int] = {}
+    lexicon = document.lexicon
+    found = {*equation_ids(document)} if lexicon is None else {e.id for e in lexicon.equations}
+    for block in document_blocks(document):
+        if isinstance(block, Heading):
+            found.add(block.anchor)
+        elif isinstance(block, FeatureBlock):
+            found.update(block.anchors())
+        elif isinstance(block, Script):
+            found.add(listing_anchor(block.path))
+        elif isinstance(block, Recording) and block.script is not None:
+            outputs[block.script] = outputs.get(block.script, 0) + 1
+            found.add(output_anchor(block.script, outputs[block.script]))
+        elif isinstance(block, HtmlBlock):
+            found.update(_HTML_ID.findall(block.html))
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, RawInline):
+                found.update(_HTML_ID.findall(inline.html))
+            elif isinstance(inline, Term):
+                found.add(inline.anchor)
+    return frozenset(found)
+
+
+def _is_line(anchor: str, document: Document) -> bool:
+    """Whether an anchor names lines of a script of a document."""
+    lines, script = linked_lines(anchor), _listing(anchor, document)
+    return lines is not None and script is not None and lines[2] <= _length(script)
+
+
+def _listing(anchor: str, document: Document) -> Script | None:
+    """The script of a document of which an anchor names lines, whether it has them or not."""
+    if (lines := linked_lines(anchor)) is None:
+        return None
+    scripts = (block for block in document_blocks(document) if isinstance(block, Script))
+    wanted = f"{lines[0]}.L{lines[1]}"
+    return next((s for s in scripts if line_anchor(s.path, lines[1]) == wanted), None)
+
+
+def _length(script: Script) -> int:
+    return script.code.text.rstrip("\n").count("\n") + 1
+
+
+def remembered_anchors() -> AnchorsOf:
+    """`anchors`, by the path of the document."""
+    known_anchors: dict[str, frozenset[str]] = {}
+
+    def anchors_of(document: Document) -> frozenset[str]:
+        path = document.source.path
+        if path not in known_anchors:
+            known_anchors[path] = anchors(document)
+        return known_anchors[path]
+
+    return anchors_of
+
+
+def document_links(
+    course: Course, document: Document, known: Places, anchors_of: AnchorsOf = anchors
+) -> Iterator[Diagnostic]:
+    """A diagnostic for each link, mention or image of a document that leads nowhere.
+
+    `known` is what the course offers.
+    """
+    for block in document_blocks(document):
+        if isinstance(block, HtmlBlock):
+            yield from _check_html(block.span, document, anchors_of)
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Link):
+                target = resolve(inline.target, course, document.source.path)
+                yield from _check_link(inline, target, document, known, anchors_of)
+            elif isinstance(inline, Image):
+                yield from _check_image(inline, document, known)
+            elif isinstance(inline, RawInline):
+                yield from _check_html(inline.span, document, anchors_of)
+
+
+def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterator[Diagnostic]:
+    """Links of raw HTML to anchors of its own page."""
+    for link in _HTML_ANCHOR.finditer(span.text):
+        place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
+        yield from _anchor(place, link[1][1:], document, "this page", anchors_of)
+
+
+class _Named(Struct, frozen=True):
+    """What a link calls by its name."""
+
+    rule: str
+    name: str
+    among: Collection[str]
+    missing: str
+    """What to say where it is not among them."""
+
+
+def _check_link(
+    link: Link, target: Target, document: Document, known: Places, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    span = link.target_span
+    if isinstance(target, UrlTarget):
+        yield from _check_url(span, target.url, document, known, anchors_of)
+        return
+    named = _named(link, target, known)
+    if named.name not in named.among:
+        help = did_you_mean(named.name, named.among)
+        yield diagnose(named.rule, span, named.missing, help=help)
+    elif isinstance(target, ModelTarget):
+        declared = known.scenarios.get(target.name, ())
+        yield from model_place(span, target.anchor, known.models[target.name], declared)
+    elif isinstance(target, LessonTarget):
+        to, where = known.lessons[target.id], f"lesson {target.id}"
+        yield from _anchor(span, target.anchor, to, where, anchors_of)
+    elif isinstance(target, PageTarget):
+        to, where = known.pages[target.id], f"page `{target.id}`"
+        yield from _anchor(span, target.anchor, to, where, anchors_of)
+
+
+def _named(link: Link, target: _Name, known: Places) -> _Named:
+    map_lacks = (
+        f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
+    )
+    match target:
+        case LessonTarget(id=id):
+            return _Named("link-lesson", id, known.lessons, f"lesson {id} {map_lacks}")
+        case LevelTarget(id=id):
+            return _Named("link-level", id, known.levels, f"level {id} {map_lacks}")
+        case PageTarget(id=id):
+            return _Named("link-page", id, known.pages, f"no page `{id}` in the course map")
+        case ModelTarget(name=name):
+            return _Named("link-model", name, known.models, f"no model `{name}` in models/")
+        case ExampleTarget(path=path):
+            missing = f"no lesson has a script `{path}`"
+            return _Named("link-example", path, known.scripts, missing)
+        case TermTarget(id=id):
+            return _Named("link-term", id, known.terms, f"no lesson defines the term `{id}`")
+        case _:
+            assert_never(target)
+
+
+def _anchor(
+    span: Span, anchor: str | None, document: Document | None, where: str, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    if not anchor:
+        return
+    if document is None:
+        yield diagnose(
+            "link-anchor",
+            span,
+            f"{where} is planned, so it has no anchor `#{anchor}` yet",
+            help="link to the lesson itself",
+        )
+        return
+    known = anchors_of(document)
+    name = unquote(anchor)
+    if name in known or _is_line(name, document):
+        return
+    listing = _listing(name, document)
+    help = (
+        did_you_mean(anchor, known)
+        if listing is None
+        else f"the last line of `{listing.path}` is {_length(listing)}"
+    )
+    yield diagnose("link-anchor", span, f"{where} has no anchor `#{anchor}`", help=help)
+
+
+def _check_url(
+    span: Span, url: str, document: Document, known: Places, anchors_of: AnchorsOf
+) -> Iterator[Diagnostic]:
+    parts = urlsplit_or_none(url)
+    if parts is None:
+        yield diagnose("link-file", span, f"`{url}` is no address that can be read")
+        return
+    if parts.scheme or parts.netloc:
+        return
+    if not parts.path:
+        yield from _anchor(span, parts.fragment or None, document, "this page", anchors_of)
+        return
+    path = local_file(url, document.source.path)
+    if path not in known.files:
+        yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
+
+
+def _file_help(path: str, known: Places) -> str:
+    name = posixpath.basename(path)
+    if name.endswith(".md"):
+        return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
+    if name.endswith(".xml") and name[:-4] in known.models:
+        return f"link to a model by its name: `model:{name[:-4]}`"
+    return (
+        did_you_mean(path, known.files)
+        if known.files
+        else "files that pages may use lie in content/"
+    )
+
+
+def _check_image(image: Image, document: Document, known: Places) -> Iterator[Diagnostic]:
+    parts = urlsplit_or_none(image.url)
+    if parts is None or parts.scheme or parts.netloc:
+        yield diagnose(
+            "image-remote",
+            image.url_span,
+            f"the image `{image.url}` is not a file of the course",
+            help="put the file into content/ and name it relative to the lesson",
+        )
+        return
+    path = local_file(image.url, document.source.path)
+    if path not in known.files:
+        yield diagnose(
+            "link-file", image.url_span, f"no file `{path}`", help=_file_help(path, known)
+        )
+
+
+def urlsplit_or_none(url: str) -> SplitResult | None:
+    """`urlsplit`, or `None` for an address that it refuses."""
+    try:
+        return urlsplit(url)
+    except ValueError:
+        return None

@@ -1,0 +1,127 @@
+"""Writing a file for others, in one step, without holding an archive in memory.
+
+Entry points: `check_target`, which says early whether one may be written somewhere;
+`write_archive`, `write_single`.
+
+The same files give the same bytes: they stand in the order of their paths, with one date, and what
+is compressed already is stored.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import zipfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import BinaryIO
+
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
+from coursebuild.core.model.results import OutputFile, SiteFile
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+_LEVEL = 6
+_FIRST = "mimetype"
+"""What an e-book must begin with, stored."""
+_STORED = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _FIRST)
+_AUTHORED = ("features", "models", "examples", ".coursebuild", ".git")
+
+
+def check_target(root: Path, out: Path, is_ours: Callable[[Path], bool]) -> None:
+    """Nothing may be at `out`, or at what it links to, but a file that is ours.
+
+    Raises:
+        PublishRefusedError: the file must not go there.
+    """
+    place = Path(os.path.realpath(out))
+    for name in _AUTHORED:
+        if place.is_relative_to(os.path.realpath(root / name)):
+            raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no export goes")
+    if any((folder / MARKER).is_file() for folder in place.parents):
+        raise PublishRefusedError(
+            f"{out} lies in a published site, which the next build replaces",
+            help="write the file beside it",
+        )
+    if place.is_dir():
+        raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
+    if os.path.lexists(place) and not is_ours(place):
+        raise PublishRefusedError(
+            f"{out} is there, and is no such export", help="move it away, or name another file"
+        )
+
+
+def holds(place: Path, name: str) -> bool:
+    """Whether a file is an archive with a file of this name."""
+    try:
+        with zipfile.ZipFile(place) as archive:
+            return name in archive.namelist()
+    except (OSError, zipfile.BadZipFile, ValueError):
+        return False
+
+
+def begins_with(place: Path, mark: bytes) -> bool:
+    """Whether a file has this near its beginning."""
+    try:
+        with place.open("rb") as file:
+            return mark in file.read(1000)
+    except OSError:
+        return False
+
+
+def write_archive(out: Path, files: Iterable[SiteFile]) -> int:
+    """Write the files into an archive; gives its size in bytes.
+
+    Raises:
+        EffectError: it cannot be written; what was there stays.
+    """
+
+    def write(target: BinaryIO) -> None:
+        with zipfile.ZipFile(target, "w") as archive:
+            for file in sorted(files, key=lambda file: (file.path != _FIRST, file.path)):
+                _add(archive, file)
+
+    return _write(out, write)
+
+
+def write_single(out: Path, files: Iterable[SiteFile]) -> int:
+    """Write the only one of the files; gives its size in bytes.
+
+    Raises:
+        EffectError: it cannot be written; what was there stays.
+    """
+    (file,) = files
+    return _write(out, lambda target: target.write(_data(file)))
+
+
+def _write(out: Path, write: Callable[[BinaryIO], object]) -> int:
+    """Put a file in its place when it is whole; gives its size."""
+    place = Path(os.path.realpath(out))
+    # One name, so that what a killed command left is written over by the next.
+    temporary = place.with_name(f".{place.name}.part")
+    try:
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("wb") as target:
+                write(target)
+            size = temporary.stat().st_size
+            temporary.replace(place)
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+    except OSError as error:
+        raise EffectError(f"{out} cannot be written: {reason(error)}") from None
+    return size
+
+
+def _add(archive: zipfile.ZipFile, file: SiteFile) -> None:
+    entry = zipfile.ZipInfo(file.path, _DATE)
+    stored = file.path.lower().endswith(_STORED)
+    entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+    entry.create_system = 3
+    entry.external_attr = 0o100644 << 16
+    archive.writestr(entry, _data(file), compresslevel=_LEVEL)
+
+
+def _data(file: SiteFile) -> bytes:
+    return file.data if isinstance(file, OutputFile) else file.make()

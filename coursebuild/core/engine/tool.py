@@ -1,0 +1,96 @@
+"""Which tool this is: a name for its code, its templates and what it bundles.
+
+Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas.
+
+What it imports belongs to it, by the versions that are installed. The files' sizes and times tell
+one tool from another, so that none of them need be read. A tool that was installed anew makes
+everything once more, though it may be the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+
+from coursebuild.core.features import features_digest
+from coursebuild.core.files.resources import assets_dir, templates_dir
+
+_CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
+
+
+def tool_digest() -> str:
+    """A hash over everything that the tool consists of, features of others and Python included."""
+    return hashlib.sha256(f"{_tool()}\0{features_digest()}".encode()).hexdigest()
+
+
+@functools.cache
+def _tool() -> str:
+    return _digest(os.path.dirname(_CORE), str(templates_dir()), str(assets_dir()))  # noqa: PTH120
+
+
+@functools.cache
+def typesetter_digest() -> str:
+    """A hash over what makes MathML of TeX."""
+    return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
+
+
+_LIBRARIES = (
+    "brotli",
+    "fonttools",
+    "jinja2",
+    "markdown_it_py",
+    "markupsafe",
+    "mdit_py_plugins",
+    "mdurl",
+    "mini_racer",
+    "msgspec",
+    "pygments",
+    "segno",
+    "selectolax",
+    "tree_sitter",
+    "tree_sitter_javascript",
+    "uharfbuzz",
+)
+"""What outputs are made with, as the folders with their versions in the name begin."""
+
+
+@functools.cache
+def _libraries() -> str:
+    """The versions of the libraries, by the folders that installing them leaves."""
+    found: list[str] = []
+    for folder in sys.path:
+        try:
+            names = os.listdir(folder or ".")  # noqa: PTH208
+        except OSError:
+            continue
+        found += sorted(
+            name
+            for name in names
+            if name.endswith(".dist-info") and name.lower().partition("-")[0] in _LIBRARIES
+        )
+    return "\0".join(found)
+
+
+def _digest(*folders: str) -> str:
+    digest = hashlib.sha256(f"{sys.version}\0{_libraries()}\0".encode())
+    for folder in folders:
+        for line in _lines(folder, ""):
+            digest.update(line.encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()
+
+
+def _lines(folder: str, inner: str) -> Iterator[str]:
+    """A line for each file, sorted, without the place of the folder."""
+    with os.scandir(folder) as entries:
+        found = sorted(entries, key=lambda entry: entry.name)
+    for entry in found:
+        name = f"{inner}/{entry.name}"
+        if entry.is_dir():
+            if entry.name != "__pycache__":
+                yield from _lines(entry.path, name)
+        elif not entry.name.endswith((".pyc", "~")):
+            status = entry.stat()
+            yield f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0"

@@ -1,0 +1,305 @@
+"""Writing the lessons' scripts to `examples/`, and never over what somebody changed there.
+
+Entry point: `write_examples`.
+
+1. The manifest `examples/.extracted.json` holds the SHA-256 of what was last written to each path.
+   A file that has such a hash is ours; any other content was put there by somebody and is reported,
+   with a diff, never overwritten.
+2. Before a file changes, the manifest names its new hash beside the old one; afterwards the new one
+   alone. Killed in between, the file is either, and known.
+3. A script that no lesson has any more is removed if it is ours.
+
+A manifest that is lost or damaged only makes the tool more careful.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import hashlib
+import json
+import os
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from msgspec import Struct, field
+
+from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
+from coursebuild.core.files.write import remove_leftovers, resolve_inside, write_atomic
+
+FOLDER = "examples"
+MANIFEST = f"{FOLDER}/.extracted.json"
+
+
+class Obstacle(enum.Enum):
+    """Why a script was not written or removed."""
+
+    EDITED = "edited"
+    """It was extracted once and changed by hand since."""
+    FOREIGN = "foreign"
+    """Something else stands at its path, which was never extracted (or the manifest is lost)."""
+    ORPHAN = "orphan"
+    """It was extracted once and changed by hand, and no lesson has it any more."""
+    LINK = "link"
+    """A link stands in its way."""
+    FOLDER = "folder"
+    """A folder stands at its path, or a file where its folder should be."""
+
+
+class Blocked(Struct, frozen=True):
+    """A path that was left alone."""
+
+    path: str
+    obstacle: Obstacle
+    current: str
+    """What the file holds; bytes that are not UTF-8 as `\\xNN`. Empty for a link or a folder."""
+    diff: str
+    """Unified diff from the lesson's block to the file; empty where there is nothing to compare."""
+    diverged: bool = False
+    """Of an edited one: the lesson's block was changed as well since the file was extracted."""
+
+
+class ExamplesReport(Struct, frozen=True):
+    """What became of each script; paths in sorted order."""
+
+    written: tuple[str, ...]
+    unchanged: tuple[str, ...]
+    removed: tuple[str, ...]
+    blocked: tuple[Blocked, ...]
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """The SHA-256 that each script should have, in hexadecimal digits."""
+
+
+def write_examples(
+    root: Path, extractions: Sequence[tuple[str, bytes]] | Mapping[str, bytes]
+) -> ExamplesReport:
+    """Bring `examples/` up to date.
+
+    Args:
+        root: the course folder; the caller holds its lock.
+        extractions: every script of the course, each path once, POSIX, below `examples/`; a
+            mapping is asked for one after the other.
+
+    Raises:
+        EffectError: the folder cannot be written, or leads out of the project.
+    """
+    root = root.resolve()
+    try:
+        resolve_inside(root, FOLDER)
+    except OutsideProjectError:
+        raise OutsideProjectError(f"{FOLDER}/ is a link that leads out of the project") from None
+    known = _load_manifest(root)
+    if not extractions and not known:
+        return ExamplesReport((), (), (), ())
+    try:
+        wanted = extractions if isinstance(extractions, Mapping) else dict(extractions)
+        return _Update(root, known, wanted).run()
+    except OSError as error:
+        where = os.path.relpath(error.filename, root) if error.filename else FOLDER
+        raise EffectError(f"{where} cannot be written: {reason(error)}") from None
+
+
+class _Update:
+    """One run: what is planned is written down first, then done, then written down as done."""
+
+    def __init__(
+        self, root: Path, known: Mapping[str, tuple[str, ...]], wanted: Mapping[str, bytes]
+    ) -> None:
+        self.root = root
+        self.known = known
+        self.wanted = wanted
+        self.current: dict[str, bytes | None] = {}
+        """What the files that are written or removed hold now."""
+        self.manifest: dict[str, tuple[str, ...]] = {}
+        self.written: list[str] = []
+        self.unchanged: list[str] = []
+        self.removed: list[str] = []
+        self.blocked: list[Blocked] = []
+        self.digests: dict[str, str] = {}
+
+    def run(self) -> ExamplesReport:
+        for path in sorted(self.wanted):
+            self._plan_write(path)
+        for path in sorted(self.known.keys() - self.wanted.keys()):
+            self._plan_removal(path)
+        (self.root / FOLDER).mkdir(exist_ok=True)
+        folders = {FOLDER, *(path.rpartition("/")[0] for path in self.wanted)}
+        remove_leftovers(self.root / folder for folder in folders)
+        before = {
+            path: tuple(dict.fromkeys((*self.manifest.get(path, ()), *self.known.get(path, ()))))
+            for path in self.manifest.keys() | set(self.removed)
+        }
+        if self.written or self.removed:
+            _save_manifest(self.root, before)
+        for path in list(self.written):
+            self._write(path)
+        for path in list(self.removed):
+            self._remove(path)
+        _save_manifest(self.root, self.manifest)
+        return ExamplesReport(
+            tuple(self.written),
+            tuple(self.unchanged),
+            tuple(self.removed),
+            tuple(sorted(self.blocked, key=lambda b: b.path)),
+            self.digests,
+        )
+
+    def _plan_write(self, path: str) -> None:
+        data = self.wanted[path]
+        digest = self.digests[path] = _hash(data)
+        obstacle, current = self._look(path)
+        if obstacle is not None:
+            self._block(path, obstacle, None)
+        elif current == data:
+            self.unchanged.append(path)
+            self.manifest[path] = (digest,)
+        elif self._is_ours(path, current):
+            self.written.append(path)
+            self.current[path] = current
+            self.manifest[path] = (digest,)
+        else:
+            self._block(path, Obstacle.EDITED if path in self.known else Obstacle.FOREIGN, current)
+
+    def _plan_removal(self, path: str) -> None:
+        obstacle, current = self._look(path)
+        if obstacle is not None or current is None:
+            return  # gone, or no longer anything of ours
+        if self._is_ours(path, current):
+            self.removed.append(path)
+            self.current[path] = current
+        else:
+            self._block(path, Obstacle.ORPHAN, current)
+
+    def _is_ours(self, path: str, current: bytes | None) -> bool:
+        # A power cut may make a file that was just written empty, and that holds nobody's work.
+        return not current or _hash(current) in self.known.get(path, ())
+
+    def _look(self, path: str) -> tuple[Obstacle | None, bytes | None]:
+        """What stands at a path: an obstacle, or the bytes of a file, or nothing."""
+        folders = [at for at, c in enumerate(path) if c == "/"][1:]  # not `examples` itself
+        for end in folders:
+            mode = self._mode(path[:end])
+            if mode is not None and stat.S_ISLNK(mode):
+                return Obstacle.LINK, None
+            if mode is not None and not stat.S_ISDIR(mode):
+                return Obstacle.FOLDER, None
+        mode = self._mode(path)
+        if mode is None:
+            return None, None
+        if stat.S_ISLNK(mode):
+            return Obstacle.LINK, None
+        if not stat.S_ISREG(mode):
+            return Obstacle.FOLDER, None
+        try:
+            with open(f"{self.root}/{path}", "rb", buffering=0) as file:  # noqa: PTH123
+                return None, file.read()
+        except FileNotFoundError:
+            return None, None
+
+    def _mode(self, path: str) -> int | None:
+        """What stands at a path itself, where a link is a link; `None` for nothing."""
+        try:
+            return os.lstat(f"{self.root}/{path}").st_mode
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+
+    def _write(self, path: str) -> None:
+        (self.root / path).parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write_atomic(
+                self.root, path, self.wanted[path], expected=self.current[path], durable=False
+            )
+        except FileChangedError:  # somebody saved it since we looked
+            self.written.remove(path)
+            self._block(path, Obstacle.EDITED, (self.root / path).read_bytes())
+
+    def _remove(self, path: str) -> None:
+        full = self.root / path
+        if full.read_bytes() != self.current[path]:
+            self.removed.remove(path)
+            self._block(path, Obstacle.ORPHAN, full.read_bytes())
+            return
+        full.unlink()
+        with contextlib.suppress(OSError):  # the folder holds something else
+            for folder in full.relative_to(self.root).parents[:-2]:
+                (self.root / folder).rmdir()
+
+    def _block(self, path: str, obstacle: Obstacle, current: bytes | None) -> None:
+        if path in self.known:
+            self.manifest[path] = self.known[path]
+        else:
+            self.manifest.pop(path, None)
+        text = _decode(current or b"")
+        diff = ""
+        if current is not None:
+            diff = unified_diff(
+                _decode(self.wanted.get(path, b"")),
+                text,
+                f"{path} (in the lesson)",
+                f"{path} (on the disk)",
+            )
+        known = self.known.get(path, ())
+        wanted = self.wanted.get(path)
+        diverged = obstacle is Obstacle.EDITED and wanted is not None and _hash(wanted) not in known
+        self.blocked.append(Blocked(path, obstacle, text, diff, diverged))
+
+
+def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:
+    """The difference of two texts as `diff -u` writes it; empty if there is none."""
+    import difflib
+
+    return "".join(
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+        for line in difflib.unified_diff(_lines(old), _lines(new), old_name, new_name)
+    )
+
+
+def _lines(text: str) -> list[str]:
+    """Split at LF alone, ends kept: a form feed in a script is no line end."""
+    return [line for line in _split(text) if line]
+
+
+def _split(text: str) -> Iterator[str]:
+    *lines, last = text.split("\n")
+    for line in lines:
+        yield f"{line}\n"
+    yield last
+
+
+def _decode(data: bytes) -> str:
+    return data.decode("utf-8", "backslashreplace")
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
+    """The hashes that each extracted path may have; empty if the manifest is not what we wrote."""
+    try:
+        files = json.loads((root / MANIFEST).read_bytes())["files"]
+        manifest = {path: tuple(hashes) for path, hashes in files.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    sound = all(
+        path.startswith(f"{FOLDER}/")
+        and ".." not in path.split("/")
+        and all(isinstance(h, str) for h in hashes)
+        for path, hashes in manifest.items()
+    )
+    return manifest if sound else {}
+
+
+def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
+    files = {path: list(manifest[path]) for path in sorted(manifest)}
+    data = (
+        json.dumps({"version": 1, "files": files}, indent=1, ensure_ascii=False) + "\n"
+    ).encode()
+    path = root / MANIFEST
+    try:
+        current: bytes | None = path.read_bytes()
+    except FileNotFoundError:
+        current = None
+    if current != data:
+        write_atomic(root, MANIFEST, data, expected=current, durable=False)

@@ -1,0 +1,309 @@
+"""Reading a course: where it is, which files it has, what they say.
+
+Entry points: `find_root`, `read_course`, `read_bytes`.
+
+1. `content/` and `models/` are walked in sorted order; editors' droppings (names that begin with a
+   dot, `x.md~`) are none of the course's files.
+2. Lessons, pages and models are decoded as strict UTF-8, line ends and byte order mark as they are:
+   offsets into the text serve edits byte for byte.
+3. A file that cannot be had becomes a diagnostic. One that is not UTF-8 still becomes a source,
+   with U+FFFD for what is wrong, so that its other mistakes are found in the same run; it is no
+   longer what stands on the disk, so nothing can be written back over it by mistake.
+4. A file that is no text at all, such as a picture, or is in UTF-16, becomes a diagnostic and
+   nothing else: whatever was found in it would be noise.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from msgspec import Struct
+
+from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.files.errors import EffectError, OutsideProjectError, reason
+from coursebuild.core.model import MjcfModel
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.source import Source
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks."""
+_STRAY = 0.1
+"""The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
+_OUTSIDE = "is reached through a link that leads out of the project"
+
+
+class CourseFiles(Struct, frozen=True):
+    """A course as it lies on the disk; sorted; paths are POSIX and relative to the root."""
+
+    map: Source | None
+    lessons: tuple[Source, ...]
+    """`content/lessons/*.md`."""
+    pages: tuple[Source, ...]
+    """`content/pages/**/*.md`."""
+    models: tuple[MjcfModel, ...]
+    """`models/**/*.xml`, those included that other models pull in."""
+    declarations: tuple[Source, ...]
+    """`models/**/*.toml`: what is to be measured on the models beside them."""
+    files: tuple[str, ...]
+    """Every regular file in `content/` and `models/`: what a relative link can lead to."""
+    unreadable: tuple[str, ...]
+    """What is there and cannot be read, or not as text."""
+
+
+def find_root(chosen: Path | None, start: Path) -> Path:
+    """The course folder: the chosen one, or the nearest from `start` upwards that has a course map.
+
+    Raises:
+        EffectError: the chosen one is no folder, or there is no course here.
+    """
+    if chosen is not None:
+        folder = start / chosen
+        if not folder.is_dir():
+            raise EffectError(
+                f"{chosen} is not a folder" if folder.exists() else f"there is no folder {chosen}"
+            )
+        return folder.resolve()
+    found = find_course_root(str(start))
+    if found is not None:
+        return Path(found)
+    raise EffectError(
+        f"there is no {MAP} in this folder or one above it",
+        help="go to a course, or name one with `-C DIR`",
+    )
+
+
+def read_course(root: Path) -> Parsed[CourseFiles]:
+    """Read the map, the lessons, the pages and the models of a course."""
+    root = root.resolve()
+    reader = _Reader(root)
+    files = [*reader.walk("content"), *reader.walk("models")]
+    lessons = [
+        f
+        for f in files
+        if f.startswith("content/lessons/") and f.count("/") == 2 and f.endswith(".md")
+    ]
+    pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
+    models = [f for f in files if f.startswith("models/") and f.endswith(".xml")]
+    declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]
+    found = CourseFiles(
+        map=reader.map(),
+        lessons=reader.sources(lessons),
+        pages=reader.sources(pages),
+        models=tuple(
+            MjcfModel(source.path.removeprefix("models/").removesuffix(".xml"), source)
+            for source in reader.sources(models)
+        ),
+        declarations=reader.sources(declarations),
+        files=tuple(sorted(files)),
+        unreadable=tuple(sorted(reader.unreadable)),
+    )
+    return Parsed(found, tuple(reader.diagnostics))
+
+
+def read_bytes(root: Path, path: str) -> bytes:
+    """The bytes of a file of the course.
+
+    Raises:
+        OutsideProjectError: it lies outside the project, or a link leads there.
+        EffectError: it cannot be read.
+    """
+    root = root.resolve()
+    if "\0" in path:
+        raise EffectError("a path holds a null character")
+    if not Path(os.path.realpath(root / path)).is_relative_to(root):
+        raise OutsideProjectError(f"{path} {_OUTSIDE}")
+    try:
+        return _read_regular(root / path)
+    except OSError as error:
+        raise EffectError(f"{path} cannot be read: {reason(error)}") from None
+
+
+def read_sources(root: Path, paths: list[str]) -> Parsed[tuple[Source, ...]]:
+    """Further text files of the project, such as pages that lie outside of `content/`."""
+    reader = _Reader(root.resolve())
+    return Parsed(reader.sources(paths), tuple(reader.diagnostics))
+
+
+class _Reader:
+    """Reads files of one course and keeps what went wrong."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.diagnostics: list[Diagnostic] = []
+        self.unreadable: list[str] = []
+        self.plain: set[str] = set()
+        """Files that were reached through no link."""
+
+    def map(self) -> Source | None:
+        """The course map; that it is missing is a mistake already here."""
+        if not (self.root / MAP).is_symlink() and not (self.root / MAP).exists():
+            self.diagnostics.append(
+                diagnose(
+                    "map-missing",
+                    Source(MAP, "").span(),
+                    f"there is no {MAP}",
+                    help="the map names every level, lesson and page; start with `[course]`",
+                )
+            )
+            return None
+        return next(iter(self.sources([MAP])), None)
+
+    def walk(self, top: str) -> Iterator[str]:
+        """Every regular file below a folder of the course, sorted by path."""
+        folder = self.root / top
+        if not folder.exists() and not folder.is_symlink():
+            return
+        if not Path(os.path.realpath(folder)).is_relative_to(self.root):
+            self._refuse(top, _OUTSIDE)
+        elif not folder.is_dir():
+            self._refuse(top, "is not a folder")
+        else:
+            yield from self._walk(top, frozenset(), plain=not folder.is_symlink())
+
+    def _walk(
+        self, folder: str, above: frozenset[tuple[int, int]], *, plain: bool
+    ) -> Iterator[str]:
+        try:
+            status = (self.root / folder).stat()
+            with os.scandir(self.root / folder) as entries:
+                names = sorted((entry.name, entry.is_symlink()) for entry in entries)
+        except OSError as error:
+            self._refuse(folder, f"cannot be read: {reason(error)}")
+            return
+        here = (status.st_dev, status.st_ino)
+        if here in above:  # a link to a folder that it lies in
+            return
+        for name, is_link in names:
+            if (
+                name.startswith(".")
+                or name.endswith("~")
+                or (name.startswith("#") and name.endswith("#"))
+                or name == "__pycache__"
+            ):
+                continue
+            plainly = plain and not is_link
+            yield from self._entry(f"{folder}/{name}", is_link, above | {here}, plain=plainly)
+
+    def _entry(
+        self, path: str, is_link: bool, above: frozenset[tuple[int, int]], *, plain: bool
+    ) -> Iterator[str]:
+        if not _is_text(path):
+            self._refuse(path, "has a name that is not UTF-8")
+            return
+        full = f"{self.root}/{path}"
+        if is_link and not Path(os.path.realpath(full)).is_relative_to(self.root):
+            self._refuse(path, _OUTSIDE)
+            return
+        try:
+            mode = os.stat(full).st_mode  # noqa: PTH116
+        except FileNotFoundError:
+            if is_link:
+                self._refuse(path, "is a link to a file that is not there")
+            return  # otherwise it vanished while we looked
+        except OSError as error:
+            self._refuse(path, f"cannot be read: {reason(error)}")
+            return
+        if stat.S_ISDIR(mode) and not path.endswith((".md", ".xml", ".toml")):
+            yield from self._walk(path, above, plain=plain)
+        elif stat.S_ISREG(mode):
+            if plain:
+                self.plain.add(path)
+            yield path
+        else:
+            self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
+
+    def sources(self, paths: list[str]) -> tuple[Source, ...]:
+        """The files that hold text, decoded."""
+        found = []
+        for path in paths:
+            if path in self.unreadable:
+                continue
+            try:
+                data = self._plainly_read(path) or read_bytes(self.root, path)
+            except OutsideProjectError:
+                self._refuse(path, _OUTSIDE)
+            except EffectError as error:
+                self._refuse(path, error.message.removeprefix(f"{path} "))
+            else:
+                source = self._decode(path, data)
+                found += [] if source is None else [source]
+        return tuple(found)
+
+    def _plainly_read(self, path: str) -> bytes | None:
+        """The bytes of a file of which it need not be found out where it lies."""
+        if path not in self.plain:
+            return None
+        try:
+            return _read_regular(f"{self.root}/{path}", _NO_LINK)
+        except OSError:  # told by who looks closer
+            return None
+
+    def _decode(self, path: str, data: bytes) -> Source | None:
+        """The text of a file; `None` where it holds none."""
+        is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _STRAY
+        wrong, why = -1 if is_text else data.find(b"\0"), "is not text"  # though it is UTF-8
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            text, wrong, why = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
+            is_text = is_text and b"\0" not in data
+        source = Source(path, text)
+        if wrong >= 0:
+            at = len(data[:wrong].decode("utf-8"))
+            self.diagnostics.append(
+                diagnose(
+                    "file-encoding",
+                    source.span(at, at + 1),
+                    f"byte 0x{data[wrong]:02x} {why}",
+                    help=f"save the file as UTF-8{_guess(data)}",
+                )
+            )
+        if is_text:
+            return source
+        self.unreadable.append(path)
+        return None
+
+    def _refuse(self, path: str, why: str) -> None:
+        shown = path if _is_text(path) else path.encode("utf-8", "backslashreplace").decode("utf-8")
+        self.unreadable.append(shown)
+        span = Source(shown, "").span()
+        self.diagnostics.append(diagnose("file-unreadable", span, f"{shown} {why}"))
+
+
+def _read_regular(path: Path | str, flags: int = 0) -> bytes:
+    """The bytes of a regular file; never waits, whatever stands at the path."""
+    fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    try:
+        status = os.fstat(fd)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError("it is not a regular file")
+        parts = [os.read(fd, status.st_size + 1)]
+        while parts[-1]:
+            parts.append(os.read(fd, 1 << 20))
+        return b"".join(parts)
+    finally:
+        os.close(fd)
+
+
+def _is_text(path: str) -> bool:
+    """Whether a path is proper Unicode (Python keeps other bytes as lone surrogates)."""
+    return path.isascii() or not any("\udc80" <= c <= "\udcff" for c in path)
+
+
+def _guess(data: bytes) -> str:
+    """What the file may be instead."""
+    if data.startswith(_UTF16) or _is_every_other_zero(data[:1024]):
+        return "; it looks like UTF-16"
+    if b"\0" in data:
+        return "; it looks like a binary file"
+    return "; it may be Latin-1 or Windows-1252"
+
+
+def _is_every_other_zero(data: bytes) -> bool:
+    """As in UTF-16 without a byte order mark, where the letters are Latin."""
+    fewer, more = sorted((data[::2].count(0), data[1::2].count(0)))
+    return fewer == 0 and more > len(data) // 4

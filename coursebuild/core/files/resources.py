@@ -1,0 +1,100 @@
+"""Where the files lie that come with the tool and are not Python.
+
+Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`,
+for the pages' templates; `bundled_files` and `template_texts` read them whole, `Bundle` one by one.
+
+In an installed package both are inside it. In a source tree they are where they are made:
+`site/dist` and `templates`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from coursebuild.core.files.errors import EffectError
+
+_PACKAGE = Path(__file__).resolve().parents[2]
+_TREE = _PACKAGE.parent
+
+
+def assets_dir() -> Path:
+    """The bundled scripts, styles and fonts.
+
+    Raises:
+        EffectError: this is a source tree where they have not been built.
+    """
+    return _first(_PACKAGE / "assets", _TREE / "site" / "dist", "the browser's files are not built")
+
+
+def templates_dir() -> Path:
+    """The templates of the pages.
+
+    Raises:
+        EffectError: the installation is broken.
+    """
+    return _first(_PACKAGE / "templates", _TREE / "templates", "the page templates are missing")
+
+
+def bundled_files() -> tuple[tuple[str, bytes], ...]:
+    """Every bundled file by path relative to `assets_dir()`, sorted."""
+    return tuple((name, path.read_bytes()) for name, path in _bundled(assets_dir()))
+
+
+class Bundle(Mapping[str, bytes]):
+    """The bundled files by path relative to `assets_dir()`, sorted; read when asked for."""
+
+    def __init__(self) -> None:
+        self._folder = assets_dir()
+        self._paths: tuple[str, ...] | None = None
+
+    def __getitem__(self, path: str) -> bytes:
+        try:  # most runs ask for one or two, and need not know which there are
+            return (self._folder / path).read_bytes()
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
+            raise KeyError(path) from error
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found())
+
+    def __len__(self) -> int:
+        return len(self._found())
+
+    def _found(self) -> tuple[str, ...]:
+        if self._paths is None:
+            self._paths = tuple(name for name, _ in _bundled(self._folder))
+        return self._paths
+
+
+def _bundled(folder: Path) -> Iterator[tuple[str, Path]]:
+    for path in _paths(folder):
+        if not path.endswith("/stamp.json") and path != "stamp.json":
+            yield path, folder / path
+
+
+def _paths(folder: Path) -> Iterator[str]:
+    """The files below a folder by path relative to it, sorted."""
+    top = len(f"{folder}/")
+    found = (f"{at}/{name}"[top:] for at, _, names in os.walk(folder) for name in names)
+    return iter(sorted(found, key=lambda path: path.split("/")))
+
+
+def template_texts() -> tuple[tuple[str, str], ...]:
+    """Every template and table of strings by path relative to `templates_dir()`, sorted."""
+    folder = templates_dir()
+    return tuple(
+        (path, (folder / path).read_text(encoding="utf-8"))
+        for path in _paths(folder)
+        if path.endswith((".html", ".toml", ".svg", ".css"))
+    )
+
+
+def _first(installed: Path, in_tree: Path, otherwise: str) -> Path:
+    for folder in (installed, in_tree):
+        if folder.is_dir():
+            return folder
+    raise EffectError(
+        f"{otherwise}: there is no {installed}",
+        help="in a source tree, run `make site`; otherwise install coursebuild again",
+    )

@@ -1,0 +1,323 @@
+"""Blocks: what a document is made of.
+
+Entry points: the union `Block`, and `Document`.
+"""
+
+from __future__ import annotations
+
+import enum
+from decimal import Decimal
+from typing import Literal, TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.model.inlines import Inline, Label
+from coursebuild.core.model.interactive import Lab
+from coursebuild.core.model.lexicon import Lexicon
+from coursebuild.core.text.source import Excerpt, Source, Span
+
+
+class Heading(Struct, frozen=True):
+    """A heading; `anchor` is unique in its document."""
+
+    span: Span
+    level: int
+    children: tuple[Inline, ...]
+    anchor: str
+    explicit: bool
+    """Whether the anchor was given by `{#id}`."""
+    classes: tuple[str, ...] = ()
+
+
+class Paragraph(Struct, frozen=True):
+    """A paragraph; `tight` when it stands in a tight list, where it gets no element of its own."""
+
+    span: Span
+    children: tuple[Inline, ...]
+    tight: bool = False
+
+
+class ListItem(Struct, frozen=True):
+    """An item of a list; `checked` is set for task lists."""
+
+    span: Span
+    blocks: tuple[Block, ...]
+    checked: bool | None = None
+
+
+class ListBlock(Struct, frozen=True):
+    """A list; `start` is the first number of an ordered one, `None` for bullets."""
+
+    span: Span
+    items: tuple[ListItem, ...]
+    start: int | None
+
+
+class BlockQuote(Struct, frozen=True):
+    """A blockquote that is no callout."""
+
+    span: Span
+    blocks: tuple[Block, ...]
+
+
+class Callout(Struct, frozen=True):
+    """`> [!kind] Title`."""
+
+    span: Span
+    kind: str
+    kind_span: Span
+    title: tuple[Inline, ...]
+    folded: bool
+    """`[!kind]-`: shown closed."""
+    blocks: tuple[Block, ...]
+
+
+class CodeBlock(Struct, frozen=True):
+    """A fenced or indented code block that is none of ours.
+
+    `info` is the raw info string, `language` its first word.
+    """
+
+    span: Span
+    language: str
+    info: str
+    code: Excerpt
+
+
+class HtmlBlock(Struct, frozen=True):
+    """A block of raw HTML, kept."""
+
+    span: Span
+    html: str
+
+
+class HtmlFlow(Struct, frozen=True):
+    """HTML in a quiz text, where math between the tags is still math.
+
+    Raw tags and inlines in order, in no paragraph.
+    """
+
+    span: Span
+    children: tuple[Inline, ...]
+
+
+class ThematicBreak(Struct, frozen=True):
+    """`---`."""
+
+    span: Span
+
+
+class MathBlock(Struct, frozen=True):
+    """`$$…$$` on lines of its own."""
+
+    span: Span
+    tex: Excerpt
+    label: Label | None = None
+
+
+class Cell(Struct, frozen=True):
+    """A table cell; `text` is its Markdown, escaped pipes made plain."""
+
+    span: Span
+    text: Excerpt
+    children: tuple[Inline, ...]
+
+
+class Table(Struct, frozen=True):
+    """A table; `align` has one entry a column."""
+
+    span: Span
+    align: tuple[Literal["left", "right", "center"] | None, ...]
+    header: tuple[Cell, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+class Script(Struct, frozen=True):
+    """A complete script: ```` ```python file=examples/x.py ````."""
+
+    span: Span
+    path: str
+    path_span: Span
+    code: Excerpt
+    """The block's text, ending in exactly one newline."""
+    prefix: str
+    """What stands before each line of the code in the lesson (`> ` in a callout, indentation in a
+    list)."""
+    timeout: float
+    """Seconds."""
+    requires: tuple[str, ...]
+    """Modules without which the script is skipped."""
+    args: tuple[str, ...]
+    norun: bool
+    body_span: Span
+    """The lines between the fences, to the start of the closing one."""
+    diverges: bool = False
+    """Whether a simulation in it is to be lost."""
+    deep: bool = False
+    """Whether bodies in it are to lie deep in each other."""
+
+
+class Mode(enum.Enum):
+    """How a recorded text is compared with a run."""
+
+    EXACT = "exact"
+    DIGITS = "digits"
+    TOLERANCE = "rtol"
+    VOLATILE = "volatile"
+
+
+class Comparison(Struct, frozen=True):
+    """How a recording is compared.
+
+    `rtol` and `atol` count only in mode `TOLERANCE`; `ellipsis` goes with all but `VOLATILE`.
+    """
+
+    mode: Mode = Mode.EXACT
+    rtol: Decimal = Decimal(0)
+    atol: Decimal = Decimal(0)
+    ellipsis: bool = False
+
+
+class Filter(Struct, frozen=True):
+    """`[[verify.filter]]`: a regular expression replaced on both sides before comparing."""
+
+    pattern: str
+    replacement: str
+
+
+class Recording(Struct, frozen=True):
+    """`Output:` and the text fence or table below it."""
+
+    span: Span
+    """From the caption to the end of the body."""
+    caption: tuple[Inline, ...]
+    caption_span: Span
+    body: Excerpt | Table
+    """The text between the fences, or the table."""
+    body_span: Span
+    """The lines between the fences (from the start of the first to the start of the closing fence);
+    for a table all of it."""
+    prefix: str
+    """What stands before each line in the lesson."""
+    comparison: Comparison | None
+    """`None`: the course's default."""
+    script: str | None
+    """The path of the nearest script above; `None` only in a document with an error."""
+    readable: bool = True
+    """Whether the fence says in a right way how to compare; if not, nothing is compared."""
+
+
+class Mjcf(Struct, frozen=True):
+    """A model or fragment.
+
+    `fragment` names the element that it goes into, `error` the message it must fail with.
+    """
+
+    span: Span
+    code: Excerpt
+    fragment: str | None
+    error: str | None
+    error_span: Span | None
+
+
+BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
+"""What of a report is shown."""
+
+
+class Bench(Struct, frozen=True):
+    """What was recorded of a model in one of its scenarios."""
+
+    span: Span
+    model: str
+    model_span: Span
+    scenario: str | None
+    """`None`: the first."""
+    scenario_span: Span | None
+    shows: tuple[BenchPart, ...]
+    """In the order in which it is shown."""
+
+
+class PlainCode(Struct, frozen=True):
+    """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
+
+    span: Span
+    code: Excerpt
+    fragment: bool
+
+
+class FeatureBlock(Struct, frozen=True):
+    """A block that a feature adds, and what the rest of the tool asks of it.
+
+    What a method does not say, the block does not have.
+    """
+
+    span: Span
+
+    def child_blocks(self) -> tuple[Block, ...]:
+        """The blocks of Markdown in it, in the order of the page."""
+        return ()
+
+    def child_inlines(self) -> tuple[Inline, ...]:
+        """The lines of Markdown in it that are in none of its blocks."""
+        return ()
+
+    def summary(self) -> FeatureBlock | None:
+        """The block without what only its own page shows; `None` where nothing is left."""
+        return None
+
+    def anchors(self) -> tuple[str, ...]:
+        """The ids that a link may name."""
+        return ()
+
+    def quoted_lines(self) -> tuple[tuple[str, int], ...]:
+        """Lines of verified outputs that it shows: the script's path, and the line from 1."""
+        return ()
+
+    def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
+        """What a reader's progress is kept for: an id, unique in the course, and keys under it."""
+        return None
+
+
+Block: TypeAlias = (
+    Heading
+    | Paragraph
+    | ListBlock
+    | BlockQuote
+    | Callout
+    | CodeBlock
+    | PlainCode
+    | HtmlBlock
+    | HtmlFlow
+    | ThematicBreak
+    | MathBlock
+    | Table
+    | Script
+    | Recording
+    | Mjcf
+    | Bench
+    | Lab
+    | FeatureBlock
+)
+
+
+class Footnote(Struct, frozen=True):
+    """A footnote that is referred to.
+
+    `number` in order of first reference, `references` how often.
+    """
+
+    span: Span
+    label: str
+    number: int
+    references: int
+    blocks: tuple[Block, ...]
+
+
+class Document(Struct, frozen=True, dict=True):
+    """One Markdown text, parsed."""
+
+    source: Source
+    blocks: tuple[Block, ...]
+    footnotes: tuple[Footnote, ...]
+    lexicon: Lexicon | None = None
+    """Only of a summary, which does not have what it was taken from."""

@@ -1,0 +1,151 @@
+"""The course: its map, its lessons and pages, its models.
+
+Entry point: `Course`.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import re
+
+from msgspec import Struct
+
+from coursebuild.core.model.blocks import Comparison, Document, Filter
+from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.text.source import Source, Span
+
+
+class Status(enum.Enum):
+    """How far a lesson is."""
+
+    COMPLETE = "complete"
+    DRAFT = "draft"
+    PLANNED = "planned"
+
+
+class Lesson(Struct, frozen=True):
+    """A lesson of the map; `document` is `None` for a planned one."""
+
+    span: Span
+    """Its entry in the course map."""
+    id: str
+    slug: str
+    title: str
+    status: Status
+    summary: str
+    objectives: tuple[str, ...]
+    prerequisites: tuple[str, ...]
+    prerequisite_spans: tuple[Span, ...]
+    minutes: int | None
+    level: str
+    document: Document | None
+
+    @property
+    def path(self) -> str:
+        """Where its file is, or would be."""
+        return f"content/lessons/{self.id}-{self.slug}.md"
+
+
+class Level(Struct, frozen=True):
+    """A level of the map."""
+
+    span: Span
+    id: str
+    title: str
+    summary: str
+    lessons: tuple[Lesson, ...]
+
+
+class Page(Struct, frozen=True):
+    """A page that is no lesson."""
+
+    span: Span
+    id: str
+    title: str
+    path: str
+    document: Document | None
+    menu: bool = True
+    """Whether every page's menu has it; the foot has them all."""
+
+
+class MjcfModel(Struct, frozen=True):
+    """A file of `models/`; its name is its path there without `.xml`."""
+
+    name: str
+    source: Source
+
+
+class CalloutKind(Struct, frozen=True):
+    """A kind of callout: its label, and what it promises."""
+
+    name: str
+    label: str
+    promise: str = ""
+
+
+class Silence(Struct, frozen=True):
+    """A warning that the author does not want to see, and why.
+
+    `path` limits it to a file (glob).
+    """
+
+    rule: str
+    reason: str
+    path: str | None
+
+
+class CourseFeature(Struct, frozen=True):
+    """A feature of the course's own: a Python file of the project."""
+
+    path: str
+    span: Span
+
+
+class Course(Struct, frozen=True):
+    """A whole course."""
+
+    map: Source
+    """course.toml."""
+    title: str
+    summary: str
+    language: str
+    base_url: str
+    repository: str
+    licence: str
+    engine: str | None
+    """The MuJoCo version that the course is written for."""
+    engine_span: Span | None
+    comparison: Comparison
+    filters: tuple[Filter, ...]
+    callouts: tuple[CalloutKind, ...]
+    silences: tuple[Silence, ...]
+    levels: tuple[Level, ...]
+    pages: tuple[Page, ...]
+    models: tuple[MjcfModel, ...]
+    files: tuple[str, ...] = ()
+    """Other files in `content/` that a page may show or link to (pictures, data), by path relative
+    to the root."""
+    declarations: tuple[Declarations, ...] = ()
+    """What `models/NAME.toml` say, each of a model that is there."""
+    features: tuple[CourseFeature, ...] = ()
+    id: str = ""
+    """Names the course where its title may change; see `key`."""
+
+    @property
+    def key(self) -> str:
+        """What readers' browsers keep their progress under: the id, else made of the title."""
+        words = re.findall(r"[a-z0-9]+", self.title.lower())
+        digest = hashlib.sha256(self.title.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+        return self.id or "-".join((*words, digest))
+
+    @property
+    def lessons(self) -> tuple[Lesson, ...]:
+        """All lessons in the order of the map."""
+        return tuple(lesson for level in self.levels for lesson in level.lessons)
+
+    @property
+    def documents(self) -> tuple[Document, ...]:
+        """Every parsed document: lessons, then pages."""
+        parts: tuple[Lesson | Page, ...] = (*self.lessons, *self.pages)
+        return tuple(part.document for part in parts if part.document is not None)

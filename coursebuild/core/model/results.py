@@ -1,0 +1,332 @@
+"""What running a course found: values made by runners, read by comparisons, reports and pages.
+
+Entry points: `ScriptRun`, `Verdict`. They stand beside the model because the stages that make them
+and those that read them don't import each other.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable
+from typing import Literal, TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.model import Comparison, Recording
+from coursebuild.core.text.source import Span
+
+
+class Outcome(enum.Enum):
+    """How the run of a script ended."""
+
+    OK = "ok"
+    FAILED = "failed"
+    """It exited with a status other than 0."""
+    TIMEOUT = "timeout"
+    KILLED = "killed"
+    """A signal ended it."""
+    OUTPUT_LIMIT = "output-limit"
+    ENCODING = "encoding"
+    """It printed bytes that are not UTF-8."""
+    SKIPPED = "skipped"
+    """A module that it requires is missing."""
+    NORUN = "norun"
+    """The author said not to run it."""
+
+
+class ScriptJob(Struct, frozen=True):
+    """A script to run: everything that the runner needs to know."""
+
+    path: str
+    """POSIX path relative to the project root, e.g. `examples/l4_2.py`."""
+    args: tuple[str, ...]
+    timeout: float
+    """Seconds."""
+    requires: tuple[str, ...]
+    norun: bool
+    perturbation: int = 0
+    """From 1: its initial states are moved a little, in one of several directions; 0: they are
+    not."""
+
+
+class Sign(enum.Enum):
+    """What shows that a simulation was lost."""
+
+    POSITIONS = "positions"
+    """MuJoCo warned of bad ones, as of the next two."""
+    VELOCITIES = "velocities"
+    ACCELERATIONS = "accelerations"
+    STATE = "state"
+    """It was not finite when it was looked at."""
+    CONTACT = "contact"
+    """Bodies lay deep in each other when they were looked at, of which MuJoCo does not warn."""
+
+
+class Divergence(Struct, frozen=True):
+    """A simulation of a script that was lost on the way."""
+
+    sign: Sign
+    time: str
+    """Simulated time, s, as MuJoCo wrote it."""
+    model: str
+    """The model's name; empty where it has none or is not known."""
+    path: str
+    """The script that was being executed, relative to the project; empty where none was."""
+    line: int
+    """Its line, from 1; 0 where it is not known."""
+    depth: str = ""
+    """Of a contact: how deep it was, m."""
+    geoms: tuple[str, ...] = ()
+    """Of a contact: the names of its geoms, or what stands for them, as words."""
+
+
+class Trace(Struct, frozen=True):
+    """What a script looked at while it ran: all that its result depends on, beside its text.
+
+    Project paths are POSIX and relative to the root. Each tuple is sorted, without repeats.
+    """
+
+    files: tuple[str, ...]
+    """Files of the project that it read, or tried to read and that were not there, such as what
+    would have been imported instead of another folder's module. Its own file and files that it
+    wrote itself before are not among them; a compiled module stands as its source."""
+    folders: tuple[str, ...]
+    """Folders of the project that it listed."""
+    outside: tuple[str, ...]
+    """Absolute paths of files read that belong neither to the project nor to an installed package
+    nor to Python."""
+    modules: tuple[str, ...]
+    """Top-level names of installed packages' modules that it imported; none of Python's own."""
+    opaque: str
+    """Why there may be more, as words that end a sentence ("it starts other programs"); empty where
+    this is everything."""
+    divergences: tuple[Divergence, ...] = ()
+    """The simulations that were lost, in the order in which it was noticed, without repeats."""
+    moved: bool = False
+    """Whether there was an initial state to be moved, of a run that was to do so."""
+    states: tuple[str, ...] = ()
+    """Of such a run, for each `MjData` in words: its number in the order of their first use, the
+    length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
+    its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
+
+
+class ScriptRun(Struct, frozen=True):
+    """What a script did."""
+
+    path: str
+    outcome: Outcome
+    status: int
+    """Exit status; the signal's number where one ended it."""
+    stdout: str
+    """LF line ends."""
+    stderr: str
+    """The end of it (64 KiB), with extracted paths still as the interpreter wrote them."""
+    seconds: float
+    missing: tuple[str, ...] = ()
+    """Modules that it requires and that are not there."""
+    cached: bool = False
+    trace: Trace | None = None
+    """What it looked at; `None` where nobody watched."""
+
+
+class DriftKind(enum.Enum):
+    """The class of a difference between what was recorded and what ran."""
+
+    ROUNDING = "rounding"
+    """Only the last recorded place of numbers differs."""
+    NUMERIC = "numeric"
+    TEXT = "text"
+    MISSING = "missing lines"
+    EXTRA = "extra lines"
+
+
+class Change(Struct, frozen=True):
+    """One difference.
+
+    For a number `relative_error` and `digits` say how far apart the two values are.
+    """
+
+    kind: DriftKind
+    span: Span
+    """In the lesson: the number, the text, the missing line, or the place where extra lines would
+    stand."""
+    recorded: str
+    ran: str
+    ran_line: int
+    """Line of the output, from 1; 0 where no line corresponds."""
+    relative_error: float | None = None
+    digits: int | None = None
+    """Leading significant digits that agree."""
+
+
+class Verdict(Struct, frozen=True):
+    """The comparison of one recorded output with a run."""
+
+    recording: Recording
+    comparison: Comparison
+    """What was used: the fence's own or the course's default."""
+    status: Literal["verified", "drift", "volatile", "unchecked"]
+    """`unchecked`: the script did not run to its end."""
+    changes: tuple[Change, ...] = ()
+    diff: str = ""
+    """Unified diff of recorded against ran, empty where nothing differs."""
+
+
+class Formula(Struct, frozen=True):
+    """A formula to typeset."""
+
+    tex: str
+    display: bool
+
+
+class MathError(Struct, frozen=True):
+    """Why a formula does not parse.
+
+    `position` is an offset in code points into the TeX, `None` where unknown.
+    """
+
+    message: str
+    position: int | None
+
+
+class CompileResult(Struct, frozen=True):
+    """What compiling a piece of MJCF gave; `error` is empty when it compiled."""
+
+    error: str
+    line: int | None = None
+    """Line of the error in the text that was compiled, from 1."""
+    facts: ModelFacts | None = None
+
+
+class ModelFacts(Struct, frozen=True):
+    """What a compiled model holds, for its page and for checking the names that labs use."""
+
+    bodies: int
+    """Without the world."""
+    geoms: int
+    joints: int
+    nq: int
+    nv: int
+    nu: int
+    timestep: float
+    """s."""
+    integrator: str
+    total_mass: float
+    """kg."""
+    keyframes: tuple[str, ...]
+    """Names; an unnamed one is empty."""
+    sites: tuple[str, ...]
+    body_names: tuple[str, ...]
+    includes: tuple[str, ...] = ()
+    """Files that the model pulls in, relative to the project root; absolute if they lie outside."""
+    sensors: tuple[str, ...] = ()
+
+
+class StaticForm(Struct, frozen=True):
+    """What a page shows of a lab before it starts, on paper and without JavaScript."""
+
+    picture: bytes
+    """PNG with a clear ground."""
+    size: tuple[int, int]
+    """Width and height in pixels."""
+    time: float
+    """Simulated time of the picture, s."""
+    readouts: tuple[tuple[str, str], ...]
+    """Label and value at the end of the main run."""
+    end: float
+    """Simulated time of the readouts and of the end of the plots, s."""
+    plots: tuple[str, ...]
+    """SVG elements, one a plot."""
+
+
+class LabResult(Struct, frozen=True):
+    """A lab as it was tried, and what its page needs."""
+
+    span: Span
+    """The lab in its lesson, by which it is found again."""
+    name: str
+    """Unique in the course: `4.2-lab-1`."""
+    lesson: str
+    """Id of its lesson or page."""
+    title: str
+    status: str
+    """`ok`, or `failed`."""
+    module: str
+    """The lab's code as an ES module."""
+    config: str
+    """The lab's data as JSON."""
+    mjb: bytes = b""
+    """Its model."""
+    seconds: float = 0.0
+    """Wall time of the trial."""
+    steps_per_second: int | None = None
+    """Of the main run, in V8; `None` where it did not come to its end."""
+    tried: tuple[str, ...] = ()
+    parity: str = ""
+    """How the run compares with native MuJoCo, in words; empty where it was not compared."""
+    static: StaticForm | None = None
+    cached: bool = False
+    export: tuple[str, str] | None = None
+    """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the
+    value of control N."""
+    unexported: str = ""
+    """Why there is no script, in words."""
+
+
+class OutputFile(Struct, frozen=True):
+    """A file of the site: its path there (POSIX, relative) and its bytes."""
+
+    path: str
+    data: bytes
+
+
+class CachedFile(Struct, frozen=True):
+    """A file of the site that need not be made where it was published under the same key before."""
+
+    path: str
+    """Its path in the site (POSIX, relative)."""
+    key: str
+    """A hash of all that its bytes depend on."""
+    make: Callable[[], bytes]
+    """Gives its bytes; called at most once, and not at all where the published file is whole."""
+
+
+SiteFile: TypeAlias = OutputFile | CachedFile
+
+
+class FileFacts(Struct, frozen=True):
+    """What a list of a site's files says of one."""
+
+    path: str
+    """Its path in the site."""
+    digest: str
+    """SHA-256 of its bytes, in hexadecimal digits."""
+    size: int
+    """Bytes."""
+
+
+class FileList(Struct, frozen=True):
+    """A file of the site that is made of what all others are."""
+
+    path: str
+    """Its path in the site (POSIX, relative)."""
+    key: str
+    """A hash of all that its bytes depend on besides the other files."""
+    make: Callable[[Iterable[FileFacts]], bytes]
+    """Gives its bytes; the other files come sorted by path."""
+
+
+class Results(Struct, frozen=True):
+    """All that running a course found."""
+
+    runs: tuple[ScriptRun, ...]
+    verdicts: tuple[Verdict, ...]
+    formulas: tuple[tuple[Formula, str | MathError], ...]
+    """Each different formula of the course, and its MathML."""
+    models: tuple[tuple[str, CompileResult], ...]
+    """Each model of `models/` by name."""
+    python: str
+    """Version of the interpreter that ran the scripts."""
+    engine: str
+    """Version of MuJoCo that ran the scripts."""
+    labs: tuple[LabResult, ...] = ()

@@ -1,0 +1,128 @@
+"""Walking a document: every block and every inline in order.
+
+Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_blocks` and
+`walk_inlines`; `is_blank`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from coursebuild.core.model.blocks import (
+    Block,
+    BlockQuote,
+    Callout,
+    Document,
+    FeatureBlock,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    ListBlock,
+    Paragraph,
+    Recording,
+    Script,
+    Table,
+)
+from coursebuild.core.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
+from coursebuild.core.model.interactive import Lab
+from coursebuild.core.text.patterns import pattern
+
+_HOLDERS = (BlockQuote, Callout, ListBlock, Lab, FeatureBlock, Recording)
+"""Blocks that may have others in them."""
+_AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
+"""Inlines that may have others in them."""
+_COMMENTS = pattern(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
+
+
+def child_blocks(block: Block) -> tuple[Block, ...]:
+    """The blocks directly inside a block, texts of quizzes and labs included."""
+    if isinstance(block, BlockQuote | Callout):
+        return block.blocks
+    if isinstance(block, ListBlock):
+        return tuple(b for item in block.items for b in item.blocks)
+    if isinstance(block, Lab):
+        return block.note
+    if isinstance(block, FeatureBlock):
+        return block.child_blocks()
+    if isinstance(block, Recording) and isinstance(block.body, Table):
+        return (block.body,)
+    return ()
+
+
+def block_inlines(block: Block) -> tuple[Inline, ...]:
+    """The inlines directly inside a block (not inside its child blocks)."""
+    kind = type(block)
+    if kind in _LINES:
+        return block.children  # type: ignore[union-attr]
+    if isinstance(block, FeatureBlock):
+        return block.child_inlines()
+    inner = _INLINES.get(kind)
+    return () if inner is None else inner(block)
+
+
+_LINES = frozenset((Paragraph, Heading, HtmlFlow))
+_INLINES: dict[type, Callable[[Any], tuple[Inline, ...]]] = {
+    Callout: lambda callout: callout.title,
+    Table: lambda table: tuple(
+        i for row in (table.header, *table.rows) for cell in row for i in cell.children
+    ),
+    Recording: lambda recording: recording.caption,
+}
+
+
+def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
+    """Every block in document order, a container before what it holds."""
+    for block in blocks:
+        yield block
+        if isinstance(block, _HOLDERS):
+            yield from walk_blocks(child_blocks(block))
+
+
+def document_blocks(document: Document) -> Iterator[Block]:
+    """Every block of a document, its footnotes last."""
+    known: list[Block] | None = document.__dict__.get("walked")
+    if known is None:  # asked for by every check
+        known = document.__dict__["walked"] = list(walk_blocks(document.blocks))
+        for footnote in document.footnotes:
+            known += walk_blocks(footnote.blocks)
+    return iter(known)
+
+
+def is_blank(blocks: Iterable[Block]) -> bool:
+    """Whether all blocks of a document show nothing: comments, and paragraphs of odd blanks."""
+    return all(
+        (isinstance(block, Paragraph) and not block.children)
+        or (isinstance(block, HtmlBlock) and _COMMENTS.fullmatch(block.html) is not None)
+        for block in blocks
+    )
+
+
+def document_has(document: Document, *kinds: type[Block]) -> bool:
+    """Whether a document has blocks of one of these types."""
+    known: frozenset[type] | None = document.__dict__.get("kinds")
+    if known is None:
+        known = frozenset(map(type, document_blocks(document)))
+        document.__dict__["kinds"] = known
+    return not known.isdisjoint(kinds)
+
+
+def document_scripts(document: Document) -> tuple[Script, ...]:
+    """The complete scripts of a document."""
+    return tuple(block for block in document_blocks(document) if isinstance(block, Script))
+
+
+def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
+    """Every inline in order, a container before what it holds."""
+    for inline in inlines:
+        yield inline
+        if type(inline) in _AROUND:
+            yield from walk_inlines(inline.children)  # type: ignore[union-attr]
+
+
+def document_inlines(document: Document) -> Iterator[Inline]:
+    """Every inline of a document."""
+    for block in document_blocks(document):
+        inlines = block_inlines(block)
+        if inlines:
+            yield from walk_inlines(inlines)

@@ -1,0 +1,113 @@
+"""The text of a document on its page, and the list of its contents.
+
+Entry points: `article`, `contents`.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.features import kind_of_block
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    Document,
+    FeatureBlock,
+    Heading,
+    HtmlBlock,
+    Lab,
+    Mjcf,
+    Recording,
+    Script,
+    Table,
+)
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.plainly import without_links
+
+
+class ContentsEntry(Struct, frozen=True):
+    """An entry of the contents list."""
+
+    anchor: str
+    title: Markup
+    children: tuple[ContentsEntry, ...] = ()
+
+
+def article(page: PageContext, document: Document) -> Markup:
+    """The text of a document. A docked lab stands beside the paragraphs around it."""
+    parts: list[Markup] = []
+    for group in _groups(document.blocks):
+        if group.lab is None:
+            parts.append(page.blocks(group.before))
+        else:
+            before, after = page.blocks(group.before), page.blocks(group.after)
+            instrument = page.block(group.lab)
+            parts.append(
+                page.template("partials/dock.html", before=before, lab=instrument, after=after)
+            )
+    return Markup("\n").join((*parts, page.footnotes()))
+
+
+class _Group(Struct, frozen=True):
+    """Blocks that follow each other; with a docked lab, those before and after it."""
+
+    before: tuple[Block, ...]
+    lab: Lab | None = None
+    after: tuple[Block, ...] = ()
+
+
+_WIDE = (Script, Recording, Mjcf, Bench, Lab, Table, HtmlBlock)
+
+
+def _is_wide(block: Block) -> bool:
+    """Whether a block takes the whole width, so that no lab can stand beside it."""
+    if isinstance(block, FeatureBlock):
+        return kind_of_block(block).wide
+    return isinstance(block, _WIDE)
+
+
+def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
+    """Cut the text around its docked labs.
+
+    Each takes what lies between it and the next heading or wide block, on both sides.
+    """
+    groups: list[_Group] = []
+    rest = blocks
+    while (
+        at := next((i for i, b in enumerate(rest) if isinstance(b, Lab) and b.dock), None)
+    ) is not None:
+        lab = rest[at]
+        assert isinstance(lab, Lab)
+        start = next((i + 1 for i in range(at - 1, -1, -1) if _is_wide(rest[i])), 0)
+        start = next(
+            (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
+        )
+        end = next(
+            (
+                i
+                for i in range(at + 1, len(rest))
+                if _is_wide(rest[i]) or isinstance(rest[i], Heading)
+            ),
+            len(rest),
+        )
+        if start:
+            groups.append(_Group(rest[:start]))
+        groups.append(_Group(rest[start:at], lab, rest[at + 1 : end]))
+        rest = rest[end:]
+    return (*groups, _Group(rest)) if rest else tuple(groups)
+
+
+def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]:
+    """The contents list: headings of levels 2 and 3, the latter under the former."""
+    entries: list[ContentsEntry] = []
+    for block in document.blocks:
+        if not isinstance(block, Heading) or block.level > 3:
+            continue
+        entry = ContentsEntry(block.anchor, page.inlines(without_links(block.children)))
+        if block.level == 3 and entries:
+            last = entries[-1]
+            entries[-1] = ContentsEntry(last.anchor, last.title, (*last.children, entry))
+        else:
+            entries.append(entry)
+    return tuple(entries)

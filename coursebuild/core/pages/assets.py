@@ -1,0 +1,94 @@
+"""The tool's own files: templates, interface texts, and the browser's half as it was bundled.
+
+Entry points: `Assets`, a value that whoever reads the disk makes; `strings_for`; `hashed_name`.
+
+1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
+   by path relative to their folder.
+2. A file that a page refers to is published under a name that has a hash of its content in it, so
+   that a browser may keep it for ever.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from msgspec import Struct
+
+from coursebuild.core.features import features
+from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+
+SCRIPTS = {
+    "theme.js": "js/theme.js",
+    "site.js": "js/site.js",
+    "offline.js": "js/offline-page.js",
+    "map.js": "js/map-page.js",
+    "reader.js": "js/reader-page.js",
+    "search.js": "js/search.js",
+}
+"""What plain scripts of pages are published as, and the bundled modules that they are."""
+
+
+class Assets(Struct, frozen=True):
+    """Templates and bundled files, sorted by path."""
+
+    templates: tuple[tuple[str, str], ...]
+    """Path relative to `templates/`, and text."""
+    dist: tuple[tuple[str, bytes], ...] | Mapping[str, bytes]
+    """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
+    bytes; a mapping may read them when they are asked for."""
+    compiled: Path | None = None
+    """Where the templates lie compiled, see `templates_of`."""
+
+    def template(self, path: str) -> str:
+        """The text of a file of `templates/` (`KeyError` where there is none)."""
+        return dict(self.templates)[path]
+
+    def file(self, path: str) -> bytes:
+        """The bytes of a bundled file (`KeyError` where there is none)."""
+        return self._bundle()[path]
+
+    def files(self, folder: str) -> tuple[tuple[str, bytes], ...]:
+        """The bundled files of a folder."""
+        bundle = self._bundle()
+        return tuple((path, bundle[path]) for path in bundle if path.startswith(f"{folder}/"))
+
+    def _bundle(self) -> Mapping[str, bytes]:
+        return self.dist if isinstance(self.dist, Mapping) else dict(self.dist)
+
+
+def hashed_name(path: str, data: bytes) -> str:
+    """`assets/site.css` with eight digits of its content's hash: `assets/site.1b4f0e98.css`."""
+    stem, dot, suffix = path.rpartition(".")
+    digest = hashlib.sha256(data).hexdigest()[:8]
+    return f"{stem}.{digest}.{suffix}" if dot else f"{path}.{digest}"
+
+
+def page_script(code: bytes) -> bytes:
+    """A bundled module without imports or exports as a plain script in a scope of its own.
+
+    Browsers refuse to load modules from a disk, and plain scripts of one page share their top-level
+    names.
+    """
+    return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
+
+
+def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
+    """The interface texts of a language (`pt-BR`): its own over those of `pt` over English ones."""
+    added = (feature.texts.items() for feature in features())
+    return _strings_for(templates, tuple(text for texts in added for text in texts), language)
+
+
+@functools.lru_cache(maxsize=8)
+def _strings_for(
+    templates: tuple[tuple[str, str], ...], added: tuple[tuple[str, str], ...], language: str
+) -> Strings:
+    files = [(path, text) for path, text in templates if path.startswith("strings/")]
+    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
+    strings = Strings((), language)
+    for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
+        for text in (text for of, text in (*texts, *added) if of == name):
+            strings = parse_strings(text, strings, language)
+    return strings

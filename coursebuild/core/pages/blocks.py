@@ -1,0 +1,240 @@
+"""The blocks that carry code and what the build knows of it; callouts and io cards.
+
+Entry points: one function for each block, from the page's context and the block to HTML. What is
+shown is worked out here as values; templates in `blocks/` say how it looks.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from decimal import Decimal
+from typing import TYPE_CHECKING, assert_never
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.model import (
+    Callout,
+    Comparison,
+    Mjcf,
+    Mode,
+    NumberBinding,
+    PlainCode,
+    Recording,
+    Script,
+    Table,
+    listing_anchor,
+    output_anchor,
+)
+from coursebuild.core.model.results import Outcome
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.folding import Part, fold
+from coursebuild.core.pages.listings import numbered
+from coursebuild.core.pages.page_inputs import ShownRun, ShownVerdict
+from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.tools import Tools
+
+if TYPE_CHECKING:
+    from coursebuild.core.pages.context import PageContext
+
+
+class CodePart(Struct, frozen=True):
+    """A stretch of a script's lines, as HTML."""
+
+    html: Markup
+    first: int
+    """The number of its first line."""
+    folded: bool
+    label: str
+    """What a fold holds, in words."""
+
+
+class Receipt(Struct, frozen=True):
+    """What the build can say for an output or a script."""
+
+    kind: str
+    """`verified`, `volatile`, `unverified`: also a class of the style sheet."""
+    text: str
+
+
+def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
+    """A script and the outputs that belong to it, as one object."""
+    run = page.shown.runs.get(block.path)
+    return page.template(
+        "blocks/script.html",
+        script=block,
+        parts=_parts(page.tools, block),
+        anchor=listing_anchor(block.path),
+        href=page.place.href(block.path),
+        command=shlex.join(("python", block.path, *block.args)),
+        outputs=tuple(_output(page, recording) for recording in recordings),
+        receipt=None if recordings else script_receipt(page, run),
+    )
+
+
+def recording(page: PageContext, block: Recording) -> Markup:
+    """A recorded output that stands apart from its script."""
+    return page.template("blocks/recording.html", output=_output(page, block))
+
+
+def code(page: PageContext, language: str, text: str) -> Markup:
+    """Code that is only shown."""
+    return page.template("blocks/code.html", language=language, html=page.highlight(language, text))
+
+
+def plain_code(page: PageContext, block: PlainCode) -> Markup:
+    """Python that is shown and not run."""
+    return code(page, "python", block.code.text)
+
+
+def callout(page: PageContext, block: Callout) -> Markup:
+    """A callout, folded where the author says so."""
+    return page.template(
+        "blocks/callout.html",
+        callout=block,
+        label=page.shown.callouts[block.kind].label,
+        promise=page.shown.callouts[block.kind].promise,
+        title=page.inlines(block.title),
+        body=page.blocks(block.blocks),
+    )
+
+
+def mjcf(page: PageContext, block: Mjcf) -> Markup:
+    """A model or a fragment, and that it compiles, or the message it fails with."""
+    return page.template(
+        "blocks/mjcf.html",
+        mjcf=block,
+        html=page.highlight("xml", block.code.text.rstrip("\n")),
+        engine=page.shown.engine,
+    )
+
+
+def binding(page: PageContext, node: NumberBinding) -> Markup:
+    """A number that a script printed; the mark names the script."""
+    text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
+    return page.template("blocks/binding.html", text=text, path=node.script)
+
+
+# --- outputs
+
+
+class ShownOutput(Struct, frozen=True):
+    """A recorded output, ready for its template."""
+
+    caption: Markup
+    path: str
+    anchor: str
+    """Empty where it is not known whose output it is."""
+    text: str | None
+    """The recorded text; `None` where it is a table."""
+    table: Markup | None
+    receipt: Receipt
+
+
+def _output(page: PageContext, block: Recording) -> ShownOutput:
+    return ShownOutput(
+        caption=page.inlines(block.caption),
+        path=block.script or "",
+        anchor=output_anchor(block.script, page.outputs[block.span.start]) if block.script else "",
+        text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),
+        table=page.blocks((block.body,)) if isinstance(block.body, Table) else None,
+        receipt=output_receipt(page, block),
+    )
+
+
+def output_receipt(page: PageContext, block: Recording) -> Receipt:
+    """What can be said for a recorded output."""
+    verdict = page.shown.verdicts.get(block.span.start)
+    run = page.shown.runs.get(block.script) if block.script is not None else None
+    return _output_receipt(page, verdict, run, isinstance(block.body, Table))
+
+
+def _output_receipt(
+    page: PageContext, verdict: ShownVerdict | None, run: ShownRun | None, table: bool
+) -> Receipt:
+    words, shown = page.tools.words, page.shown
+    versions = {"engine": shown.engine, "python": shown.python}
+    if verdict is None or verdict.status == "unchecked":
+        return _not_run(words, run)
+    match verdict.status:
+        case "verified":
+            how = compared(words, verdict.comparison)
+            return Receipt("verified", f"{words('receipt.verified', **versions)} {how}.")
+        case "volatile":
+            return Receipt("volatile", words("receipt.volatile", **versions))
+        case "drift":
+            return Receipt("unverified", words("receipt.drift", **versions))
+        case _:
+            assert_never(verdict.status)
+
+
+def compared(words: Strings, comparison: Comparison) -> str:
+    """How an output was compared, in words."""
+    match comparison.mode:
+        case Mode.EXACT | Mode.VOLATILE:
+            how = words("receipt.exact")
+        case Mode.DIGITS:
+            how = words("receipt.digits")
+        case Mode.TOLERANCE:
+            how = _tolerance(words, comparison.rtol, comparison.atol)
+        case _:
+            assert_never(comparison.mode)
+    return f"{how}; {words('receipt.ellipsis')}" if comparison.ellipsis else how
+
+
+def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
+    relative, absolute = short(rtol), short(atol)
+    if rtol and atol:
+        return words("receipt.rtol_atol", rtol=relative, atol=absolute)
+    return words("receipt.rtol", rtol=relative) if rtol else words("receipt.atol", atol=absolute)
+
+
+def short(value: Decimal) -> str:
+    """A tolerance as a reader writes it: `1e-6`, `0.05`."""
+    value = value.normalize()
+    return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
+
+
+def script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
+    """What can be said for a script without a recorded output."""
+    words, shown = page.tools.words, page.shown
+    if run is not None and run.outcome is Outcome.OK:
+        text = words("receipt.ran", engine=shown.engine, python=shown.python)
+        return Receipt("verified", text)
+    return _not_run(words, run)
+
+
+def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
+    if run is not None and run.outcome is Outcome.SKIPPED:
+        return Receipt("unverified", words("receipt.skipped", modules=", ".join(run.missing)))
+    if run is not None and run.outcome is Outcome.NORUN:
+        return Receipt("unverified", words("receipt.norun"))
+    return Receipt("unverified", words("receipt.unchecked"))
+
+
+# --- code
+
+
+def _parts(tools: Tools, block: Script) -> tuple[CodePart, ...]:
+    text = block.code.text.rstrip("\n")
+    lines = tools.mark("python", text)
+    return tuple(
+        CodePart(
+            numbered(lines[part.first - 1 : part.last], block.path, part.first),
+            part.first,
+            part.folded,
+            _fold_label(tools.words, part),
+        )
+        for part in fold(text)
+    )
+
+
+def _fold_label(words: Strings, part: Part) -> str:
+    where = words(
+        "code.lines" if part.first < part.last else "code.line", first=part.first, last=part.last
+    )
+    holds = [words("code.docstring")] if part.docstring else []
+    holds += [words("code.imports")] if part.imports else []
+    holds += part.names
+    return f"{where}: {', '.join(holds)}" if holds else where

@@ -1,0 +1,84 @@
+"""Drawing a page: its inputs and its document through the templates.
+
+Entry points: `draw(inputs, document, tools)`; `draw_whole`, with the document's context as well.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from coursebuild.core.model import Document, Paragraph, plain_text
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.article import article, contents
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.draft import Draft as Draft
+from coursebuild.core.pages.graph import drawings
+from coursebuild.core.pages.listings import numbered
+from coursebuild.core.pages.page_inputs import Graphed, Highlighted, PageInputs, Plotted
+from coursebuild.core.pages.tools import Tools
+
+if TYPE_CHECKING:
+    from coursebuild.numerics.reports.bench import ScenarioReport
+
+
+def draw(inputs: PageInputs, document: Document | None, tools: Tools) -> Draft:
+    """The page without its frame; the same values give the same page."""
+    return draw_whole(inputs, document, tools)[0]
+
+
+def draw_whole(
+    inputs: PageInputs, document: Document | None, tools: Tools
+) -> tuple[Draft, PageContext | None]:
+    """The page without its frame, and the context of its document."""
+    page: PageContext | None = None
+    values = {name: _drawn(value, tools) for name, value in inputs.values.items()}
+    description = inputs.description
+    if document is not None and inputs.shown is not None:
+        page = PageContext.made(tools, inputs.shown, urls.Place(inputs.path), document)
+        values["contents"] = contents(page, document)
+        values["article"] = article(page, document)
+        if inputs.kind == "page":
+            description = _first_sentences(document)
+    draft = Draft(
+        inputs.path,
+        inputs.kind,
+        inputs.title,
+        description,
+        tools.render(inputs.template, **values),
+        json_ld=inputs.json_ld,
+        og_type=inputs.og_type,
+        indexed=inputs.indexed,
+    )
+    return draft, page
+
+
+def _drawn(value: object, tools: Tools) -> object:
+    match value:
+        case Highlighted():
+            return numbered(tools.mark(value.language, value.text), value.path)
+        case Graphed():
+            return drawings(value, tools.words)
+        case Plotted():
+            return tuple(plots(f"_plot-{n}", one) for n, one in enumerate(value.reports, 1))
+        case _:
+            return value
+
+
+def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
+    """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
+    from coursebuild.numerics.reports.plot import plot_svg  # which few pages need
+
+    drawn = (
+        plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+        for kind in ("wide", "narrow")
+    )
+    return tuple(Markup(svg) for svg in drawn if svg)
+
+
+def _first_sentences(document: Document) -> str:
+    """The first paragraph, cut at a word: what search engines show."""
+    first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
+    text = " ".join(plain_text(first.children).split()) if first is not None else ""
+    return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"

@@ -1,0 +1,64 @@
+"""`llms.txt`: the course in one Markdown file of links, for language models.
+
+Entry point: `llms(library)`. Format: <https://llmstxt.org>.
+
+There is no `llms-full.txt`: of a course of thousands of lessons it would have tens of megabytes,
+more than any model reads, and every edit would write it again. The links lead to pages in Markdown,
+one for each lesson.
+"""
+
+from __future__ import annotations
+
+from coursebuild.core.model import Lesson
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.exports.marks import escaped, link
+from coursebuild.core.pages.library import Library
+
+PATH = "llms.txt"
+
+
+def llms(library: Library) -> bytes:
+    """The file."""
+    course, words = library.course, library.words
+    parts = [f"# {_line(course.title)}"]
+    if course.summary:
+        parts.append(f"> {_line(course.summary)}")
+    parts.append(words("exports.llms"))
+    for level in course.levels:
+        label = f"{words('level.label', id=level.id)}: {level.title}"
+        rows = [_lesson(library, one) for one in level.lessons if one.document is not None]
+        if rows:
+            parts.append("\n".join((f"## {_line(label)}", "", *rows)))
+    parts += _others(library)
+    return visible("\n\n".join(parts) + "\n").encode()
+
+
+def _lesson(library: Library, lesson: Lesson) -> str:
+    path = urls.lesson_path(lesson)
+    return _row(library, path, f"{lesson.id} {lesson.title}", lesson.summary)
+
+
+def _others(library: Library) -> list[str]:
+    """What may be left out where there is little room."""
+    course, words = library.course, library.words
+    rows = [_row(library, urls.HOME, words("site.map"), "")]
+    rows += [_row(library, urls.page_path(page), page.title, "") for page in course.pages]
+    rows += [
+        _row(library, urls.model_page_path(m.name), words("model.title", name=m.name), "")
+        for m in course.models
+    ]
+    if library.reports.cases:
+        title, text = words("numerics.title"), words("numerics.description")
+        rows.append(_row(library, urls.NUMERICS, title, text))
+    return ["\n".join(("## Optional", "", *rows))]
+
+
+def _row(library: Library, path: str, title: str, text: str) -> str:
+    copy = urls.markdown_path(path) or path
+    address = urls.absolute(library.course, copy) or urls.encode(copy)
+    return f"- {link(_line(title), address)}" + (f": {_line(text)}" if text else "")
+
+
+def _line(text: str) -> str:
+    return escaped(" ".join(text.split()))

@@ -1,0 +1,333 @@
+"""Blocks and inlines as Markdown that needs no course: CommonMark with tables, footnotes and `$`.
+
+Entry points: `write_blocks`, `write_inlines`, `write_footnotes`; `MarkdownContext`, which says
+where links lead and what our own blocks become.
+
+1. A text that stands in the source as it reads is written as it stands there: it was read as text
+   once, between the same neighbours. Any other (with escapes or entities in it, or out of JSON) has
+   all its marks escaped.
+2. What may begin another block where a line begins is escaped when the paragraph is put together.
+3. Containers indent what they hold.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Protocol, TypeAlias, assert_never
+
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    BlockQuote,
+    Callout,
+    Cell,
+    CodeBlock,
+    CodeSpan,
+    Emphasis,
+    FeatureBlock,
+    Footnote,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Lab,
+    Link,
+    ListBlock,
+    ListItem,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Target,
+    Term,
+    Text,
+    ThematicBreak,
+    plain_text,
+)
+from coursebuild.core.pages.exports.marks import (
+    code_span,
+    delimiter,
+    escaped,
+    fence,
+    formula,
+    guarded,
+    hang,
+    link,
+    no_empty_lines,
+    number_text,
+    picture,
+    piped,
+    quoted,
+    table,
+    text_source,
+)
+from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.markup import escape, is_tight
+from coursebuild.core.text.patterns import pattern
+
+
+class MarkdownContext(Protocol):
+    """What depends on where the Markdown goes."""
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+        ...
+
+    def url(self, url: str) -> str:
+        """The address of a picture that is written as `url`."""
+        ...
+
+    def reference(self, note: int) -> str:
+        """A reference to a footnote."""
+        ...
+
+    def named(self, target: Target) -> str:
+        """What a link without a text says: the number of a formula; empty for none."""
+        ...
+
+    def number(self, start: int) -> str:
+        """The number that is to stand beside the formula at an offset; empty for none."""
+        ...
+
+    def own(self, block: OwnBlock) -> str:
+        """A block of ours, without its last line end; empty for none."""
+        ...
+
+
+Same: TypeAlias = dict[int, tuple[object, str]]
+"""Texts that are the same in every context, by the identity of what they were written from, which
+is held so that it stays its own."""
+
+
+def write_blocks(
+    blocks: Iterable[Block], context: MarkdownContext, same: Same | None = None
+) -> str:
+    """Blocks one after the other, an empty line between two, without the last line end.
+
+    Where the same document is written for several contexts that show the same numbers, `same` is
+    what they share.
+    """
+    return _Writer(context, same).blocks(blocks)
+
+
+def write_inlines(
+    inlines: tuple[Inline, ...], context: MarkdownContext, same: Same | None = None
+) -> str:
+    """Inlines in one line, such as a title."""
+    return _Writer(context, same).title(inlines)
+
+
+def write_footnotes(
+    footnotes: Iterable[Footnote], context: MarkdownContext, same: Same | None = None
+) -> str:
+    """The definitions of footnotes, which are referred to as `[^1]`."""
+    return "\n\n".join(
+        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context, same), 4)
+        for note in footnotes
+    )
+
+
+_APART = (
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, Bench, Lab, FeatureBlock),
+    *(Table, MathBlock),
+)
+"""Blocks that an empty line parts from others, even in a tight list."""
+
+_LAST_MARKS = pattern(r"(^|\s)(#+)$")
+
+
+class _Writer:
+    def __init__(self, context: MarkdownContext, same: Same | None) -> None:
+        self.context = context
+        self._same = same
+        self._asked = False
+        """Whether the context said where something lies: elsewhere it may say otherwise."""
+
+    def title(self, inlines: tuple[Inline, ...]) -> str:
+        """Inlines in one line."""
+        return self._once(inlines, lambda: self._one_line(inlines))
+
+    def _one_line(self, inlines: Iterable[Inline]) -> str:
+        return " ".join(self.inlines(inlines, line=True).split("\n")).strip()
+
+    def _once(self, of: object, write: Callable[[], str]) -> str:
+        """A text, taken from another context where it is the same there."""
+        if self._same is None:
+            return write()
+        known = self._same.get(id(of))
+        if known is not None:
+            return known[1]
+        self._asked = False
+        text = write()
+        if not self._asked:
+            self._same[id(of)] = of, text
+        return text
+
+    # --- blocks
+
+    def blocks(self, blocks: Iterable[Block], *, tight: bool = False) -> str:
+        parts: list[tuple[Block, str]] = []
+        for block in blocks:
+            before = parts[-1][0] if parts else None
+            text = self.block(block, before)
+            if text:
+                parts.append((block, text))
+        written = ""
+        for at, (block, text) in enumerate(parts):
+            if at:
+                apart = (
+                    not tight or isinstance(parts[at - 1][0], _APART) or isinstance(block, _APART)
+                )
+                written += "\n\n" if apart else "\n"
+            written += text
+        return written
+
+    def block(self, block: Block, after: Block | None = None) -> str:
+        match block:
+            case Heading():
+                return self._once(block, lambda: self._heading(block))
+            case Paragraph():
+                return self._once(block, lambda: self.inlines(block.children))
+            case HtmlFlow():
+                return "".join(map(self._in_html, block.children))
+            case ListBlock():
+                return self._list(block, other=isinstance(after, ListBlock))
+            case BlockQuote():
+                return quoted(self.blocks(block.blocks))
+            case CodeBlock():
+                return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+            case HtmlBlock():
+                return block.html.rstrip("\n")
+            case ThematicBreak():
+                return "___"
+            case MathBlock():
+                tex, tag = no_empty_lines(block.tex.text), self._tag(block.span.start)
+                return "\n".join(filter(None, ("$$", tex, tag, "$$")))
+            case Table():
+                return self._once(block, lambda: self._table(block))
+            case Callout() | PlainCode() | Script() | Recording() | Mjcf():
+                return self.context.own(block)
+            case Bench() | Lab() | FeatureBlock():
+                return self.context.own(block)
+            case _:
+                assert_never(block)
+
+    def _in_html(self, inline: Inline) -> str:
+        """An inline in HTML, where text is no Markdown."""
+        if isinstance(inline, Text):
+            return escape(inline.text)
+        return self._inline(inline, line=False, cell=False)
+
+    def _heading(self, heading: Heading) -> str:
+        text = _LAST_MARKS.sub(r"\1\\\2", self._one_line(heading.children))
+        return f"{'#' * heading.level} {text}".rstrip()
+
+    def _list(self, block: ListBlock, *, other: bool) -> str:
+        """A list; one right after another has other marks, by which it is known as another."""
+        number, mark = block.start, "*" if other else "-"
+        tight = all(
+            is_tight(inner) or not isinstance(inner, Paragraph)
+            for item in block.items
+            for inner in item.blocks
+        )
+        items: list[str] = []
+        for item in block.items:
+            if number is not None:
+                mark = f"{number}{')' if other else '.'}"
+                number += 1
+            items.append(self._item(f"{mark} ", item, tight=tight))
+        return ("\n" if tight else "\n\n").join(items)
+
+    def _item(self, mark: str, item: ListItem, *, tight: bool) -> str:
+        text = self.blocks(item.blocks, tight=tight)
+        if item.checked is not None:
+            text = f"[{'x' if item.checked else ' '}] {text or '&nbsp;'}"
+        elif item.blocks and isinstance(item.blocks[0], ListBlock):
+            text = f"\n{text}"  # three marks in a line would be a break
+        return hang(mark, text, len(mark))
+
+    def _table(self, block: Table) -> str:
+        rows = (map(self._cell, row) for row in block.rows)
+        return table(map(self._cell, block.header), rows, (one or "" for one in block.align))
+
+    def _cell(self, cell: Cell) -> str:
+        return self.inlines(cell.children, line=True, cell=True).replace("\n", " ")
+
+    # --- inlines
+
+    def inlines(self, inlines: Iterable[Inline], *, line: bool = False, cell: bool = False) -> str:
+        text = self._joined(inlines, line=line, cell=cell)
+        return text if line else guarded(text)
+
+    def _joined(self, inlines: Iterable[Inline], *, line: bool, cell: bool) -> str:
+        return "".join([self._inline(one, line=line, cell=cell) for one in inlines])
+
+    def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
+        match inline:
+            case Text():
+                return text_source(inline, cell=cell)
+            case SoftBreak():
+                return " " if line else "\n"
+            case HardBreak():
+                if line:
+                    return " "
+                return "\\\n" if inline.span.text.startswith("\\") else "  \n"
+            case CodeSpan():
+                source = inline.span.text
+                ticks = source[: len(source) - len(source.lstrip("`"))]
+                return piped(code_span(inline.text, ticks), cell=cell)
+            case NumberBinding():
+                return escaped(number_text(inline))
+            case Math():
+                tag = self._tag(inline.span.start) if inline.display else ""
+                return formula(inline, tag, cell=cell)
+            case Emphasis():
+                mark = delimiter(inline.span.text, "*")
+                return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
+            case Strong():
+                mark = delimiter(inline.span.text, "*") * 2
+                return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
+            case Term():
+                return f"*{self._joined(inline.children, line=line, cell=cell)}*"
+            case Strikethrough():
+                return f"~~{self._joined(inline.children, line=line, cell=cell)}~~"
+            case Link():
+                text = self._joined(inline.children, line=line, cell=cell)
+                return self._link(inline, text, cell=cell)
+            case Image():
+                self._asked = True
+                url = self.context.url(inline.url)
+                return piped(picture(inline.alt, url, inline.title), cell=cell)
+            case RawInline():
+                return piped(inline.html, cell=cell)
+            case FootnoteRef():
+                self._asked = True
+                return self.context.reference(inline.number)
+            case _:
+                assert_never(inline)
+
+    def _tag(self, start: int) -> str:
+        number = self.context.number(start)
+        return f"\\tag{{{number}}}" if number else ""
+
+    def _link(self, node: Link, text: str, *, cell: bool) -> str:
+        source = node.span.text
+        if source == f"<{plain_text(node.children)}>" and not cell:
+            return source
+        self._asked = True
+        href = self.context.href(node.target)
+        text = text or escaped(self.context.named(node.target))
+        return link(text, href.replace("|", "%7C") if cell else href, node.title)

@@ -1,0 +1,131 @@
+"""A page as plain Markdown: for people, feeds and language models.
+
+Entry points: `markdown_copy(inputs, page, …)`, the text; `html_copy`, that of a page without a
+document; `markdown_href`, an address in it.
+
+A lesson or page of the course is written from its document. Every other page (the map, levels,
+models, measured figures) is written from its HTML, so that it says what the page says.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable
+from typing import TypeAlias
+from urllib.parse import unquote, urlsplit
+
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.exports.markdown import Same, write_blocks, write_footnotes
+from coursebuild.core.pages.exports.marks import code_span, escaped, guarded, link
+from coursebuild.core.pages.exports.plain import Plain
+from coursebuild.core.pages.lesson import LessonHead, LessonLink, LevelName
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.strings import Strings
+
+Locate: TypeAlias = Callable[[str], str]
+
+
+def markdown_href(place: urls.Place, href: str) -> str:
+    """An address on a page as its copy has it: that of the other page's copy."""
+    try:
+        parts = urlsplit(href)
+    except ValueError:  # it is no address
+        return href
+    if parts.scheme or parts.netloc or not parts.path.endswith(".html"):
+        return href
+    folder = posixpath.dirname(place.path)
+    target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
+    if target.startswith(("files/", "../")) or urls.markdown_path(target) is None:
+        return href
+    return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
+
+
+def markdown_copy(inputs: PageInputs, page: PageContext | None, body: str, same: Same) -> str:
+    """The text of a page; `body` is its HTML, as published, `same` what its notebook shares."""
+    if page is None:
+        return html_copy(inputs.path, body)
+    place, words, document = page.place, page.tools.words, page.document
+    here = place.href(place.path)
+    context = Plain(page, lambda href: markdown_href(place, href), here, same=same)
+    parts = (
+        *head(inputs, words, context.locate),
+        write_blocks(document.blocks, context, same),
+        write_footnotes(document.footnotes, context, same),
+        *_foot(inputs, words, context.locate),
+    )
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def html_copy(path: str, body: str) -> str:
+    """The text of a page without a document, from its HTML."""
+    if urls.markdown_path(path) is None:
+        return ""
+    from coursebuild.core.pages.exports.fromhtml import (
+        markdown_of,  # pages with one need none of it
+    )
+
+    return f"{markdown_of(body, lambda href: markdown_href(urls.Place(path), href))}\n"
+
+
+def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
+    """Title, summary, facts and objectives; of a page that is no lesson, its title."""
+    lesson = inputs.values.get("lesson")
+    if not isinstance(lesson, LessonHead):
+        return [f"# {_line(inputs.title)}"]
+    parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
+    if lesson.summary:
+        parts.append(guarded(_line(lesson.summary)))
+    parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
+    if lesson.objectives:
+        items = "\n".join(f"- {guarded(_line(one))}" for one in lesson.objectives)
+        parts.append(f"{_line(words('lesson.objectives'))}\n\n{items}")
+    return parts
+
+
+def _facts(inputs: PageInputs, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
+    facts = []
+    level, href = inputs.values.get("level"), inputs.values.get("level_href")
+    if isinstance(level, LevelName) and isinstance(href, str):
+        name = f"{words('level.label', id=level.id)}: {level.title}"
+        facts.append(link(_line(name), locate(href)))
+    facts.append(_line(words(f"status.{inputs.values['status']}")))
+    if lesson.minutes:
+        facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
+    needs = lesson_links(inputs, "needs", locate)
+    if needs:
+        facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")
+    return facts
+
+
+def lesson_links(inputs: PageInputs, name: str, locate: Locate) -> list[str]:
+    """Links to the lessons that a value of inputs names."""
+    found = inputs.values.get(name)
+    lessons = found if isinstance(found, tuple) else (found,)
+    return [
+        link(_line(f"{one.id} {one.title}"), locate(one.href))
+        for one in lessons
+        if isinstance(one, LessonLink)
+    ]
+
+
+def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
+    """Where to go from here."""
+    rows = []
+    scripts = inputs.values.get("scripts")
+    if isinstance(scripts, tuple) and scripts:
+        named = (link(code_span(path), href) for path, href in scripts)
+        rows.append(f"{_line(words('lesson.scripts'))}: {', '.join(named)}")
+    for name, key in (
+        ("leads", "lesson.leads"),
+        ("previous", "lesson.previous"),
+        ("following", "lesson.next"),
+    ):
+        links = lesson_links(inputs, name, locate)
+        if links:
+            rows.append(f"{_line(words(key))}: {', '.join(links)}")
+    return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []
+
+
+def _line(text: str) -> str:
+    return escaped(" ".join(text.split()))

@@ -1,0 +1,180 @@
+"""The marks of Markdown: links, fences, tables, escapes.
+
+Entry points: `escaped`, `guarded`; `link`, `picture`, `code_span`, `fence`, `table`, `quoted`,
+`hang`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from coursebuild.core.model import Math, NumberBinding, Text
+from coursebuild.core.text.patterns import pattern
+
+
+def hang(mark: str, text: str, indent: int | None = None) -> str:
+    """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
+    space = " " * (len(mark) if indent is None else indent)
+    first, *rest = text.split("\n")
+    lines = [f"{mark}{first}" if first else mark.rstrip()]
+    return "\n".join([*lines, *(f"{space}{line}" if line.strip() else "" for line in rest)])
+
+
+def quoted(text: str) -> str:
+    """Lines in a blockquote."""
+    return "\n".join(f"> {line}" if line.strip() else ">" for line in text.split("\n"))
+
+
+def fence(language: str, text: str) -> str:
+    """Code between fences that are longer than any in it."""
+    runs = _FENCES.findall(text) if "```" in text else ()
+    ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
+    body = text if text.endswith("\n") or not text else f"{text}\n"
+    return f"{ticks}{language}\n{body}{ticks}"
+
+
+_FENCES = pattern(r"^[ ]*(`{3,})", re.MULTILINE)
+
+
+def code_span(text: str, ticks: str = "") -> str:
+    """Text as inline code, between these ticks or as few as do."""
+    text = text.replace("\n", " ")
+    runs = set(map(len, _TICKS.findall(text))) if "`" in text else ()
+    ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
+    blank = text.strip(" ") == ""
+    edges = text[:1] == "`" or text[-1:] == "`" or (text[:1] == text[-1:] == " ")
+    pad = " " if edges and not blank else ""
+    return f"{ticks}{pad}{text}{pad}{ticks}"
+
+
+_TICKS = pattern("`+")
+_ANY_MARK = pattern(r"[\\`*\[\]<$|!~&_]")
+"""What every mark has; most texts have none."""
+_MARKS = pattern(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
+ALWAYS = pattern(r"[$`]")
+"""What is escaped wherever it is text: another reader may see more in it than ours did."""
+
+
+def escaped(text: str) -> str:
+    """Text with all its marks escaped, in one line or several."""
+    return _MARKS.sub(lambda match: f"\\{match[0]}", text) if _ANY_MARK.search(text) else text
+
+
+def link(text: str, href: str, title: str = "") -> str:
+    """A link; `text` is Markdown."""
+    return f"[{text}]({_destination(href)}{_title(title)})"
+
+
+def picture(alt: str, url: str, title: str = "") -> str:
+    """A picture; `alt` is plain text."""
+    alt = escaped(" ".join(alt.split()))
+    return f"![{alt}]({_destination(url)}{_title(title)})"
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[str] = ()) -> str:
+    """A table of cells that are Markdown in one line, their pipes escaped."""
+    head = tuple(head)
+    marks = {"left": ":---", "right": "---:", "center": ":---:"}
+    aligned = [marks.get(one, "---") for one in align] or ["---"] * len(head)
+    lines = [head, aligned, *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+_APART = pattern(r"[\s<>()\\]")
+"""What an address may have in angle brackets only."""
+
+
+def _destination(url: str) -> str:
+    if url and not _APART.search(url):
+        return url
+    safe = url.replace("\\", "%5C").replace("<", "%3C").replace(">", "%3E")
+    return f"<{''.join('%20' if c.isspace() else c for c in safe)}>"
+
+
+def _title(title: str) -> str:
+    if not title:
+        return ""
+    text = re.sub(r'[\\"]|&(?=#?\w+;)', lambda match: f"\\{match[0]}", title)
+    text = re.sub(r"\n[ \t\n]*", "\n", text)
+    return f' "{text}"'
+
+
+_BEGINS = pattern(
+    r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
+    r"|[|:\s-]*-[|:\s-]*$)"
+    r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
+    r"|(?P<note>\[\^[^\]]+\]):"
+)
+"""What begins, or makes of the line before it, another block than a paragraph."""
+
+
+def guarded(text: str) -> str:
+    """The lines of a paragraph, so that none of them begins another block."""
+    # A letter begins no block.
+    return "\n".join(
+        [line if line[:1].isalpha() else _guarded_line(line) for line in text.split("\n")]
+    )
+
+
+def _guarded_line(line: str) -> str:
+    found = _BEGINS.match(line)
+    if found is None:
+        return line
+    if found["number"]:
+        return f"{found['number']}\\{line[found.end('number') :]}"
+    if found["note"]:
+        return f"{found['note']}\\{line[found.end('note') :]}"
+    return f"\\{line}"
+
+
+_PIPE = pattern(r"(?<!\\)\|")
+_COMMENT = pattern(r"(?<!\\)%")
+_MINUS = pattern(r"(?<!\w)-(?=\d)")
+
+
+def number_text(node: NumberBinding) -> str:
+    """A number that a script printed, with a real minus sign."""
+    return _MINUS.sub("\u2212", node.text)
+
+
+def text_source(node: Text, *, cell: bool) -> str:
+    """A text as it stands in its source, where it reads there as it does here."""
+    source = node.span.text
+    if source != node.text:
+        text = escaped(node.text)
+        if text[:1].isspace() and not source[:1].isspace():
+            text = f"&#{ord(text[0])};{text[1:]}"
+        if text[-1:].isspace() and not source[-1:].isspace():
+            text = f"{text[:-1]}&#{ord(text[-1])};"
+        return text.replace("\n", "&#10;")
+    if "$" in source or "`" in source:
+        source = ALWAYS.sub(lambda match: f"\\{match[0]}", source)
+    return piped(source, cell=cell)
+
+
+def piped(text: str, *, cell: bool) -> str:
+    """Marks, whose pipes are escaped in a cell of a table."""
+    return _PIPE.sub(r"\\|", text) if cell and "|" in text else text
+
+
+def delimiter(source: str, usual: str) -> str:
+    """The mark that emphasis has in its source."""
+    return source[0] if source[:1] in ("*", "_") else usual
+
+
+def formula(node: Math, tag: str, *, cell: bool) -> str:
+    """A formula between its dollars, with its number, if it has one."""
+    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
+    if cell:  # a pipe would end the cell, and an escaped one is another sign
+        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
+    if "%" in tex and _COMMENT.search(tex):  # a line's end ends a comment
+        tex = no_empty_lines(tex)
+    elif "\n" in tex:
+        tex = " ".join(part.strip() for part in tex.split("\n"))
+    return f"$${tex}$$" if node.display else f"${tex}$"
+
+
+def no_empty_lines(tex: str) -> str:
+    """TeX without empty lines, at which a formula would end."""
+    return "\n".join(line for line in tex.split("\n") if line.strip())

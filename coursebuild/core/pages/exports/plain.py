@@ -1,0 +1,254 @@
+"""The blocks that are ours as plain Markdown: scripts, outputs, labs, quizzes, callouts.
+
+Entry point: `Plain`, the writer's context for one document on one page.
+
+What a page shows with templates is said here in Markdown: a script is a fence under its name, a lab
+is its recorded picture and what it showed, a quiz is a list with its answers.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from typing import assert_never
+
+from msgspec import Struct, field
+
+from coursebuild.core.features import kind_of_block
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    Callout,
+    FeatureBlock,
+    Inline,
+    Lab,
+    Mjcf,
+    ModelTarget,
+    PlainCode,
+    Recording,
+    Script,
+    Table,
+    Target,
+)
+from coursebuild.core.pages.blocks import output_receipt, script_receipt
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.exports.markdown import Same, write_blocks, write_inlines
+from coursebuild.core.pages.exports.marks import (
+    code_span,
+    escaped,
+    fence,
+    guarded,
+    link,
+    picture,
+    quoted,
+    table,
+)
+from coursebuild.core.pages.labs import (
+    control_view,
+    number,
+    overlay_name,
+    plot_view,
+    seconds,
+    start_name,
+)
+from coursebuild.core.pages.look import OwnBlock
+
+
+class Plain(Struct, frozen=True):
+    """A document as plain Markdown."""
+
+    page: PageContext
+    locate: Callable[[str], str]
+    """An address as the page has it, as the Markdown has it."""
+    live: str
+    """The address of the page with its labs."""
+    notebook: bool = False
+    """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
+    same: Same = field(default_factory=dict)
+    """What the page's other context writes in the same way."""
+
+    # what the writer asks
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+        return self.locate(self.page.href(target))
+
+    def url(self, url: str) -> str:
+        """The address of a picture."""
+        return self.locate(self.page.url(url))
+
+    def reference(self, note: int) -> str:
+        """A reference to a footnote."""
+        return f"<sup>{note}</sup>" if self.notebook else f"[^{note}]"
+
+    def named(self, target: Target) -> str:
+        """What a link without a text says."""
+        return self.page.reference(target)
+
+    def number(self, start: int) -> str:
+        """The number beside a formula that does not show one itself."""
+        known = self.page.equations.get(start)
+        return known.number if known is not None and known.shown else ""
+
+    def own(self, block: OwnBlock) -> str:
+        """A block of ours."""
+        match block:
+            case Callout():
+                return self._callout(block)
+            case PlainCode():
+                return fence("python", block.code.text)
+            case Script():
+                return self._script(block)
+            case Recording():
+                joined = any(block in some for some in self.page.joined.values())
+                return "" if joined else self.recording(block)
+            case Mjcf():
+                return self._mjcf(block)
+            case Bench():
+                return self._bench(block)
+            case Lab():
+                return self._lab(block)
+            case FeatureBlock():
+                return kind_of_block(block).markdown(self, block)
+            case _:
+                assert_never(block)
+
+    def blocks(self, blocks: tuple[Block, ...]) -> str:
+        """Blocks as Markdown."""
+        return write_blocks(blocks, self, self.same)
+
+    def inlines(self, inlines: tuple[Inline, ...]) -> str:
+        """Inlines as Markdown in one line."""
+        return write_inlines(inlines, self, self.same)
+
+    def words(self, key: str, **values: str | int | float) -> str:
+        """A text of the interface, as Markdown."""
+        return escaped(self.page.tools.words(key, **values))
+
+    # --- callouts, io, MJCF
+
+    def _callout(self, block: Callout) -> str:
+        label = f"**{escaped(self.page.shown.callouts[block.kind].label)}**"
+        title = self.inlines(block.title)
+        head = f"{label} {title}" if title else label
+        inner = self.blocks(block.blocks)
+        return quoted(f"{head}\n\n{inner}" if inner else head)
+
+    def _mjcf(self, block: Mjcf) -> str:
+        shown = self.page.shown
+        label = (
+            self.words("mjcf.fragment", element=block.fragment)
+            if block.fragment
+            else self.words("mjcf.label")
+        )
+        receipt = f"*{self.words('mjcf.compiles', engine=shown.engine)}*"
+        if block.error is not None:
+            receipt = f"*{self.words('mjcf.fails', engine=shown.engine)}* {code_span(block.error)}"
+        return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
+
+    def _bench(self, block: Bench) -> str:
+        from coursebuild.core.pages.benches import bench_text  # few lessons show a report
+        from coursebuild.core.pages.exports.fromhtml import markdown_of
+
+        html, said = bench_text(self.page, block)
+        parts = [guarded(escaped(said))] if said else []
+        head, *rest = markdown_of(str(html), self.locate).split("\n\n")
+        return "\n\n".join((head, *parts, *rest))
+
+    # --- scripts and outputs
+
+    def _script(self, block: Script) -> str:
+        href = self.locate(self.page.place.href(block.path))
+        name = link(code_span(block.path), href)
+        if self.notebook:
+            return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
+        command = code_span(shlex.join(("python", block.path, *block.args)))
+        run = f"{self.words('code.run')}: {command}"
+        if block.requires:
+            run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
+        parts = [f"{name}:", fence("python", block.code.text), run]
+        recordings = self.page.joined.get(block.span.start, ())
+        parts += [self.recording(recording) for recording in recordings]
+        if not recordings:
+            receipt = script_receipt(self.page, self.page.shown.runs.get(block.path))
+            parts.append(f"*{escaped(receipt.text)}*")
+        return "\n\n".join(parts)
+
+    def recording(self, block: Recording) -> str:
+        """An output with its caption and what can be said for it."""
+        if isinstance(block.body, Table):
+            body = self.blocks((block.body,))
+        else:
+            body = fence("text", block.body.text)
+        return f"{self.inlines(block.caption)}\n\n{body}\n\n{self.receipt(block)}"
+
+    def receipt(self, block: Recording) -> str:
+        """What can be said for an output."""
+        return f"*{escaped(output_receipt(self.page, block).text)}*"
+
+    # --- labs
+
+    def _lab(self, block: Lab) -> str:
+        page, words = self.page, self.words
+        title = block.title or page.tools.words("lab.untitled")
+        parts = [f"**{words('lab.label')}: {escaped(title)}**"]
+        live = page.shown.labs.get(block.span.start)
+        record = live.record if live is not None else None
+        if record is not None:
+            alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
+            parts.append(picture(alt, self.locate(page.place.href(record.picture))))
+            if record.readouts:
+                rows = [(_cell(label), _cell(value)) for label, value in record.readouts]
+                parts.append(f"{words('lab.at', t=seconds(record.end))}:")
+                parts.append(table((words("lab.readouts"), ""), rows))
+        parts.append(self._about(block))
+        if block.controls:
+            views = [control_view(page.tools.words, control) for control in block.controls]
+            rows = [(_cell(view.label), _cell(view.values)) for view in views]
+            parts.append(table((words("lab.control"), words("lab.range")), rows))
+        shows = self._shows(block, recorded=record is not None)
+        parts += ["\n".join(shows)] if shows else []
+        parts += [self.blocks(block.note)] if block.note else []
+        return "\n\n".join((*parts, link(words("exports.run_lab"), self.live)))
+
+    def _about(self, block: Lab) -> str:
+        """What is simulated, and from where to where."""
+        if block.model is not None:
+            name = link(escaped(block.model), self.href(ModelTarget(block.model)))
+            about = f"{self.words('lab.static')} {name}."
+        else:
+            about = f"{self.words('lab.static_xml')}."
+        start = start_name(self.page, block)
+        if start:
+            about += f" {self.words('lab.start')} {code_span(start)}."
+        if block.stop_at is not None:
+            about += f" {self.words('lab.stops', t=number(block.stop_at))}"
+        return about
+
+    def _shows(self, block: Lab, *, recorded: bool) -> list[str]:
+        words = self.page.tools.words
+        rows: list[tuple[str, tuple[str, ...]]] = []
+        if block.readouts and not recorded:
+            labels = tuple(readout.label for readout in block.readouts)
+            rows.append((words("lab.readouts"), labels))
+        for index in range(len(block.plots)):
+            view = plot_view(words, block, index)
+            rows.append((view.title, view.traces + view.marks))
+        if block.toggles:
+            names = tuple(overlay_name(words, name) for name in block.toggles)
+            rows.append((words("lab.overlays"), names))
+        return [f"- {escaped(label)}: {escaped(', '.join(names))}" for label, names in rows]
+
+    def folded(self, label: str, text: str) -> str:
+        """A text behind its label, which a notebook shows on demand."""
+        if self.notebook:
+            return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
+        return f"**{label}:** {text}" if _begins_as_text(text) else f"**{label}:**\n\n{text}"
+
+
+def _cell(text: str) -> str:
+    return escaped(" ".join(text.split()))
+
+
+def _begins_as_text(text: str) -> bool:
+    return not text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))

@@ -1,0 +1,274 @@
+"""Fonts cut down to the characters that a site uses, and fallbacks of the same measure.
+
+Entry points: `read_faces`, `font_jobs` (which files to make, from which characters), `subset_font`
+(one job, bytes to bytes), `ready_font` (what of that can be done before a course is known),
+`face_rules` (the `@font-face` rules).
+
+1. A face is a file of the bundle with its family, style, range of weights and range of characters.
+2. A job keeps of a face what the pages use; a face of which they use nothing is left out. The
+   weights outside the range that the style sheet asks for are cut away, the optical size axis
+   stays. Of a font for mathematics the MATH table stays with all its variants and pieces of
+   brackets.
+3. While a font loads, text is set in a local one, scaled so that lines break and stand as they
+   will: see `FALLBACKS`.
+
+A job's `key` names its result: who calls may keep results by it.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from msgspec import Struct
+
+TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
+"""Families, as the bundle names them."""
+
+WEIGHTS = {TEXT: (400, 700), CODE: (400, 700)}
+"""The weights that the style sheet uses."""
+
+BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
+"""Characters that are always kept, so that few edits change a font."""
+
+VERSION = 5
+"""Part of a job's key: to be raised when the way of cutting changes."""
+_QUALITY = 10
+"""Of compression: the finest, 11, would take half of the time of cutting for a hundredth of the
+bytes."""
+
+
+class Face(Struct, frozen=True):
+    """A font file of the bundle, as `fonts.json` lists it."""
+
+    family: str
+    subset: str
+    file: str
+    style: str
+    weight: tuple[int, int]
+    unicode_range: str | None
+    """CSS syntax; `None`: the whole font."""
+    characters: str = ""
+    """Those that it has a glyph for, as a `unicode-range`; empty where nobody has looked."""
+    measure: tuple[float, float, float, float] | None = None
+    """See `measured`; nothing where nobody has looked."""
+
+
+class FontJob(Struct, frozen=True):
+    """One font to cut."""
+
+    face: Face
+    data: bytes
+    characters: str
+    """Sorted, each once."""
+
+    @property
+    def key(self) -> str:
+        """A name for the result: the same key, the same bytes."""
+        digest = hashlib.sha256(self.data)
+        digest.update(f"{VERSION}/{WEIGHTS.get(self.face.family)}/{self.characters}".encode())
+        return digest.hexdigest()
+
+
+def read_faces(listing: bytes) -> tuple[Face, ...]:
+    """The faces that `fonts.json` lists."""
+    return tuple(map(_face, json.loads(listing)))
+
+
+def _face(entry: dict[str, Any]) -> Face:
+    measure = entry.get("measure")
+    return Face(
+        **{
+            **entry,
+            "weight": tuple(entry["weight"]),
+            "measure": None if measure is None else tuple(measure),
+        }
+    )
+
+
+def font_jobs(
+    faces: Iterable[tuple[Face, bytes]], text: str, mathematics: str
+) -> tuple[FontJob, ...]:
+    """What to cut for pages that use the characters of `text`, and of `mathematics` in formulas."""
+    jobs: list[FontJob] = []
+    given: dict[tuple[str, str], set[str]] = {}
+    for face, data in faces:
+        wanted = BASE | set(text) if face.family != MATH else _mathematical(mathematics)
+        taken = given.setdefault((face.family, face.style), set())
+        kept = (wanted & _characters(face, data)) - taken
+        if face.unicode_range is not None:
+            kept &= characters_in(face.unicode_range)
+        if kept and (mathematics or face.family != MATH):
+            taken |= kept
+            jobs.append(FontJob(face, data, "".join(sorted(kept))))
+    return tuple(jobs)
+
+
+@functools.lru_cache(maxsize=64)
+def characters_in(unicode_range: str) -> frozenset[str]:
+    """The characters of a CSS `unicode-range`."""
+    found: set[str] = set()
+    for part in unicode_range.split(","):
+        first, _, last = part.strip().upper().removeprefix("U+").partition("-")
+        start = int(first.replace("?", "0"), 16)
+        end = int(last or first.replace("?", "F"), 16)
+        found.update(map(chr, range(start, end + 1)))
+    return frozenset(found)
+
+
+def unicode_range(characters: str) -> str:
+    """The CSS `unicode-range` of sorted characters."""
+    runs: list[list[int]] = []
+    for code in map(ord, characters):
+        if runs and code == runs[-1][1] + 1:
+            runs[-1][1] = code
+        else:
+            runs.append([code, code])
+    return ", ".join(f"U+{a:X}" if a == b else f"U+{a:X}-{b:X}" for a, b in runs)
+
+
+def _mathematical(characters: str) -> set[str]:
+    """Characters of formulas with the italics that a browser makes of single letters."""
+    wanted = {*characters, *map(chr, range(0x20, 0x7F)), _RADICAL}
+    return wanted | {italic for c in wanted if (italic := italic_letter(c))}
+
+
+def italic_letter(character: str) -> str:
+    """The italic that `<mi>` sets a letter in, or nothing (MathML Core, appendix C)."""
+    code = ord(character)
+    if character == "h":
+        return "\u210e"
+    if "A" <= character <= "Z":
+        return chr(0x1D434 + code - ord("A"))
+    if "a" <= character <= "z":
+        return chr(0x1D44E + code - ord("a"))
+    if "Α" <= character <= "Ω" and code != 0x3A2:
+        return chr(0x1D6E2 + code - 0x391)
+    if "α" <= character <= "ω":
+        return chr(0x1D6FC + code - 0x3B1)
+    return _ITALIC_SYMBOLS.get(character, "")
+
+
+_RADICAL = "√"
+"""Drawn for roots without standing in their text."""
+
+_ITALIC_SYMBOLS = {
+    "ı": "\U0001d6a4",
+    "ȷ": "\U0001d6a5",
+    "ϴ": "\U0001d6f3",
+    "∇": "\U0001d6fb",
+    "∂": "\U0001d715",
+    "ϵ": "\U0001d716",
+    "ϑ": "\U0001d717",
+    "ϰ": "\U0001d718",
+    "ϕ": "\U0001d719",
+    "ϱ": "\U0001d71a",
+    "ϖ": "\U0001d71b",
+}
+
+
+def _characters(face: Face, data: bytes) -> frozenset[str]:
+    if face.characters:
+        return characters_in(face.characters)
+    from coursebuild.core.pages.cutting import covered
+
+    return covered(data)
+
+
+@functools.lru_cache(maxsize=64)
+def subset_font(job: FontJob) -> bytes:
+    """The font with the job's characters only, as WOFF2. The same job gives the same bytes.
+
+    The job's data may be what `ready_font` made: then it takes a tenth of the time.
+    """
+    return _cut(job, "woff2", _QUALITY)
+
+
+def finest_font(job: FontJob) -> bytes:
+    """The same a hundredth smaller, for twice the time: for fonts that are cut once for all."""
+    return _cut(job, "woff2", 11)
+
+
+def ready_font(job: FontJob) -> bytes:
+    """The font with the job's characters only, to cut smaller ones from; not compressed."""
+    return _cut(job, None, 0)
+
+
+def _cut(job: FontJob, flavor: str | None, quality: int) -> bytes:
+    from coursebuild.core.pages.cutting import cut  # which a run without a new font does not need
+
+    return cut(job.data, job.characters, WEIGHTS.get(job.face.family), flavor, quality)
+
+
+# --------------------------------------------------------------------------------- fallbacks
+
+
+class Fallback(Struct, frozen=True):
+    """Local fonts, alike in their advance widths, that stand in for a face until it is there."""
+
+    family: str
+    """The web font."""
+    style: str
+    locals: tuple[str, ...]
+    width: float
+    """Their mean advance width in em, weighted by `cutting.FREQUENCY`."""
+
+
+FALLBACKS = (
+    Fallback(TEXT, "normal", ("Times New Roman", "Liberation Serif", "Tinos"), 0.39831),
+    Fallback(
+        TEXT,
+        "italic",
+        ("Times New Roman Italic", "Liberation Serif Italic", "Tinos Italic"),
+        0.39993,
+    ),
+    Fallback(CODE, "normal", ("Courier New", "Liberation Mono", "Cousine"), 0.60010),
+)
+"""The widths are those of Liberation Serif and Liberation Mono, which are made to match the
+others."""
+
+
+def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
+    """The `@font-face` rules of cut fonts, each with its address, and of their fallbacks."""
+    rules: list[str] = []
+    files = tuple(files)
+    for job, url in files:
+        face = job.face
+        low, high = WEIGHTS.get(face.family, face.weight)
+        weight = f"{low} {high}" if low != high else str(low)
+        whole = face.unicode_range is None
+        rules.append(
+            f'@font-face{{font-family:"{face.family}";font-style:{face.style};font-weight:{weight};font-display:swap;'
+            f'src:url("{url}") format("woff2")'
+            + ("}" if whole else f";unicode-range:{unicode_range(job.characters)}}}")
+        )
+    rules += [rule for fallback in FALLBACKS for rule in _fallback_rules(fallback, files)]
+    return "\n".join(rules) + "\n"
+
+
+def _measured(job: FontJob) -> tuple[float, float, float, float] | None:
+    from coursebuild.core.pages.cutting import measured
+
+    return measured(job.data)
+
+
+def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
+    """The rule of a fallback, scaled to the face with the Latin letters, where that is used."""
+    wanted = (fallback.family, fallback.style, "latin")
+    for job, _ in files:
+        if (job.face.family, job.face.style, job.face.subset) == wanted:
+            measure = job.face.measure or _measured(job)
+            assert measure is not None
+            scale = measure[0] / fallback.width
+            ascent, descent, gap = (x / scale for x in measure[1:])
+            local = ",".join(f'local("{name}")' for name in fallback.locals)
+            return (
+                f'@font-face{{font-family:"{fallback.family} fallback";'
+                f"font-style:{fallback.style};src:{local};size-adjust:{scale:.2%};"
+                f"ascent-override:{ascent:.2%};descent-override:{descent:.2%};"
+                f"line-gap-override:{gap:.2%}}}",
+            )
+    return ()

@@ -1,0 +1,300 @@
+"""A page without its frame, and the frame: head, site navigation, foot.
+
+Entry points: `Draft`, what the modules of the single kinds of page make; `frame(library, draft,
+names)`, the finished text; `frame_around`, what stands before and after the body; `Frames`, the
+same for many pages.
+
+Pages are drawn in two steps because a page's head names the style sheet by its content, and the
+style sheet holds the fonts' names, which depend on every character of every page.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping
+
+from markupsafe import Markup, escape
+from msgspec import Struct
+
+from coursebuild.core.features import features, is_loaded_late
+from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.draft import Draft as Draft
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.own_pages import own_pages
+from coursebuild.core.text.patterns import pattern
+
+PAGE_WORDS = (
+    "theme.label",
+    "theme.auto",
+    "theme.light",
+    "theme.dark",
+    "code.copy",
+    "code.copied",
+    "code.failed",
+    "offline.changed",
+    "offline.again",
+    "code.mark",
+    "search.open",
+    "search.failed",
+)
+"""Interface texts that the page's script shows."""
+
+_LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
+_PARTS = {
+    "labs": ("data-script=", ("lab.live.", "overlay.", *_LAB_KEYS)),
+    "offline": ("data-keep", ("offline.live.",)),
+    "map": ("data-mark", ("progress.map.",)),
+    "lesson": ('data-progress="lesson"', ("progress.lesson.", "progress.trouble.")),
+    "progress": ('data-progress="overall"', ("progress.live.", "progress.trouble.")),
+    "review": ('data-progress="review"', ("review.live.", "quiz.live.", "progress.trouble.")),
+}
+"""What not every page has and the page's script brings to life: a mark by which it is known in a
+body, and the interface texts that it needs; of some, the beginnings of their keys. Features have
+more of them (`known_parts`)."""
+
+
+class Names(Struct, frozen=True):
+    """Site paths of the files that every page refers to."""
+
+    style: str
+    theme_script: str
+    script: str
+    icon: str
+    credits: str
+    touch_icon: str
+    offline_script: str
+    """Of the page about what is kept."""
+    reader_script: str
+    """Of the pages about the reader's progress."""
+    map_script: str
+    """Of pages that list lessons."""
+    search_script: str
+    """Loaded when a reader opens the search."""
+    feature_scripts: tuple[tuple[str, str], ...] = ()
+    """Of features that have one, by the feature's name."""
+
+    def paths(self) -> frozenset[str]:
+        """The site paths alone."""
+        named = (getattr(self, field) for field in self.__struct_fields__)
+        single = (path for path in named if isinstance(path, str))
+        return frozenset((*single, *(path for _, path in self.feature_scripts)))
+
+
+def policy(json_ld: str, *, form: bool = False) -> str:
+    """The Content-Security-Policy of a page: nothing from elsewhere, no code or style in the page.
+
+    Only a page with a `form` may send one, and only to this site.
+
+    Structured data is no code, but is named by its hash, since checkers take it for some.
+    """
+    digest = base64.b64encode(hashlib.sha256(json_ld.encode()).digest()).decode()
+    data = f" 'sha256-{digest}'" if json_ld else ""
+    return "; ".join(
+        (
+            "default-src 'self'",
+            f"script-src 'self' 'wasm-unsafe-eval'{data}",
+            "style-src 'self'",
+            "img-src 'self' data: blob:",
+            "worker-src 'self' blob:",
+            "object-src 'none'",
+            "base-uri 'none'",
+            "form-action 'self'" if form else "form-action 'none'",
+        )
+    )
+
+
+class NavLink(Struct, frozen=True):
+    """An entry of the site's navigation."""
+
+    href: str
+    text: str
+    current: bool
+
+
+def place_of(library: Library, path: str) -> urls.Place:
+    """The place of a page: the page for missing addresses is served at any depth."""
+    return urls.Place(path, urls.base_path(library.course) if path == urls.NOT_FOUND else None)
+
+
+def frame(library: Library, draft: Draft, names: Names) -> str:
+    """The finished text of a page."""
+    before, after = frame_around(library, draft, names, parts_of(draft.body))
+    return before + visible(draft.body) + after
+
+
+_HERE = Markup("<!--here-->")
+
+
+def known_parts() -> dict[str, tuple[str, tuple[str, ...]]]:
+    """What the page's scripts bring to life: its mark and its interface texts, by name."""
+    return _PARTS | {f.name: (f.mark, f.script_texts) for f in features() if f.mark}
+
+
+def parts_of(body: str) -> tuple[str, ...]:
+    """Which parts with scripts of their own a page's body has: `labs`, `quiz`."""
+    return tuple(part for part, (mark, _) in known_parts().items() if mark in body)
+
+
+def frame_around(
+    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
+) -> tuple[str, str]:
+    """What stands before and after the body of a page with these parts; see `parts_of`."""
+    own = _own_values(library, draft)
+    shared = _shared_values(library, draft, names, parts)
+    return _cut(library.render("base.html", **own, **shared))
+
+
+def _cut(html: str) -> tuple[str, str]:
+    # Nothing else has angle brackets there: texts are escaped, and so is the structured data.
+    before, _, after = visible(html).partition(_HERE)
+    return before, f"{after}\n"
+
+
+def _own_values(library: Library, draft: Draft) -> dict[str, object]:
+    """What the frame of one page shows, and none of another."""
+    course = library.course
+    return {
+        "policy": policy(draft.json_ld, form=draft.kind == "search"),
+        "head_title": meta.head_title(course, draft.title, draft.kind),
+        "description": draft.description,
+        "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
+        "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
+        "json_ld": draft.json_ld,
+        "markdown": urls.encode((urls.markdown_path(draft.path) or "").rpartition("/")[2]),
+    }
+
+
+def _shared_values(
+    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
+) -> dict[str, object]:
+    """What the frames of pages of one kind in one folder show, where no menu has these pages."""
+    course = library.course
+    place = place_of(library, draft.path)
+    return {
+        "kind": draft.kind,
+        "body": _HERE,
+        "language": course.language or "en",
+        "direction": direction(course.language or "en"),
+        "course_key": course.key,
+        "root": place.href(urls.HOME).removesuffix(urls.HOME),
+        "robots": "" if draft.indexed else "noindex",
+        "icon": place.href(names.icon),
+        "style": place.href(names.style),
+        "theme_script": place.href(names.theme_script),
+        "script": place.href(names.script),
+        "feature_scripts": tuple(
+            (name, place.href(path), is_loaded_late(name))
+            for name, path in names.feature_scripts
+            if name in parts
+        ),
+        "search_script": place.href(names.search_script),
+        "manifest": place.href(urls.MANIFEST),
+        "touch_icon": place.href(names.touch_icon),
+        "own_script": place.href(own) if (own := _own_script(draft, names)) else "",
+        "home": place.href(urls.HOME),
+        "credits": place.href(names.credits),
+        "menu": _navigation(library, place, menu=True),
+        "own": _own_navigation(library, place),
+        "more": _navigation(library, place, menu=False),
+        "course": course,
+        "source": course.repository if "{path}" not in course.repository else "",
+        "results": library.results,
+        "page_words": _page_words(library, parts),
+    }
+
+
+def _own_script(draft: Draft, names: Names) -> str:
+    """The script that only pages of this kind have; empty where there is none."""
+    match draft.kind:
+        case "offline":
+            return names.offline_script
+        case "progress" | "review":
+            return names.reader_script
+        case "home" | "level":
+            return names.map_script
+        case _:
+            return ""
+
+
+_ALIKE = ("lesson", "stub", "level", "model")
+"""Kinds of pages that no menu has, so that their frames differ in their own values alone."""
+_SLOT = pattern("\ue000([a-z_]+[0-9]*)\ue001")
+
+
+class Frames:
+    """The frames of many pages: those that are alike are put together from the same pieces."""
+
+    def __init__(self, library: Library, names: Names) -> None:
+        self._library = library
+        self._names = names
+        self._pieces: dict[object, tuple[list[str], list[str]]] = {}
+
+    def around(self, draft: Draft, parts: tuple[str, ...]) -> tuple[str, str]:
+        """See `frame_around`."""
+        if draft.kind not in _ALIKE:
+            return frame_around(self._library, draft, self._names, parts)
+        own = _own_values(self._library, draft)
+        slots, filled = _slots(own)
+        folder = draft.path.rpartition("/")[0]
+        key = (draft.kind, folder, draft.indexed, parts, repr(slots))
+        if key not in self._pieces:
+            shared = _shared_values(self._library, draft, self._names, parts)
+            before, after = _cut(self._library.render("base.html", **slots, **shared))
+            self._pieces[key] = _SLOT.split(before), _SLOT.split(after)
+        before, after = (_joined(pieces, filled) for pieces in self._pieces[key])
+        return before, after
+
+
+def _slots(own: Mapping[str, object]) -> tuple[dict[str, object], dict[str, str]]:
+    """Values that stand for those of one page, and what goes in their places, as HTML."""
+    slots: dict[str, object] = {}
+    filled: dict[str, str] = {}
+
+    def slot(name: str, value: object) -> Markup | str:
+        if not value:
+            return ""
+        filled[name] = visible(escape(value))
+        return Markup(f"\ue000{name}\ue001")
+
+    for name, value in own.items():
+        if isinstance(value, tuple):
+            slots[name] = tuple(
+                (key, slot(f"{name}{number}", text)) for number, (key, text) in enumerate(value)
+            )
+        else:
+            slots[name] = slot(name, value)
+    return slots, filled
+
+
+def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
+    """Every second piece is the name of a slot, or an author's between the same characters."""
+    texts = (p if n % 2 == 0 else filled.get(p, f"\ue000{p}\ue001") for n, p in enumerate(pieces))
+    return "".join(texts)
+
+
+def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
+    """Keys of the texts that the page carries for its scripts."""
+    keys = library.words.keys
+    known = known_parts()
+    needed = [key for part in parts for key in known[part][1]]
+    begun = tuple(key for key in needed if key.endswith("."))
+    found = sorted(key for key in keys if begun and key.startswith(begun))
+    return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
+
+
+def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[NavLink, ...]:
+    """Links to the pages that are in the menu, or to the others."""
+    pages = (page for page in library.course.pages if page.menu is menu)
+    paths = ((urls.page_path(page), page.title) for page in pages)
+    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)
+
+
+def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
+    """Links to what the site adds to the pages of the course."""
+    return tuple(
+        NavLink(place.href(own.path), own.title, own.path == place.path)
+        for own in own_pages(library)
+    )

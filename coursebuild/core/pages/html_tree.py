@@ -1,0 +1,161 @@
+"""HTML as a tree, read as a browser reads it, whatever an author wrote.
+
+Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree.
+
+The parser is Lexbor: it puts in what HTML lets a writer leave out, and mends what is misplaced.
+Comments are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from html import escape
+from typing import TypeAlias
+
+from msgspec import Struct, field
+from selectolax.lexbor import LexborHTMLParser, LexborNode
+
+from coursebuild.core.text.patterns import pattern
+
+VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
+"""Elements that have no content and no end."""
+_RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
+"""Elements in which a text is written as it is."""
+_DEEPEST = 200
+"""Levels of a tree; what lies deeper is brought up, so that whoever walks a tree may recurse."""
+_NAMESPACES = {
+    "svg": "http://www.w3.org/2000/svg",
+    "math": "http://www.w3.org/1998/Math/MathML",
+}
+_XLINK = "http://www.w3.org/1999/xlink"
+_XML_NAME = pattern(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_NOT_XML = pattern("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+
+
+class HtmlElement(Struct):
+    """An element."""
+
+    name: str
+    """In lower case, but for elements of SVG."""
+    attributes: dict[str, str] = field(default_factory=dict)
+    children: list[HtmlContent] = field(default_factory=list)
+
+    @property
+    def classes(self) -> frozenset[str]:
+        """Its classes."""
+        return frozenset(self.attributes.get("class", "").split())
+
+    @property
+    def elements(self) -> Iterator[HtmlElement]:
+        """The elements directly in it."""
+        return (child for child in self.children if isinstance(child, HtmlElement))
+
+    @property
+    def text(self) -> str:
+        """All text in it."""
+        return "".join(child if isinstance(child, str) else child.text for child in self.children)
+
+    def nearest(self, *names: str) -> Iterator[HtmlElement]:
+        """The elements of these names in it, but none inside another of them."""
+        for child in self.elements:
+            if child.name in names:
+                yield child
+            else:
+                yield from child.nearest(*names)
+
+
+HtmlContent: TypeAlias = HtmlElement | str
+"""An element, or a text without markup."""
+
+
+def parse_html(html: str) -> list[HtmlContent]:
+    """What stands in the body of a page with this HTML."""
+    # The parser takes UTF-8. Half a surrogate pair has no form there.
+    page = LexborHTMLParser(f"<!DOCTYPE html><body>{html}".encode("utf-8", "replace").decode())
+    root = HtmlElement("body")
+    if page.body is not None:
+        _read(page.body, root, _DEEPEST)
+    return root.children
+
+
+def _read(parent: LexborNode, into: HtmlElement, levels: int) -> None:
+    node = parent.child
+    while node is not None:
+        if node.is_text_node:
+            text = node.text_content or ""
+            if into.children and isinstance(into.children[-1], str):
+                into.children[-1] += text
+            else:
+                into.children.append(text)
+        elif node.is_element_node:
+            name = node.tag or ""
+            made = HtmlElement(name, {key: value or "" for key, value in node.attributes.items()})
+            into.children.append(made)
+            if levels:
+                _read(node, made, levels - 1)
+            else:
+                _read_flat(node, into)
+        node = node.next
+
+
+def _read_flat(parent: LexborNode, into: HtmlElement) -> None:
+    """The texts in a node, one after the other."""
+    into.children.append(parent.text(deep=True))
+
+
+def to_html(content: Iterable[HtmlContent]) -> str:
+    """A tree as HTML."""
+    return "".join(_html(content, raw=False))
+
+
+def _html(content: Iterable[HtmlContent], *, raw: bool) -> Iterator[str]:
+    for child in content:
+        if isinstance(child, str):
+            yield child if raw else escape(child, quote=False)
+            continue
+        yield f"<{child.name}"
+        for key, value in child.attributes.items():
+            yield f' {key}="{escape(value)}"'
+        yield ">"
+        if child.name not in VOID:
+            if child.name in ("pre", "textarea", "listing"):
+                yield "\n"  # the first line end in these is not part of them
+            yield from _html(child.children, raw=child.name in _RAW)
+            yield f"</{child.name}>"
+
+
+def to_xml(content: Iterable[HtmlContent]) -> str:
+    """A tree as XHTML; what XML has no name for is left out, but for its content."""
+    return "".join(_xml(content))
+
+
+def _xml(content: Iterable[HtmlContent]) -> Iterator[str]:
+    for child in content:
+        if isinstance(child, str):
+            yield _xml_text(child)
+        elif not _XML_NAME.fullmatch(child.name):
+            yield from _xml(child.children)
+        else:
+            yield f"<{child.name}"
+            if child.name in _NAMESPACES:
+                yield f' xmlns="{_NAMESPACES[child.name]}"'
+            for key, value in child.attributes.items():
+                yield _xml_attribute(key, value)
+            if child.name in VOID:
+                yield "/>"
+            else:
+                yield ">"
+                yield from _xml(child.children)
+                yield f"</{child.name}>"
+
+
+def _xml_attribute(name: str, value: str) -> str:
+    space, _, local = name.rpartition(":")
+    if space not in ("", "xml", "xlink") or not _XML_NAME.fullmatch(local) or name == "xmlns":
+        return ""
+    declared = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
+    return f'{declared} {name}="{_xml_text(value).replace(chr(34), "&quot;")}"'
+
+
+def _xml_text(text: str) -> str:
+    return _NOT_XML.sub("\ufffd", escape(text, quote=False))

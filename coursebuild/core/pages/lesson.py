@@ -1,0 +1,152 @@
+"""The page of a lesson: where it stands, what it needs and gives, its text, and the way on.
+
+Entry points: `lesson_inputs`, and for a planned lesson `stub_inputs`.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from coursebuild.core.model import Document, Lesson, Status
+from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.graph import neighbourhood
+from coursebuild.core.pages.library import Library, document_scripts
+from coursebuild.core.pages.owners import owner_links
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.shown import shown
+
+
+class LessonLink(Struct, frozen=True):
+    """A lesson as other pages name it."""
+
+    id: str
+    title: str
+    href: str
+    status: str
+    minutes: int | None
+    summary: str
+    needs: tuple[LessonLink, ...] = ()
+    asked: str = ""
+    """Its questions, where a list names them; see `quiz_index`."""
+
+
+class LessonHead(Struct, frozen=True):
+    """What stands over a lesson."""
+
+    id: str
+    title: str
+    summary: str
+    minutes: int | None
+    objectives: tuple[str, ...]
+
+    @classmethod
+    def of(cls, lesson: Lesson) -> LessonHead:
+        """The head of a lesson of the map."""
+        return cls(lesson.id, lesson.title, lesson.summary, lesson.minutes, lesson.objectives)
+
+
+class LevelName(Struct, frozen=True):
+    """A level as a lesson names it."""
+
+    id: str
+    title: str
+
+
+def lesson_link(
+    library: Library, place: urls.Place, lesson: Lesson, *, needs: bool = False
+) -> LessonLink:
+    """A lesson as a link from a place; with `needs`, its prerequisites as well."""
+    required = (library.lessons[need] for need in lesson.prerequisites) if needs else ()
+    return LessonLink(
+        lesson.id,
+        lesson.title,
+        place.href(urls.lesson_path(lesson)),
+        lesson.status.value,
+        lesson.minutes,
+        lesson.summary,
+        tuple(lesson_link(library, place, need) for need in required),
+    )
+
+
+def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageInputs:
+    """What the page of a written lesson shows; its document's summary is enough."""
+    place = urls.Place(urls.lesson_path(lesson))
+    scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
+    values = {
+        **_common(library, place, lesson),
+        "scripts": scripts,
+        "scripts_zip": place.href(urls.lesson_zip_path(lesson)) if scripts else None,
+        "notebook": place.href(urls.notebook_path(lesson)),
+        "markdown": place.href(urls.markdown_path(place.path) or place.path),
+        "edit": edit_address(library, lesson.path),
+    }
+    return PageInputs(
+        place.path,
+        "lesson",
+        lesson.title,
+        lesson.summary,
+        "lesson.html",
+        values,
+        json_ld=meta.lesson_data(library, lesson),
+        og_type="article",
+        document=document.source.path,
+        shown=shown(library, place, document),
+    )
+
+
+def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
+    """What the page of a planned lesson shows: that it is planned, and what can be read now."""
+    place = urls.Place(urls.lesson_path(lesson))
+    written = [need for need in _ancestors(library, lesson) if need.document is not None]
+    readable = tuple(lesson_link(library, place, need) for need in written)
+    values = {**_common(library, place, lesson), "readable": readable}
+    return PageInputs(
+        place.path, "stub", lesson.title, lesson.summary, "stub.html", values, indexed=False
+    )
+
+
+def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
+    """What a lesson's page says whether it is written or not."""
+    level = library.levels[lesson.level]
+    order, at = library.order, library.positions[lesson.id]
+    return {
+        "lesson": LessonHead.of(lesson),
+        "status": lesson.status.value,
+        "draft": lesson.status is Status.DRAFT,
+        "level": LevelName(level.id, level.title),
+        "home": place.href(urls.HOME),
+        "level_href": place.href(urls.level_path(level)),
+        "needs": lesson_link(library, place, lesson, needs=True).needs,
+        "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
+        "graph": neighbourhood(library, place, lesson),
+        "referrers": owner_links(library, place, library.references.referrers.get(lesson.id, ())),
+        "previous": lesson_link(library, place, order[at - 1]) if at else None,
+        "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,
+    }
+
+
+def _ancestors(library: Library, lesson: Lesson) -> tuple[Lesson, ...]:
+    """Everything that a lesson builds on, in the order of the course."""
+    found: set[str] = set()
+    waiting = list(lesson.prerequisites)
+    while waiting:
+        need = waiting.pop()
+        if need not in found:
+            found.add(need)
+            waiting += library.lessons[need].prerequisites
+    return tuple(other for other in library.order if other.id in found)
+
+
+def edit_address(library: Library, path: str) -> str | None:
+    """Where a file of the course can be edited.
+
+    `{path}` in the repository's address stands for the file; without it the address is that of a
+    repository on a host that keeps to the usual paths.
+    """
+    repository = library.course.repository
+    if not repository:
+        return None
+    if "{path}" in repository:
+        return repository.replace("{path}", urls.encode(path))
+    middle = "/-/edit/main/" if "gitlab" in repository else "/edit/main/"
+    return repository.rstrip("/") + middle + urls.encode(path)

@@ -1,0 +1,284 @@
+"""What a page may have to look up: the course by id, its results, words and templates.
+
+Entry point: `Library.of(course, results, assets)`. It is made once for a site and only read
+afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+from jinja2 import Environment
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.model import (
+    Bench,
+    CalloutKind,
+    Course,
+    Document,
+    Lab,
+    Lesson,
+    Level,
+    Lexicon,
+    Link,
+    ModelTarget,
+    Page,
+    Recording,
+    Script,
+    document_blocks,
+    document_inlines,
+)
+from coursebuild.core.model import document_scripts as document_scripts
+from coursebuild.core.model.results import (
+    CompileResult,
+    Formula,
+    MathError,
+    Results,
+    ScriptRun,
+    Verdict,
+)
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.assets import Assets, strings_for
+from coursebuild.core.pages.lab_files import PublishedLabs, lab_files
+from coursebuild.core.pages.lookup.references import CrossReferences, Mentions, mentions
+from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
+from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.templates import templates_of
+from coursebuild.core.pages.tools import Tools
+from coursebuild.core.text.patterns import pattern
+from coursebuild.numerics.reports import Reports
+
+_OURS = {kind.name: kind for kind in CALLOUTS}
+
+Owner: TypeAlias = Lesson | Page
+"""What a document belongs to."""
+
+
+class ModelUse(Struct, frozen=True):
+    """A document that uses a model, and how."""
+
+    owner: Owner
+    by_lab: bool
+    by_script: bool
+    by_link: bool
+
+
+class Library(Struct, frozen=True):
+    """A course and its results, by name."""
+
+    course: Course
+    results: Results
+    words: Strings
+    templates: Environment
+    lessons: Mapping[str, Lesson]
+    levels: Mapping[str, Level]
+    pages: Mapping[str, Page]
+    callouts: Mapping[str, CalloutKind]
+    models: Mapping[str, CompileResult]
+    scripts: Mapping[str, tuple[Script, Owner]]
+    """By path, in the order of the course."""
+    runs: Mapping[str, ScriptRun]
+    order: tuple[Lesson, ...]
+    """All lessons in the order of the course."""
+    positions: Mapping[str, int]
+    """Where a lesson stands in the order of the course, by id, from 0."""
+    leads: Mapping[str, tuple[Lesson, ...]]
+    """The lessons that need a lesson, by its id."""
+    uses: Mapping[str, tuple[ModelUse, ...]]
+    """Where a model is used, by its name, in the order of the course."""
+    references: CrossReferences
+    asked: QuizIndex
+    """The questions of each document, as lists of lessons name them."""
+    labs: PublishedLabs
+    _formulas: Mapping[Formula, str | MathError]
+    verdicts: Mapping[tuple[str, int], Verdict]
+    """By `place`."""
+    reports: Reports
+    """What was measured on models and hard cases, as far as it fits the course."""
+
+    @classmethod
+    def of(
+        cls,
+        course: Course,
+        results: Results,
+        assets: Assets,
+        reports: Reports | None = None,
+        *,
+        labs: PublishedLabs | None = None,
+        models_of: Callable[[Document], NamedModels] | None = None,
+    ) -> Library:
+        """Look everything over once.
+
+        `labs` are the files of labs, where these are known. `models_of` is `named_models`, or what
+        remembers its results.
+        """
+        formulas = dict(results.formulas)
+        questions: dict[str, str] = {}
+
+        def said(document: Document) -> Mentions:
+            text = quiz_index(document)  # while its blocks are at hand
+            if text:
+                questions[document.source.path] = text
+            return mentions(document, course, lexicon_of(document, formulas))
+
+        references = references_of(course, said)
+        return cls(
+            course=course,
+            results=results,
+            words=strings_for(assets.templates, course.language),
+            templates=templates_of(assets.templates, assets.compiled),
+            lessons={lesson.id: lesson for lesson in course.lessons},
+            levels={level.id: level for level in course.levels},
+            pages={page.id: page for page in course.pages},
+            callouts={kind.name: kind for kind in course.callouts},
+            models=dict(results.models),
+            scripts=course_scripts(course),
+            runs={run.path: run for run in results.runs},
+            order=course.lessons,
+            positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
+            leads=_leads(course),
+            uses=uses_of(course, models_of or named_models),
+            references=references,
+            asked=questions,
+            labs=lab_files(results.labs, assets) if labs is None else labs,
+            _formulas=formulas,
+            verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
+            reports=reports or Reports(),
+        )
+
+    def lexicon(self, document: Document) -> Lexicon:
+        """What a document, or its summary, adds to the glossary and the like."""
+        return lexicon_of(document, self._formulas)
+
+    @property
+    def tools(self) -> Tools:
+        """What pages are drawn with."""
+        return Tools(self.words, self.templates, self._formulas)
+
+    def render(self, template: str, **values: object) -> Markup:
+        """A filled-in template; see `Tools`."""
+        return self.tools.render(template, **values)
+
+    def verdict(self, recording: Recording) -> Verdict | None:
+        """How a recorded output compared with the run; `None` where nobody compared it."""
+        return self.verdicts.get(place(recording))
+
+    def callout_label(self, kind: str) -> str:
+        """The label of a kind of callout: the course's own, else that of the interface."""
+        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+        if theirs is not None and (ours is None or theirs.label != ours.label):
+            return theirs.label
+        return self.words(f"callout.{kind}") if ours is not None else kind.capitalize()
+
+    def callout_promise(self, kind: str) -> str:
+        """What a kind of callout promises; empty where nobody says."""
+        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+        if theirs is not None and (ours is None or theirs.promise != ours.promise):
+            return theirs.promise
+        if self.words.has(f"promise.{kind}"):
+            return self.words(f"promise.{kind}")
+        return ours.promise if ours is not None else ""
+
+
+def owners(course: Course) -> tuple[Owner, ...]:
+    """Everything of the course that has, or may have, a document."""
+    return (*course.lessons, *course.pages)
+
+
+def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) -> Lexicon:
+    """That of a summary, or made from a whole document and its formulas."""
+    if document.lexicon is not None:
+        return document.lexicon
+    from coursebuild.core.pages.lookup.lexicon import lexicon  # with all that it takes to draw
+
+    return lexicon(document, formulas)
+
+
+def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -> CrossReferences:
+    """What the documents of a course say of each other."""
+    return CrossReferences.of(
+        lambda: (
+            (owner, mentions_of(owner.document))
+            for owner in owners(course)
+            if owner.document is not None
+        )
+    )
+
+
+_MODEL_NAMED = pattern(
+    r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?<![\w./-])(?P<file>[\w./-]+)\.xml\b"""
+    r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
+)
+
+
+def models_named(script: Script) -> frozenset[str]:
+    """What may be models in a script.
+
+    What it asks `model_path` for, files that it names, and words that stand in quotes by
+    themselves, which a function of its own may hand on to `model_path`.
+    """
+    found: set[str] = set()
+    for match in _MODEL_NAMED.finditer(script.code.text):
+        name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")
+        found.add(name.removeprefix("models/"))
+    return frozenset(found)
+
+
+class NamedModels(Struct, frozen=True):
+    """What a document names that may be models."""
+
+    by_labs: frozenset[str]
+    by_scripts: frozenset[str]
+    by_links: frozenset[str]
+
+
+def named_models(document: Document) -> NamedModels:
+    """The models that a document may use."""
+    blocks = tuple(document_blocks(document))
+    labs = {block.model for block in blocks if isinstance(block, Lab) and block.model is not None}
+    scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
+    targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
+    links = {target.name for target in targets if isinstance(target, ModelTarget)}
+    shown = {block.model for block in blocks if isinstance(block, Bench)}
+    return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
+
+
+def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
+    """The scripts of a course by path, in order; of two with one path, the first."""
+    found: dict[str, tuple[Script, Owner]] = {}
+    for owner in owners(course):
+        if owner.document is not None:
+            for script in document_scripts(owner.document):
+                found.setdefault(script.path, (script, owner))
+    return found
+
+
+def place(recording: Recording) -> tuple[str, int]:
+    """What a recorded output is found by."""
+    return recording.span.path, recording.span.start
+
+
+def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
+    found: dict[str, list[Lesson]] = {lesson.id: [] for lesson in course.lessons}
+    for lesson in course.lessons:
+        for need in lesson.prerequisites:
+            found[need].append(lesson)
+    return {id: tuple(lessons) for id, lessons in found.items()}
+
+
+def uses_of(
+    course: Course, models_of: Callable[[Document], NamedModels]
+) -> dict[str, tuple[ModelUse, ...]]:
+    """Where each model is used."""
+    found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
+    for owner in owners(course) if found else ():
+        if owner.document is None:
+            continue
+        named = models_of(owner.document)
+        for name in sorted(named.by_labs | named.by_scripts | named.by_links):
+            if name in found:
+                how = (name in named.by_labs, name in named.by_scripts, name in named.by_links)
+                found[name].append(ModelUse(owner, *how))
+    return {name: tuple(uses) for name, uses in found.items()}

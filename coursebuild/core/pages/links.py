@@ -1,0 +1,318 @@
+"""Every internal link, anchor, image and script of the built pages leads somewhere.
+
+Entry points: `check_links(files, base_url)`, which gives what is broken, sorted by page and place;
+`ids_and_addresses`, `references` and `all_lead_somewhere`, by which it is known beforehand that
+nothing is.
+
+1. Each page is read once by a real parser: its ids, and the addresses in it with their lines.
+2. Each address is resolved as a browser would, from the page that has it; those on other hosts are
+   left alone.
+3. It must be a file of the site, and its fragment an id of that page. What is nearest is proposed.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from html import unescape
+from html.parser import HTMLParser
+from typing import TypeAlias
+from urllib.parse import unquote, urljoin, urlsplit
+
+from msgspec import Struct
+
+from coursebuild.core.model import linked_lines
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages import urls
+from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.patterns import pattern
+
+_ADDRESSES = {
+    "a": ("href",),
+    "area": ("href",),
+    "audio": ("src",),
+    "embed": ("src",),
+    "iframe": ("src",),
+    "image": ("href",),
+    "img": ("src", "srcset"),
+    "input": ("src",),
+    "link": ("href",),
+    "object": ("data",),
+    "script": ("src",),
+    "source": ("src", "srcset"),
+    "track": ("src",),
+    "use": ("href",),
+    "video": ("src", "poster"),
+}
+"""Attributes that hold addresses, by element."""
+
+_ORIGIN = "https://site.invalid"
+"""Stands for wherever the site is served from."""
+
+
+Reference: TypeAlias = tuple[str, str]
+"""A site path and an anchor there, or the empty text; an empty path: the address cannot be right.
+"""
+
+
+class BrokenLink(Struct, frozen=True):
+    """An address of a page that leads nowhere."""
+
+    page: str
+    """Site path of the page."""
+    line: int
+    """Its line in the page, from 1."""
+    url: str
+    """As it is written there."""
+    reason: str
+    """What is wrong, lower case, no full stop."""
+    near: str | None
+    """The nearest file or id that is there."""
+
+
+class _Address(Struct, frozen=True):
+    url: str
+    line: int
+
+
+class _Page(Struct, frozen=True):
+    ids: frozenset[str]
+    addresses: tuple[_Address, ...]
+
+
+class _Base(Struct, frozen=True):
+    """Where the site is served."""
+
+    root: str
+    """The address of its root, with `_ORIGIN` for the host."""
+    own: str | None
+    """The host, where it is known."""
+    plain: bool
+    """Whether nothing in the root has to be resolved."""
+
+    @staticmethod
+    @functools.lru_cache(maxsize=8)
+    def of(base_url: str) -> _Base:
+        base = urlsplit(base_url)
+        own = f"{base.scheme}://{base.netloc}" if base.netloc else None
+        folder = f"{base.path.rstrip('/')}/"
+        return _Base(f"{_ORIGIN}{folder}", own, _STEPS.fullmatch(folder, 1) is not None)
+
+
+def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
+    """What is broken in a site that is served at `base_url`."""
+    contents = {file.path: file.data for file in files}
+    pages = {path: _read(data.decode()) for path, data in contents.items() if _is_page(path)}
+    base = _Base.of(base_url)
+    broken = (
+        problem
+        for path, page in pages.items()
+        for address in page.addresses
+        if (problem := _problem(path, address, contents.keys(), pages, base)) is not None
+    )
+    return tuple(sorted(broken, key=lambda b: (b.page, b.line, b.url)))
+
+
+def _is_page(path: str) -> bool:
+    return path.endswith(".html")
+
+
+def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
+    """The ids in the text of a page, and the addresses in it."""
+    page = _quickly_read(html) or _read(html)
+    return page.ids, frozenset(address.url for address in page.addresses)
+
+
+def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:
+    """Where the addresses of a page lead."""
+    base = _Base.of(base_url)
+    found: set[Reference] = set()
+    for url in addresses:
+        if _PLAIN_ANCHOR.fullmatch(url):
+            found.add((path, unquote(url[1:])))
+            continue
+        target = _target(path, url, base)
+        if target is not None:
+            found.add(target if isinstance(target, tuple) else ("", target))
+    return frozenset(found)
+
+
+def all_lead_somewhere(
+    references: Iterable[Reference], files: Container[str], ids: Mapping[str, Collection[str]]
+) -> bool:
+    """Whether references lead to files and, in pages, to ids; `check_links` says which do not."""
+    return all(
+        path in files and (anchor in ("", "top") or path not in ids or has(ids[path], anchor))
+        for path, anchor in references
+    )
+
+
+def has(ids: Collection[str], anchor: str) -> bool:
+    """Whether an anchor is among ids, of which those of lines may be `without_lines`."""
+    if anchor in ids:
+        return True
+    lines = linked_lines(anchor)
+    if lines is None:
+        return False
+    others = (other for name in ids if (other := linked_lines(name)) is not None)
+    return any(stem == lines[0] and lines[2] <= last for stem, _, last in others)
+
+
+def without_lines(ids: Iterable[str]) -> frozenset[str]:
+    """Ids with the last line of each listing for all of its lines."""
+    kept: set[str] = set()
+    longest: dict[str, int] = {}
+    for name in ids:
+        stem, _, line = name.rpartition(".L")
+        if stem.isprintable() and stem and _is_number(line):  # as most are
+            last = int(line)
+        elif ".L" in name and (lines := linked_lines(name)) is not None:
+            stem, _, last = lines
+        else:
+            kept.add(name)
+            continue
+        if last > longest.get(stem, 0):
+            longest[stem] = last
+    return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
+
+
+def _is_number(text: str) -> bool:
+    return text.isdecimal() and text.isascii() and text[0] != "0" and len(text) < 10
+
+
+_STEP = r"[A-Za-z0-9_~@,+-][A-Za-z0-9_.~@,+-]*+"
+_STEPS = pattern(rf"(?:{_STEP}/)*+(?:{_STEP})?")
+_PLAIN_URL = pattern(rf"((?:\.\./)*+)((?:{_STEP}/)*+{_STEP})(?:#([A-Za-z0-9_.~@,+:%-]*+))?")
+"""An address as nearly all are: nothing is encoded before its anchor, and every step leads
+somewhere."""
+_PLAIN_ANCHOR = pattern("#[!-~]*+")
+
+
+@functools.lru_cache(maxsize=8)
+def _folders(path: str) -> tuple[str, ...]:
+    """The folder of a plain path, and those around it, to the root; none of any other path."""
+    steps = path.split("/")[:-1] if _STEPS.fullmatch(path) else None
+    if steps is None:
+        return ()
+    return tuple("".join(f"{step}/" for step in steps[:end]) for end in range(len(steps), -1, -1))
+
+
+def plain_target(path: str, url: str) -> tuple[str, str] | None:
+    """Where an address on a page leads, if both are written as nearly all are; else `None`.
+
+    The site path, and the anchor as it is written: empty where there is none.
+    """
+    plain = _PLAIN_URL.fullmatch(url)
+    if plain is None:
+        return None
+    up, folders = plain.end(1) // 3, _folders(path)
+    return (folders[up] + plain[2], plain[3] or "") if up < len(folders) else None
+
+
+def _target(path: str, url: str, base: _Base) -> Reference | str | None:
+    """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
+    plain = plain_target(path, url) if base.plain else None
+    if plain is not None:
+        return plain[0], unquote(plain[1])
+    try:
+        parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
+    except ValueError:
+        return "the address cannot be read"
+    host = f"{parts.scheme}://{parts.netloc}"
+    if host not in (_ORIGIN, base.own):
+        return None
+    folder = urlsplit(base.root).path
+    if not f"{parts.path}/".startswith(folder):
+        return "the address leads out of the site" if host == _ORIGIN else None
+    target = unquote(parts.path[len(folder) :])
+    if not target or target.endswith("/"):
+        target += urls.HOME
+    return target, unquote(parts.fragment)
+
+
+def _problem(
+    path: str,
+    address: _Address,
+    files: Collection[str],
+    pages: Mapping[str, _Page],
+    base: _Base,
+) -> BrokenLink | None:
+    def broken(reason: str, near: str | None = None) -> BrokenLink:
+        return BrokenLink(path, address.line, address.url, reason, near)
+
+    found = _target(path, address.url, base)
+    if found is None:
+        return None
+    if isinstance(found, str):
+        return broken(found)
+    target, anchor = found
+    if target not in files:
+        return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
+    if anchor in ("", "top") or target not in pages or has(pages[target].ids, anchor):
+        return None
+    return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, pages[target].ids))
+
+
+def _srcset(value: str) -> Iterator[str]:
+    for part in value.split(","):
+        if part.strip():
+            yield part.split()[0]
+
+
+def attribute_targets(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The ids and the addresses in an attribute of an element."""
+    if name == "id" or (name == "name" and tag == "a"):
+        return (value,), ()
+    if name not in _ADDRESSES.get(tag, ()):
+        return (), ()
+    return (), (tuple(_srcset(value)) if name == "srcset" else (value,))
+
+
+class _StartTags(HTMLParser):
+    """Notes where elements begin: a name, attributes, and a line from 1."""
+
+    found: list[tuple[str, list[tuple[str, str | None]], int]]
+
+    def reset(self) -> None:
+        super().reset()
+        self.found = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, attrs, self.getpos()[0]))
+
+
+def _read(html: str) -> _Page:
+    reader = _StartTags(convert_charrefs=True)
+    reader.feed(html)
+    reader.close()
+    ids: set[str] = set()
+    addresses: list[_Address] = []
+    for tag, attributes, line in reader.found:
+        for name, value in attributes:
+            if value is not None:
+                named, urls = attribute_targets(tag, name, value)
+                ids.update(named)
+                addresses += (_Address(url, line) for url in urls)
+    return _Page(frozenset(ids), tuple(addresses))
+
+
+_TAGS = pattern(r"""(?:[^<]++|</|<[a-z][a-z0-9]*+(?:>|(?:\s[\w:-]++(?:="[^"<>]*+")?)*+\s*/?>))*+""")
+_WITH_ATTRIBUTES = pattern(r"<([a-z][a-z0-9]*)(\s[^<>]+)>")
+_ATTRIBUTE = pattern(r"""\s([\w:-]+)="([^"<>]*)\"""")
+_RAW_TEXT = pattern(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
+
+
+def _quickly_read(html: str) -> _Page | None:
+    """The same as `_read` but for the lines, where all tags are written as we write them."""
+    if not _TAGS.fullmatch(html) or _RAW_TEXT.search(html):
+        return None
+    ids: set[str] = set()
+    addresses: list[_Address] = []
+    for tag, attributes in _WITH_ATTRIBUTES.findall(html):
+        if tag not in _ADDRESSES and ' id="' not in attributes:
+            continue
+        for name, value in _ATTRIBUTE.findall(attributes):
+            named, urls = attribute_targets(tag, name, unescape(value))
+            ids.update(named)
+            addresses += (_Address(url, 0) for url in urls)
+    return _Page(frozenset(ids), tuple(addresses))

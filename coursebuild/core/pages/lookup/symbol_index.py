@@ -1,0 +1,73 @@
+"""The index of symbols: what the letters in the formulas of the course stand for, and where.
+
+Entry point: `symbols_inputs`.
+
+Symbols whose meaning a lesson declares come first; the others are listed with their places.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.lookup.references import CourseSymbol
+from coursebuild.core.pages.lookup.symbols import sort_key
+from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, owner_link, owner_links
+from coursebuild.core.pages.page_inputs import PageInputs
+
+
+class MeaningView(Struct, frozen=True):
+    """What a symbol stands for; `places`, where lessons differ in it."""
+
+    text: str
+    unit: str
+    places: OwnerLinks | None
+
+
+class SymbolView(Struct, frozen=True):
+    """A row."""
+
+    symbol: Markup
+    meanings: tuple[MeaningView, ...]
+    first: OwnerLink
+    section: str
+    """The heading under which it stands there; empty before the first."""
+    others: OwnerLinks
+
+
+def symbols_inputs(library: Library) -> PageInputs:
+    """What the index shows."""
+    place = urls.Place(urls.SYMBOLS)
+    rows = [
+        _view(library, place, row)
+        for row in sorted(library.references.symbols, key=lambda row: sort_key(row.symbol))
+    ]
+    values = {
+        "home": place.href(urls.HOME),
+        "declared": tuple(row for row in rows if row.meanings),
+        "undeclared": tuple(row for row in rows if not row.meanings),
+        "glossary": place.href(urls.GLOSSARY) if library.references.terms else "",
+    }
+    title, description = library.words("symbols.title"), library.words("symbols.description")
+    return PageInputs(place.path, "symbols", title, description, "symbols.html", values)
+
+
+def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
+    anchor, section = row.section
+    several = len(row.meanings) > 1
+    return SymbolView(
+        Markup(f"<math>{row.symbol}</math>"),
+        tuple(
+            MeaningView(
+                meaning.text,
+                meaning.unit,
+                owner_links(library, place, meaning.owners) if several else None,
+            )
+            for meaning in row.meanings
+        ),
+        owner_link(place, row.owners[0], anchor),
+        section,
+        owner_links(library, place, row.owners[1:]),
+    )

@@ -1,0 +1,338 @@
+"""Blocks and inlines into HTML.
+
+Entry points: `render_blocks`, `render_inlines`, `render_footnotes`, `render_table`.
+
+What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
+is asked of the context (`look.py`), which may call back for what its blocks hold. All else is
+Markdown, and is written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import zip_longest
+from typing import assert_never
+from urllib.parse import quote
+
+from markupsafe import Markup
+
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    BlockQuote,
+    Callout,
+    Cell,
+    CodeBlock,
+    CodeSpan,
+    Emphasis,
+    FeatureBlock,
+    Footnote,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Lab,
+    Link,
+    ListBlock,
+    ListItem,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Term,
+    Text,
+    ThematicBreak,
+)
+from coursebuild.core.pages.look import Context, Look
+from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
+from coursebuild.core.text.patterns import pattern
+
+_LOOK = Look()
+
+
+def escape(text: str) -> Markup:
+    """Text as HTML, also for attributes in double quotes."""
+    return Markup(_escaped(text))
+
+
+def _escaped(text: str) -> str:
+    """The same as a string; where there is nothing to escape, as is the rule, nothing is copied."""
+    text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
+    return text.replace(">", "&gt;").replace('"', "&quot;")
+
+
+_SIMPLE = pattern('[^0-9&<>"]*+')
+"""Text without quantities, and with nothing to escape."""
+_PLAIN_ANCHOR = pattern("[A-Za-z0-9_.~-]*+")
+
+
+def _quoted(anchor: str) -> str:
+    """An anchor in an address."""
+    return anchor if _PLAIN_ANCHOR.fullmatch(anchor) else quote(anchor)
+
+
+def render_blocks(blocks: Iterable[Block], context: Context, look: Look = _LOOK) -> Markup:
+    """Blocks one after the other, each with its line end."""
+    return Markup(_Writer(context, look).blocks(blocks))
+
+
+def render_inlines(inlines: Iterable[Inline], context: Context, look: Look = _LOOK) -> Markup:
+    """Inlines one after the other."""
+    return Markup(_Writer(context, look).inlines(inlines))
+
+
+def render_table(table: Table, context: Context, look: Look = _LOOK) -> Markup:
+    """A table."""
+    return Markup(_Writer(context, look).table(table))
+
+
+def render_footnotes(footnotes: Iterable[Footnote], context: Context, look: Look = _LOOK) -> Markup:
+    """The footnotes of a document in a section at its end; empty where there are none."""
+    return Markup(_Writer(context, look).footnotes(footnotes))
+
+
+def reference_id(number: int, occurrence: int) -> str:
+    """The id of a reference to a footnote; no anchor made from a heading's text has a colon."""
+    return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
+
+
+def is_tight(block: Block) -> bool:
+    """Whether a block is a paragraph of a tight list."""
+    return isinstance(block, Paragraph) and block.tight
+
+
+class _Writer:
+    """Writes in a context; every string that it gives is HTML."""
+
+    def __init__(self, context: Context, look: Look) -> None:
+        self.context, self.look = context, look
+
+    def blocks(self, blocks: Iterable[Block]) -> str:
+        return "".join(map(self.block, blocks))
+
+    def inlines(self, inlines: Iterable[Inline]) -> str:
+        if not self.look.quantities:
+            return "".join(map(self.inline, inlines))
+        return "".join(self._with_units(tuple(inlines)))
+
+    def _with_units(self, inlines: tuple[Inline, ...]) -> list[str]:
+        """Inlines, of which formulas and bound numbers are held together with their units."""
+        written: list[str] = []
+        taken = 0
+        for inline, after in zip_longest(inlines, inlines[1:]):
+            if isinstance(inline, Text):
+                written.append(self._text(inline.text[taken:]))
+                taken = 0
+                continue
+            html = self.inline(inline)
+            number = isinstance(inline, NumberBinding) or (
+                isinstance(inline, Math) and not inline.display
+            )
+            if number and isinstance(after, Text) and (taken := unit_length(after.text)):
+                html += _escaped(after.text[:taken].replace(" ", "\u00a0"))
+                if self.look.quantities == "rtl":
+                    html = in_order(Markup(html))
+            written.append(html)
+        return written
+
+    def _text(self, text: str) -> str:
+        """Text whose quantities are in one line and in order."""
+        if _SIMPLE.fullmatch(text):  # as most are
+            return text
+        text = joined(text)
+        if self.look.quantities == "ltr":
+            return _escaped(text)
+        pieces = ((_escaped(piece), kept) for piece, kept in quantities(text))
+        return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
+
+    # -- blocks
+
+    def block(self, block: Block) -> str:
+        """One block, with its line end unless it is a paragraph of a tight list."""
+        match block:
+            case Paragraph():
+                inner = self.inlines(block.children)
+                return inner if block.tight else f"<p>{inner}</p>\n"
+            case Heading():
+                return self._heading(block)
+            case ListBlock():
+                return self._list(block)
+            case BlockQuote():
+                return f"<blockquote>\n{self.blocks(block.blocks)}</blockquote>\n"
+            case CodeBlock():
+                return self.context.code(block.language, block.code.text)
+            case HtmlBlock():
+                return block.html
+            case HtmlFlow():
+                return f"{self.inlines(block.children)}\n"
+            case ThematicBreak():
+                return f"<hr{self.look.void_end}\n"
+            case MathBlock():
+                return f"{self.context.display(block.tex.text, block.span.start)}\n"
+            case Table():
+                return self.table(block)
+            case Bench() | Callout() | Lab() | Mjcf() | PlainCode():
+                return self.context.block(block)
+            case Recording() | Script() | FeatureBlock():
+                return self.context.block(block)
+            case _:
+                assert_never(block)
+
+    def _heading(self, heading: Heading) -> str:
+        inner, name = self.inlines(heading.children), f"h{heading.level}"
+        if not self.look.anchors:
+            return f"<{name}>{inner}</{name}>\n"
+        anchor = _escaped(heading.anchor)
+        kinds = f' class="{_escaped(" ".join(heading.classes))}"' if heading.classes else ""
+        label = _escaped(self.look.words.anchor)
+        link = f'<a class="anchor" href="#{_quoted(heading.anchor)}" aria-label="{label}">#</a>'
+        return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
+
+    def _list(self, block: ListBlock) -> str:
+        start = "" if block.start is None or block.start == 1 else f' start="{block.start}"'
+        name = "ul" if block.start is None else "ol"
+        tasks = any(item.checked is not None for item in block.items)
+        mark = ' class="task-list"' if tasks else ""
+        return f"<{name}{start}{mark}>\n{''.join(map(self._item, block.items))}</{name}>\n"
+
+    def _item(self, item: ListItem) -> str:
+        """An item; a tight paragraph stands on the line of what is before it."""
+        parts = ["<li>"]
+        if item.checked is not None:
+            parts.append(self._box(item.checked))
+        line_end = False
+        for block in item.blocks:
+            if not (line_end or (is_tight(block) and len(parts) == 1 + (item.checked is not None))):
+                parts.append("\n")
+            parts.append(self.block(block))
+            line_end = not is_tight(block)
+        return "".join([*parts, "</li>\n"])
+
+    def _box(self, checked: bool) -> str:
+        words = self.look.words
+        label = _escaped(words.done if checked else words.not_done)
+        state = " checked" if checked else ""
+        return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.look.void_end} '
+
+    def table(self, table: Table) -> str:
+        """A table; its columns are aligned by class."""
+        head = self._row(table.header, table, 'th scope="col"')
+        rows = "".join(self._row(row, table, "td") for row in table.rows)
+        body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
+        html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
+        if not self.look.frames:
+            return html
+        label = _escaped(self.look.words.table)
+        return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
+
+    def _row(self, cells: tuple[Cell, ...], table: Table, tag: str) -> str:
+        parts = ["<tr>\n"]
+        for cell, align in zip(cells, table.align, strict=True):
+            mark = f' class="align-{align}"' if align else ""
+            shown = tag if cell.children else "td"  # what is empty is the header of nothing
+            parts.append(f"<{shown}{mark}>{self.inlines(cell.children)}</{shown[:2]}>\n")
+        return "".join([*parts, "</tr>\n"])
+
+    # -- inlines
+
+    def inline(self, inline: Inline) -> str:
+        """One inline."""
+        match inline:
+            case Text():
+                return _escaped(inline.text)
+            case SoftBreak():
+                return "\n"
+            case CodeSpan():
+                return f"<code>{_escaped(inline.text)}</code>"
+            case Math():
+                if inline.display:
+                    return self.context.display(inline.tex.text, inline.span.start)
+                return self.context.math(inline.tex.text)
+            case Term():
+                name = f' id="{_escaped(inline.anchor)}"' if self.look.anchors else ""
+                return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
+            case Emphasis():
+                return f"<em>{self.inlines(inline.children)}</em>"
+            case Strong():
+                return f"<strong>{self.inlines(inline.children)}</strong>"
+            case Strikethrough():
+                return f"<del>{self.inlines(inline.children)}</del>"
+            case Link():
+                return self._link(inline)
+            case Image():
+                return self._image(inline)
+            case RawInline():
+                return inline.html
+            case HardBreak():
+                return f"<br{self.look.void_end}\n"
+            case NumberBinding():
+                return self.context.binding(inline)
+            case FootnoteRef():
+                return self._reference(inline)
+            case _:
+                assert_never(inline)
+
+    def _link(self, link: Link) -> str:
+        title = f' title="{_escaped(link.title)}"' if link.title else ""
+        href = _escaped(self.context.href(link.target))
+        inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
+        bare = self.look.frames and inner == href  # an address that stands for itself
+        own = ' class="url"' if bare else ""
+        return f'<a href="{href}"{title}{own}>{inner}</a>'
+
+    def _image(self, image: Image) -> str:
+        title = f' title="{_escaped(image.title)}"' if image.title else ""
+        url = _escaped(self.context.url(image.url))
+        return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.look.void_end}'
+
+    # -- footnotes
+
+    def _reference(self, reference: FootnoteRef) -> str:
+        number = reference.number
+        label = _escaped(self.look.words.footnote.format(number=number))
+        name = reference_id(number, reference.occurrence)
+        return (
+            f'<sup class="footnote-ref"><a href="#fn:{number}" id="{name}" role="doc-noteref"'
+            f' aria-label="{label}">{number}</a></sup>'
+        )
+
+    def footnotes(self, footnotes: Iterable[Footnote]) -> str:
+        items = "".join(map(self._footnote, footnotes))
+        if not items:
+            return ""
+        label = _escaped(self.look.words.footnotes)
+        start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
+        return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
+
+    def _footnote(self, footnote: Footnote) -> str:
+        """A footnote; the ways back stand at the end of its last paragraph."""
+        back = " ".join(self._back(footnote.number, k + 1) for k in range(footnote.references))
+        last = footnote.blocks[-1] if footnote.blocks else None
+        inner = self.blocks(footnote.blocks[:-1])
+        if isinstance(last, Paragraph):
+            inner += f"<p>{self.inlines(last.children)} {back}</p>\n"
+        else:
+            inner += f"{'' if last is None else self.block(last)}<p>{back}</p>\n"
+        return f'<li id="fn:{footnote.number}">\n{inner}</li>\n'
+
+    def _back(self, number: int, occurrence: int) -> str:
+        words = self.look.words.back if occurrence == 1 else self.look.words.back_again
+        label = _escaped(words.format(number=number, occurrence=occurrence))
+        mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
+        arrow = "↪" if self.look.quantities == "rtl" else "↩"
+        return (
+            f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
+            f' role="doc-backlink" aria-label="{label}">{arrow}{mark}</a>'
+        )

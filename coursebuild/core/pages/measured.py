@@ -1,0 +1,173 @@
+"""What was measured on a model, as its page shows it.
+
+Entry point: `measured_view(library, place, name)`. What was not measured is said to be so, with the
+command that measures it.
+"""
+
+from __future__ import annotations
+
+from markupsafe import Markup, escape
+from msgspec import Struct
+
+from coursebuild.core.model import MjcfModel, scenario_anchor
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.figures import again, factor, power, sentence, size, where, whole
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.scenarios import ScenarioView, scenario_view
+from coursebuild.core.pages.strings import Strings
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
+from coursebuild.numerics.reports.records import bench_path, diet_path
+
+
+class FindingView(Struct, frozen=True):
+    """A finding of the diet."""
+
+    kind: str
+    message: str
+    label: str
+    saving: str
+    scenarios: str
+    proof: str
+    kept: str
+    doubt: str
+    places: tuple[str, ...]
+
+
+class DietView(Struct, frozen=True):
+    """What the model could be without."""
+
+    summary: str
+    findings: tuple[FindingView, ...]
+    where: str
+    command: str
+    file: str
+    """The address of the report."""
+
+
+class MeasuredView(Struct, frozen=True):
+    """All of it."""
+
+    card: tuple[tuple[str, str], ...]
+    """More of the model's facts, as pairs of words."""
+    scenarios: tuple[ScenarioView, ...]
+    waiting: tuple[tuple[str, str], ...]
+    """Of scenarios that are declared, where nothing was measured: id and title."""
+    where: str
+    """Machine and versions; empty where nothing was measured."""
+    command: str
+    """What measures it, again or for the first time."""
+    file: str
+    """The address of the report; empty where there is none."""
+    diet: DietView | None
+    diet_command: str
+
+
+def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasuredView:
+    """What the page of a model shows of its reports."""
+    words, name = library.words, model.name
+    scene, diet = library.reports.scenes.get(name), library.reports.diets.get(name)
+    scenarios = () if scene is None else scene.scenarios
+    declared = _declared(library, name)
+    anchors = {one: scenario_anchor(one) for one in declared}
+    return MeasuredView(
+        card=_card(words, model, scene),
+        scenarios=tuple(
+            scenario_view(words, one, anchors.get(one.name, f"_scenario-{n}"))
+            for n, one in enumerate(scenarios, 1)
+        ),
+        waiting=tuple(
+            (anchors[one], title)
+            for one, title in declared.items()
+            if one not in {scenario.name for scenario in scenarios}
+        ),
+        where="" if scene is None else where(words, scene.machine),
+        command=again("bench", name, "--record"),
+        file="" if scene is None else place.href(urls.file_path(bench_path(name))),
+        diet=None if diet is None else _diet(words, place, diet),
+        diet_command=again("diet", name, "--record"),
+    )
+
+
+def _declared(library: Library, model: str) -> dict[str, str]:
+    """The titles of the scenarios that a model declares, by name."""
+    found = (one for one in library.course.declarations if one.model == model)
+    return {one.name: one.title or one.name for each in found for one in each.scenarios}
+
+
+def _card(
+    words: Strings, model: MjcfModel, scene: SceneReport | None
+) -> tuple[tuple[str, str], ...]:
+    missing = words("measured.not")
+    text = len(model.source.text.encode())
+    card = None if scene is None else scene.card
+    own = None
+    if scene is not None and scene.scenarios:
+        own = next((row.realtime for row in scene.scenarios[0].rows if row.own), None)
+    speed = words("measured.times", factor=factor(own)) if own is not None else missing
+    if card is None:
+        return (
+            (words("measured.possible"), missing),
+            (words("measured.touched"), missing),
+            (words("measured.mjcf_file"), size(text)),
+            (words("measured.native"), speed),
+            (words("measured.browser"), missing),
+        )
+    browser = missing
+    if card.browser is not None:
+        browser = words("measured.times", factor=factor(card.browser))
+    return (
+        (words("measured.possible"), str(card.possible)),
+        (words("measured.touched"), str(card.touched)),
+        (words("measured.mjcf"), size(card.mjcf)),
+        (words("measured.mjb"), size(card.mjb)),
+        (words("measured.native"), speed),
+        (words("measured.browser"), browser),
+    )
+
+
+# --- the diet
+
+
+def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
+    open_ones = sum(one.counts for one in diet.findings)
+    summary = words("measured.diet_open", n=open_ones) if open_ones else words("measured.slim")
+    lost = [f"{one.name}: {'; '.join(one.reasons)}" for one in diet.scenarios if one.status != "ok"]
+    if lost:
+        summary += " " + words("measured.diet_lost", scenarios="; ".join(lost))
+    return DietView(
+        summary,
+        tuple(_finding(words, one) for one in diet.findings),
+        where(words, diet.machine),
+        again("diet", diet.model, "--record"),
+        place.href(urls.file_path(diet_path(diet.model))),
+    )
+
+
+def _finding(words: Strings, one: Finding) -> FindingView:
+    label = escape(one.label)
+    if one.difference:
+        label += Markup(" ({})").format(whole(power(one.difference, 2)))
+    return FindingView(
+        kind=one.kind,
+        message=sentence(one.message),
+        label=label,
+        saving=_saving(words, one.saving),
+        scenarios=", ".join(one.scenarios),
+        proof=one.proof,
+        kept=one.kept,
+        doubt=one.doubt,
+        places=tuple(f"{at.path}:{at.line}" for at in one.places),
+    )
+
+
+def _saving(words: Strings, saving: Saving) -> str:
+    parts = []
+    if saving.time is not None:
+        text = words("measured.saves_time", factor=f"{saving.time:.3g}")
+        parts.append(text if saving.certain else words("measured.saves_none"))
+    if saving.memory:
+        parts.append(words("measured.saves_memory", size=size(saving.memory)))
+    if saving.text:
+        parts.append(words("measured.saves_text", size=size(saving.text)))
+    return ", ".join(parts)

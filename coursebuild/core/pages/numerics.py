@@ -1,0 +1,250 @@
+"""The page of the hard cases: what was measured on MuJoCo, beside what theory says.
+
+Entry point: `numerics_sheet(library)`. There is such a page where hard cases are recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.figures import (
+    FigurePart,
+    Grid,
+    about_reference,
+    again,
+    bounded,
+    exact,
+    grid,
+    percent,
+    power,
+    sentence,
+)
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.scenarios import ORDERS, largest
+from coursebuild.core.pages.strings import Strings
+from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
+from coursebuild.numerics.reports.points import FLOORS, KNOWN, seconds_text, status_text
+from coursebuild.numerics.reports.records import STABILITY_PATH
+
+_QUANTITIES = (
+    ("position", "measured.position"),
+    ("attitude", "measured.attitude"),
+    ("velocity", "measured.velocity"),
+)
+_BOUNDARY = (
+    "measured.largest",
+    "measured.theory",
+    "measured.difference",
+    "measured.beyond",
+    "measured.growth",
+    "measured.remark",
+)
+_FIGURE = ("numerics.measured", "numerics.exact", "measured.difference")
+_Rows = list[tuple[tuple[str, ...], str]]
+"""Cells, and the integrator that they are of."""
+
+
+class CaseView(Struct, frozen=True):
+    """A hard case."""
+
+    name: str
+    title: str
+    about: tuple[str, ...]
+    """What it is and what it was held against, a sentence each."""
+    grids: tuple[Grid, ...]
+    errors: tuple[Grid, ...]
+    """Errors by timestep, which are many."""
+    notes: tuple[str, ...]
+    command: str
+
+
+class CaseGroup(Struct, frozen=True):
+    """Cases of one number."""
+
+    number: int
+    title: str
+    cases: tuple[CaseView, ...]
+
+
+def numerics_inputs(library: Library) -> PageInputs:
+    """What the page of the hard cases shows."""
+    words, place = library.words, urls.Place(urls.NUMERICS)
+    cases = library.reports.cases
+    numbers = sorted({one.case for one in cases})
+    groups = tuple(_group(words, n, [one for one in cases if one.case == n]) for n in numbers)
+    values = {
+        "home": place.href(urls.HOME),
+        "groups": groups,
+        "engine": ", ".join(sorted({one.engine for one in cases})),
+        "file": place.href(urls.file_path(STABILITY_PATH)),
+        "command": again("stability", "--record"),
+    }
+    title = words("numerics.title")
+    return PageInputs(
+        place.path, "numerics", title, words("numerics.description"), "numerics.html", values
+    )
+
+
+def _group(words: Strings, number: int, cases: Sequence[CaseReport]) -> CaseGroup:
+    first = cases[0].title
+    key = f"numerics.case_{number}"
+    title = words(key) if len(cases) > 1 and words.has(key) else first
+    return CaseGroup(number, title, tuple(_case(words, one) for one in cases))
+
+
+def _case(words: Strings, report: CaseReport) -> CaseView:
+    grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
+    return CaseView(
+        report.name,
+        report.title,
+        tuple(_about(words, report)),
+        tuple(one for one in grids if one is not None),
+        tuple(_errors(words, report)),
+        tuple(_notes(words, report)),
+        again("stability", report.name),
+    )
+
+
+def _about(words: Strings, report: CaseReport) -> list[str]:
+    told = [sentence(report.note)] if report.note else []
+    found = report.reference
+    return told if found is None else [*told, *about_reference(words, found.kind, found)]
+
+
+def _merged(rows: _Rows) -> tuple[list[str], list[tuple[str, ...]]]:
+    """The integrators, those of equal rows together, and the rows."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for cells, integrator in rows:
+        together.setdefault(cells, []).append(integrator)
+    return [", ".join(names) for names in together.values()], list(together)
+
+
+def _grid(
+    words: Strings, label: str, titles: Sequence[str], rows: _Rows, *, left: str = ""
+) -> Grid | None:
+    if not rows:
+        return None
+    names, cells = _merged(rows)
+    columns = [(words("measured.integrator"), names)]
+    columns += [(title, [row[n] for row in cells]) for n, title in enumerate(titles)]
+    return grid(label, columns, words=(left,))
+
+
+def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
+    rows = [(_boundary(words, line), line.integrator) for line in report.boundaries]
+    titles = [words(key) for key in _BOUNDARY]
+    label = words("numerics.boundaries", title=report.title)
+    return _grid(words, label, titles, rows, left=words("measured.remark"))
+
+
+def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
+    theory = seconds_text(line.theory) if line.theory else ""
+    if line.formula and not line.theory:
+        theory = words("numerics.all" if line.theory is None else "numerics.none")
+    islands = ""
+    if not line.monotone:
+        shown = ", ".join(seconds_text(float(f"{h:.3g}")) for h in line.islands)
+        islands = words("numerics.islands", times=shown)
+    return (
+        largest(words, line.largest, line.searched),
+        theory,
+        percent(line.difference),
+        status_text(line.beyond) if line.beyond else "",
+        "" if line.growth is None else f"{line.growth:.9f}",
+        islands,
+    )
+
+
+def _figures(words: Strings, report: CaseReport) -> Grid | None:
+    """Quantities that are known."""
+    if not report.figures:
+        return None
+    names: list[str] = []
+    cells: list[tuple[str, ...]] = []
+    parts: list[FigurePart] = []
+    for name in dict.fromkeys(line.name for line in report.figures):
+        lines = [line for line in report.figures if line.name == name]
+        some, rows = _merged([(_figure(words, line), line.integrator) for line in lines])
+        names += some
+        cells += rows
+        unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
+        title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
+        parts.append(FigurePart(title, "; ".join(sources), len(rows)))
+    columns = [(words("measured.integrator"), names)]
+    for n, key in enumerate(_FIGURE):
+        columns.append((words(key), [row[n] for row in cells]))
+    label = words("numerics.figures", title=report.title)
+    return grid(label, columns, parts=tuple(parts))
+
+
+def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
+    measured = words("numerics.infinite") if line.measured is None else exact(line.measured)
+    difference: str = ""
+    if line.exact is not None and line.measured is not None:
+        difference = power(line.measured - line.exact, 2)
+    return measured, exact(line.exact), difference
+
+
+def _orders(words: Strings, report: CaseReport) -> Grid | None:
+    shown = [o for o in report.orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
+    rows: _Rows = []
+    for one in shown:
+        values = (one.position, one.attitude, one.velocity)
+        rows.append((tuple("" if v is None else f"{v:.3f}" for v in values), one.integrator))
+    titles = [words(key) for _, key in ORDERS]
+    return _grid(words, words("numerics.orders", title=report.title), titles, rows)
+
+
+def _errors(words: Strings, report: CaseReport) -> list[Grid]:
+    """Errors by timestep and integrator, a table for each quantity."""
+    found = []
+    least = 0.0 if report.reference is None else FLOORS * report.reference.floor
+    lines = {(one.timestep, one.integrator): one for one in report.errors}
+    steps = sorted({one.timestep for one in report.errors}, reverse=True)
+    names = sorted({one.integrator for one in report.errors}, key=_rank)
+    for quantity, key in _QUANTITIES:
+        if all(getattr(one, quantity) is None for one in report.errors):
+            continue
+        columns = [(words("measured.timestep"), [seconds_text(step) for step in steps])]
+        for name in names:
+            cells = [_error(lines.get((step, name)), quantity, least) for step in steps]
+            columns.append((name, cells))
+        label = words("numerics.errors", quantity=words(key))
+        found.append(grid(label, columns))
+    return found
+
+
+def _rank(name: str) -> int:
+    return KNOWN.index(name) if name in KNOWN else len(KNOWN)
+
+
+def _error(line: ErrorLine | None, quantity: str, least: float) -> str:
+    if line is None:
+        return ""
+    if line.status != "ok":
+        return status_text(line.status)
+    pair: tuple[float, float] | None = getattr(line, quantity)
+    return bounded(None if pair is None else pair[0], least)
+
+
+def _notes(words: Strings, report: CaseReport) -> list[str]:
+    notes = []
+    formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
+    if formulas:
+        notes.append(words("numerics.theory", sources="; ".join(formulas)))
+    softened = sorted({line.timestep for line in report.errors if line.refsafe})
+    if softened:
+        times = ", ".join(seconds_text(step) for step in softened)
+        notes.append(words("measured.refsafe", settings=times))
+    together: dict[tuple[str, ...], list[str]] = {}
+    for line in report.errors:
+        if line.status != "ok":
+            told = (status_text(line.status), *line.reasons)
+            text = f"{line.integrator} at {seconds_text(line.timestep)}"
+            together.setdefault(told, []).append(text)
+    notes += [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
+    return notes

@@ -1,0 +1,176 @@
+"""What makes the site an application that works without a network.
+
+Entry points: `offline_files(course, assets)`: the manifest, its icons and the service worker;
+`file_list(names)`: the list of all files by which the worker knows what there is; `offline_inputs`,
+the page that says what is kept, which is also shown where a page is not.
+
+1. The worker is the same text in every build of the same tool: what changes with a course stands in
+   the list. So an edit of a page changes that page and its line in the list.
+2. The list has three groups. `shell` is what every page needs, `text` what pages show, `rest` what
+   is large, or for those who look closer: the engine and the data of labs, models, scripts. Copies
+   of the course in other forms (archives, books) are in none.
+3. A file whose name holds a hash of its content needs no other; of every other file the list holds
+   the first digits of one.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import FileFacts, FileList, OutputFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Assets, hashed_name, page_script
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageInputs
+
+PAPER = "#fcfbf8"
+"""The ground of a page in light colours, as in the style sheet."""
+
+_FORMAT = 1
+_DIGITS = 12
+"""Of a hash; what is told apart are states of one file."""
+_SHORT = 12
+"""Characters of a name below an icon."""
+_COPIES = (".br", ".gz", ".zip", ".ipynb", ".md", ".imscc")
+_PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
+_NEEDED = (".css", ".js", ".svg")
+_SHOWN = (".html", ".webmanifest", *_PICTURES)
+_LARGE = 1 << 20
+"""Bytes: a page or picture of more is kept for those only who ask for everything."""
+_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt", "llms-full.txt")
+
+
+def offline_files(course: Course, assets: Assets) -> tuple[OutputFile, ...]:
+    """The manifest, its icons, and the service worker."""
+    large = tuple(_icon(assets, f"icon-{side}.png") for side in (192, 512))
+    masked = _icon(assets, "icon-maskable.png")
+    scalable = hashed_name("assets/icon.svg", assets.template("icon.svg").encode())
+    icons = [
+        {"src": scalable, "type": "image/svg+xml", "sizes": "any"},
+        *(
+            {"src": icon.path, "type": "image/png", "sizes": f"{side}x{side}"}
+            for side, icon in zip((192, 512), large, strict=True)
+        ),
+        {"src": masked.path, "type": "image/png", "sizes": "512x512", "purpose": "maskable"},
+    ]
+    manifest = {
+        "id": "./",
+        "name": course.title,
+        "short_name": short_name(course.title),
+        "description": course.summary,
+        "lang": course.language or "en",
+        "dir": direction(course.language or "en"),
+        "start_url": "./",
+        "scope": "./",
+        "display": "standalone",
+        "theme_color": PAPER,
+        "background_color": PAPER,
+        "categories": ["education"],
+        "icons": icons,
+    }
+    text = json.dumps({k: v for k, v in manifest.items() if v}, ensure_ascii=False, indent=1)
+    worker = page_script(assets.file("js/service-worker.js"))
+    return (
+        *large,
+        masked,
+        OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace")),
+        OutputFile(urls.WORKER, worker),
+    )
+
+
+def short_name(title: str) -> str:
+    """As many words of a title as have room below an icon, but at least the first."""
+    words = title.split()
+    found = " ".join(words[:1])
+    for count in range(2, len(words) + 1):
+        longer = " ".join(words[:count])
+        if len(longer) > _SHORT:
+            break
+        found = longer
+    # A word that ends what was cut off joins nothing.
+    return found.rstrip(" ,;:–—-") or title
+
+
+def _icon(assets: Assets, name: str) -> OutputFile:
+    data = assets.file(f"icons/{name}")
+    return OutputFile(hashed_name(f"assets/{name}", data), data)
+
+
+# ---------------------------------------------------------------------------------- the list
+
+
+def file_list(names: Names, key: str) -> FileList:
+    """The list; `key` is a hash of the tool, which says how it is made."""
+    return FileList(urls.FILES, key, functools.partial(listing, shell_of(names)))
+
+
+def shell_of(names: Names) -> frozenset[str]:
+    """What every page needs, but for the fonts, and what is there when nothing else is."""
+    pages = {urls.HOME, urls.OFFLINE, urls.MANIFEST}
+    return frozenset(pages | {path for path in names.paths() if path.endswith(_NEEDED)})
+
+
+def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
+    """The list of files, as JSON with a line for each."""
+    groups: dict[str, dict[str, str]] = {"shell": {}, "text": {}, "rest": {}}
+    sizes = dict.fromkeys(groups, 0)
+    for file in files:
+        group = _group(shell, file)
+        if group is not None:
+            groups[group][file.path] = "" if _is_lasting(file) else file.digest[:_DIGITS]
+            sizes[group] += file.size
+    parts = [f'"format": {_FORMAT}']
+    for name, found in groups.items():
+        parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {_lines(found)}\n}}')
+    return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8", "surrogatepass")
+
+
+def _lines(files: dict[str, str]) -> str:
+    """A line for each file, as `json` writes with an indent of 0, but at once."""
+    text = json.dumps(files, ensure_ascii=False, separators=(",\n", ": "))
+    return f"{{\n{text[1:-1]}\n}}" if files else "{}"
+
+
+def _group(shell: frozenset[str], file: FileFacts) -> str | None:
+    path = file.path
+    if path in _MACHINES or path.endswith(_COPIES) or path == urls.NOT_FOUND:
+        return None
+    if path in shell or path.startswith("assets/fonts/"):
+        return "shell"
+    if path.startswith("assets/"):
+        labs = path.startswith("assets/labs/") and not path.endswith(_PICTURES)
+        return "rest" if labs else "text"
+    shown = path.endswith(_SHOWN) or path == urls.SEARCH_INDEX
+    return "text" if shown and file.size <= _LARGE else "rest"
+
+
+def _is_lasting(file: FileFacts) -> bool:
+    """Whether the name holds the content's hash."""
+    digits = file.path.rpartition(".")[0].rpartition(".")[2]
+    return file.path.startswith("assets/") and digits == file.digest[:8]
+
+
+# ---------------------------------------------------------------------------------- the page
+
+
+def offline_inputs(library: Library) -> PageInputs:
+    """What that page shows; it is complete without a script."""
+    place = urls.Place(urls.OFFLINE)
+    words = library.words
+    values = {"home": place.href(urls.HOME)}
+    title, description = words("offline.title"), words("offline.description")
+    return PageInputs(
+        place.path, "offline", title, description, "offline.html", values, indexed=False
+    )
+
+
+def facts_of(files: Iterable[OutputFile]) -> Iterator[FileFacts]:
+    """What the list says of files whose bytes are there."""
+    for file in sorted(files, key=lambda file: file.path):
+        yield FileFacts(file.path, hashlib.sha256(file.data).hexdigest(), len(file.data))

@@ -1,0 +1,169 @@
+"""A page that is to be drawn, as a value: everything that it shows but the text of its document.
+
+Entry point: `PageInputs`.
+
+A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
+else: so it need be drawn again only when one of these is another. What inputs are made of are plain
+values (texts, numbers, tuples, mappings and data classes of them); what a page looks up in the
+course (where a link leads, what a script printed) stands in it as the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
+
+from markupsafe import Markup
+from msgspec import Struct, field
+
+from coursebuild.core.model import Comparison, Target
+from coursebuild.core.model.results import Outcome
+
+if TYPE_CHECKING:
+    from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+
+
+class ShownRun(Struct, frozen=True):
+    """What a page may say of the run of a script."""
+
+    outcome: Outcome
+    missing: tuple[str, ...]
+    """Modules that are not there."""
+    lines: tuple[tuple[int, str | None], ...] = ()
+    """Lines that it printed, by number from 1, as far as questions of the page ask for them;
+    `None` where there is no such line."""
+
+
+class ShownVerdict(Struct, frozen=True):
+    """What a page says of the comparison of an output."""
+
+    status: Literal["verified", "drift", "volatile", "unchecked"]
+    comparison: Comparison
+
+
+class ShownRecord(Struct, frozen=True):
+    """What a page shows of the trial of a lab."""
+
+    picture: str
+    """Site path."""
+    size: tuple[int, int]
+    """Pixels."""
+    time: float
+    """Simulated time of the picture, s."""
+    readouts: tuple[tuple[str, str], ...]
+    end: float
+    """Simulated time of the readouts and of the end of the plots, s."""
+    plots: tuple[str, ...]
+    """SVG."""
+    tried: int
+    parity: str
+
+
+class ShownLab(Struct, frozen=True):
+    """A lab that runs."""
+
+    name: str
+    config: str
+    """Site path, as of `script`."""
+    script: str
+    record: ShownRecord | None
+
+
+class ShownBench(Struct, frozen=True):
+    """What a page shows of a report."""
+
+    href: str
+    """Where the model's page shows the same."""
+    report: ScenarioReport | None
+    """`None` where none fits the course."""
+    machine: Machine | None
+    """Where it was measured."""
+
+
+class ShownCallout(Struct, frozen=True):
+    """The words of a kind of callout."""
+
+    label: str
+    promise: str
+
+
+class ShownDocument(Struct, frozen=True):
+    """What the page of a document shows of the rest of the course, and of what running it found.
+
+    What stands at a place in the document goes by its offset there.
+    """
+
+    engine: str = ""
+    """Version of MuJoCo."""
+    python: str = ""
+    hrefs: Mapping[Target, str] = field(default_factory=dict)
+    """Addresses of links, as seen from the page."""
+    equations: Mapping[Target, str] = field(default_factory=dict)
+    """What links to formulas of other pages say, where they have no text."""
+    callouts: Mapping[str, ShownCallout] = field(default_factory=dict)
+    runs: Mapping[str, ShownRun] = field(default_factory=dict)
+    """By path of the script."""
+    verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
+    labs: Mapping[int, ShownLab] = field(default_factory=dict)
+    benches: Mapping[int, ShownBench] = field(default_factory=dict)
+    keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the keyframes of models, by the model's name."""
+    address: str = ""
+    """The page's full address; empty where nobody knows where the site will stand."""
+
+
+class Highlighted(Struct, frozen=True):
+    """A file whose tokens are marked when the page is drawn."""
+
+    language: str
+    text: str
+    path: str
+    """By which its lines are linked to."""
+
+
+class Plotted(Struct, frozen=True):
+    """Work–precision plots, drawn when the page is: two of each, for wide and narrow screens."""
+
+    reports: tuple[ScenarioReport, ...]
+
+
+class GraphNode(Struct, frozen=True):
+    """A lesson in a drawing of lessons."""
+
+    id: str
+    title: str
+    href: str
+    status: str
+    current: bool
+    """Whether it is the lesson of the page."""
+    outside: bool
+    """Whether it is of another level than the page's."""
+
+
+class Graphed(Struct, frozen=True):
+    """Which lessons build on which, drawn when the page is: for wide and narrow screens."""
+
+    nodes: tuple[GraphNode, ...]
+    """In the order of the course."""
+    edges: tuple[tuple[str, str], ...]
+    """Ids: what is needed, and what needs it."""
+
+
+class PageInputs(Struct, frozen=True):
+    """A page that is to be drawn."""
+
+    path: str
+    """Its site path."""
+    kind: str
+    """See `Draft`."""
+    title: str
+    description: str
+    template: str
+    values: Mapping[str, object]
+    """For the template; `Highlighted`, `Plotted` and `Graphed` among them are drawn first."""
+    json_ld: Markup = Markup()
+    og_type: str = "website"
+    indexed: bool = True
+    document: str | None = None
+    """The path of its document, whose text and contents the template gets as well."""
+    shown: ShownDocument | None = None

@@ -1,0 +1,195 @@
+"""The pages around the lessons: home, levels, models, other pages, and that of missing addresses.
+
+Entry points: `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`, `not_found_inputs`, what
+each shows.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.frame import place_of
+from coursebuild.core.pages.graph import of_level
+from coursebuild.core.pages.labs import number
+from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
+from coursebuild.core.pages.library import Library, ModelUse
+from coursebuild.core.pages.measured import measured_view
+from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, Plotted
+from coursebuild.core.pages.shown import shown
+
+
+class LevelView(Struct, frozen=True):
+    """A level and its lessons."""
+
+    id: str
+    title: str
+    summary: str
+    href: str
+    lessons: tuple[LessonLink, ...]
+    written: int
+
+
+class CourseHead(Struct, frozen=True):
+    """What stands over the course map."""
+
+    title: str
+    summary: str
+
+
+class Named(Struct, frozen=True):
+    """A link with its text, and a remark on it."""
+
+    href: str
+    text: str
+    remark: str = ""
+
+
+def home_inputs(library: Library) -> PageInputs:
+    """What the home page shows: the course map."""
+    course = library.course
+    place = urls.Place(urls.HOME)
+    written = [lesson for lesson in library.order if lesson.document is not None]
+    values = {
+        "course": CourseHead(course.title, course.summary),
+        "levels": tuple(level_view(library, place, level) for level in course.levels),
+        "start": lesson_link(library, place, written[0]) if written else None,
+        "total": len(library.order),
+        "written": len(written),
+        "models": tuple(
+            Named(place.href(urls.model_page_path(m.name)), m.name) for m in course.models
+        ),
+        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
+        "scripts": len(library.scripts),
+        "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
+    }
+    data = meta.course_data(library)
+    return PageInputs(
+        urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data
+    )
+
+
+def level_inputs(library: Library, level: Level) -> PageInputs:
+    """What the page of a level shows."""
+    place = urls.Place(urls.level_path(level))
+    levels = library.course.levels
+    at = next(i for i, other in enumerate(levels) if other.id == level.id)
+    view = level_view(library, place, level)
+    heads = map(LessonHead.of, level.lessons)
+    values = {
+        "home": place.href(urls.HOME),
+        "level": view,
+        "entries": tuple(zip(heads, view.lessons, strict=True)),
+        "graph": of_level(library, place, level),
+        "previous": _level_link(library, place, levels[at - 1]) if at else None,
+        "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
+    }
+    title = f"{library.words('level.label', id=level.id)}: {level.title}"
+    return PageInputs(place.path, "level", title, level.summary, "level.html", values)
+
+
+def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
+    label = library.words("level.label", id=level.id)
+    return Named(place.href(urls.level_path(level)), level.title, label)
+
+
+def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
+    """A level with its lessons, as seen from a place."""
+    return LevelView(
+        level.id,
+        level.title,
+        level.summary,
+        place.href(urls.level_path(level)),
+        tuple(
+            replace(
+                lesson_link(library, place, lesson, needs=True),
+                asked=library.asked.get(lesson.path, ""),
+            )
+            for lesson in level.lessons
+        ),
+        sum(lesson.status is not Status.PLANNED for lesson in level.lessons),
+    )
+
+
+def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
+    """What the page of a model shows: what it holds, its text, where it is used."""
+    place = urls.Place(urls.model_page_path(model.name))
+    compiled = library.models.get(model.name)
+    title = library.words("model.title", name=model.name)
+    scene = library.reports.scenes.get(model.name)
+    values = {
+        "home": place.href(urls.HOME),
+        "name": model.name,
+        "path": model.source.path,
+        "anchor": listing_anchor(model.source.path),
+        "title": title,
+        "href": place.href(urls.model_file_path(model.name)),
+        "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
+        "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
+        "measured": measured_view(library, place, model),
+        "plots": Plotted(() if scene is None else scene.scenarios),
+        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
+        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
+    }
+    return PageInputs(place.path, "model", title, "", "model.html", values)
+
+
+def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
+    """What a compiled model holds, as pairs of words."""
+    words = library.words
+    unnamed = words("model.unnamed")
+    rows = (
+        (words("model.bodies"), str(facts.bodies)),
+        (words("model.geoms"), str(facts.geoms)),
+        (words("model.joints"), str(facts.joints)),
+        (words("model.coordinates"), str(facts.nq)),
+        (words("model.freedom"), str(facts.nv)),
+        (words("model.actuators"), str(facts.nu)),
+        (words("model.mass"), f"{number(facts.total_mass)} kg"),
+        (words("model.timestep"), f"{number(facts.timestep)} s"),
+        (words("model.integrator"), facts.integrator),
+        (words("model.keyframes"), ", ".join(name or unnamed for name in facts.keyframes)),
+        (words("model.sites"), ", ".join(name or unnamed for name in facts.sites)),
+        (words("model.includes"), ", ".join(facts.includes)),
+    )
+    return tuple((label, value) for label, value in rows if value)
+
+
+def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
+    words = library.words
+    ways = (
+        ("model.by_lab", use.by_lab),
+        ("model.by_script", use.by_script),
+        ("model.by_link", use.by_link),
+    )
+    remark = ", ".join(words(key) for key, is_so in ways if is_so)
+    if isinstance(use.owner, Lesson):
+        text = f"{words('lesson.label', id=use.owner.id)}: {use.owner.title}"
+        return Named(place.href(urls.lesson_path(use.owner)), text, remark)
+    return Named(place.href(urls.page_path(use.owner)), use.owner.title, remark)
+
+
+def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
+    """What a page that is no lesson shows; its document's summary is enough."""
+    place = urls.Place(urls.page_path(page))
+    return PageInputs(
+        place.path,
+        "page",
+        page.title,
+        "",
+        "page.html",
+        {"title": page.title, "edit": edit_address(library, page.path)},
+        document=document.source.path,
+        shown=shown(library, place, document),
+    )
+
+
+def not_found_inputs(library: Library) -> PageInputs:
+    """What the page for missing addresses shows."""
+    place = place_of(library, urls.NOT_FOUND)
+    values = {"home": place.href(urls.HOME)}
+    title = library.words("notfound.title")
+    return PageInputs(urls.NOT_FOUND, "notfound", title, "", "notfound.html", values, indexed=False)

@@ -1,0 +1,108 @@
+"""Numbers and their units in running text: in one line, and in order in text from the right.
+
+Entry points: `text_html(text, direction)`; its steps `joined` and `quantities`; `unit_length`;
+`in_order(html)`.
+
+1. No line ends between a number and its unit, nor inside a unit (`kg m²`): the space becomes one
+   that does not break.
+2. In text from the right a sign, or a unit, would come to stand on the wrong side of its number,
+   since neither belongs to the one direction or the other. Such a quantity is a text of its own.
+
+Units are those of the SI, those used with it, and a few of computing; a single letter that is a
+word or a label (`Figure 2 A`) loses nothing by a space that does not break.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from markupsafe import Markup, escape
+
+from coursebuild.core.text.patterns import pattern
+
+_PREFIXED = (
+    "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
+    "(?:bar|cd|eV|Gy|Hz|kat|lm|lx|mol|Pa|rad|sr|Sv|Wb|[ACFgHJKLlmNSsTtVW\u03a9\u2126])"
+)
+_UNIT = (
+    rf"(?:{_PREFIXED}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
+    r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
+)
+_SPACE = " \u00a0\u202f"
+_SPACES = f"[{_SPACE}]"
+_END = r"(?![^\W_])"
+_UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}(?:{_SPACES}{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}){{0,3}}"
+_NUMBER = (
+    r"[0-9][0-9.,]*(?<![.,])(?:[eE][+-]?[0-9]+|[ \u00a0\u2009]?[×·][ \u00a0\u2009]?10"
+    r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
+)
+
+_ONE_UNIT = pattern(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
+_AFTER_DIGIT = pattern("[0-9] ")
+_QUANTITY = pattern(
+    rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
+)
+_LATIN_BEFORE = pattern("[A-Za-z]\\s*$")
+
+
+def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
+    """Text as HTML, where text runs in a direction."""
+    text = joined(text)
+    if direction == "ltr":
+        return escape(text)
+    pieces = ((escape(piece), kept) for piece, kept in quantities(text))
+    return Markup("").join(in_order(piece) if kept else piece for piece, kept in pieces)
+
+
+def in_order(html: Markup) -> Markup:
+    """What runs from the left wherever it stands."""
+    return Markup('<bdi dir="ltr">') + html + Markup("</bdi>")
+
+
+def joined(text: str) -> str:
+    """The text with no line end between a number and its unit, nor inside the unit."""
+    parts: list[str] = []
+    at = 0
+    for space in _AFTER_DIGIT.finditer(text):
+        start = space.start() + 1
+        end = _units_end(text, start + 1) if start >= at else 0
+        if end:
+            parts += (text[at:start], text[start:end].replace(" ", "\u00a0"))
+            at = end
+    return "".join((*parts, text[at:])) if parts else text
+
+
+def _units_end(text: str, at: int) -> int:
+    """Where the units end that begin at a place (`_UNITS`); 0 where none does."""
+    found = _ONE_UNIT.match(text, at)
+    if found is None:
+        return 0
+    for _ in range(3):
+        more = _ONE_UNIT.match(text, found.end() + 1)
+        if more is None or text[found.end()] not in _SPACE:
+            break
+        found = more
+    return found.end()
+
+
+def unit_length(text: str) -> int:
+    """How many characters at the start of a text are the unit of a number that stands before it."""
+    return _units_end(text, int(text[:1] in _SPACE)) if text else 0
+
+
+def quantities(text: str) -> Iterator[tuple[str, bool]]:
+    """The text in pieces, each with whether it is a quantity that must be kept in order.
+
+    A number after a word in Latin letters is in its order already.
+    """
+    at = 0
+    for found in _QUANTITY.finditer(text):
+        if _LATIN_BEFORE.search(text, at, found.start()):
+            continue
+        if found.start() > at:
+            yield text[at : found.start()], False
+        yield found[0], True
+        at = found.end()
+    if at < len(text):
+        yield text[at:], False

@@ -1,0 +1,77 @@
+"""The pages that are about the reader: what is read and answered, and what to go over again.
+
+Entry points: `progress_inputs`, `review_inputs`, what each shows.
+
+Nothing of a reader is known here. The pages list the lessons with their questions, say what is kept
+and where, and hold places that the page's script fills from the reader's own browser.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from coursebuild.core.model import Lesson
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library, owners
+from coursebuild.core.pages.owners import owner_path
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.pages import level_view
+from coursebuild.core.pages.quiz_index import count
+
+KEPT_AS = "coursebuild.progress."
+"""What the name under which a browser keeps progress begins with; the course's key follows. As in
+site/js/progress/store.js."""
+
+
+class Asking(Struct, frozen=True):
+    """A lesson or page with questions."""
+
+    id: str
+    """Of a lesson; empty for another page."""
+    title: str
+    href: str
+    asked: str
+    """See `quiz_index`."""
+    questions: int
+
+
+def progress_inputs(library: Library) -> PageInputs:
+    """What the page of the reader's progress shows: all lessons, by level."""
+    place, words = urls.Place(urls.PROGRESS), library.words
+    values = {
+        "home": place.href(urls.HOME),
+        "levels": tuple(level_view(library, place, level) for level in library.course.levels),
+        "pages": tuple(one for one in _asking(library, place) if not one.id),
+        "review": place.href(urls.REVIEW) if library.asked else "",
+        "name": KEPT_AS + library.course.key,
+    }
+    title, description = words("progress.title"), words("progress.description")
+    return PageInputs(
+        place.path, "progress", title, description, "progress.html", values, indexed=False
+    )
+
+
+def review_inputs(library: Library) -> PageInputs:
+    """What the page of the review shows: where questions are, and when missed ones come back."""
+    place, words = urls.Place(urls.REVIEW), library.words
+    values = {
+        "home": place.href(urls.HOME),
+        "pages": _asking(library, place),
+        "progress": place.href(urls.PROGRESS),
+    }
+    title, description = words("review.title"), words("review.description")
+    return PageInputs(
+        place.path, "review", title, description, "review.html", values, indexed=False
+    )
+
+
+def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
+    """Everything with questions, in the order of the course."""
+    found = []
+    for owner in owners(library.course):
+        text = library.asked.get(owner.path, "")
+        if text:
+            id = owner.id if isinstance(owner, Lesson) else ""
+            href = place.href(owner_path(owner))
+            found.append(Asking(id, owner.title, href, text, count(text)))
+    return tuple(found)

@@ -1,0 +1,199 @@
+"""A scenario that was measured, as pages show it: of a model's page, and of a lesson's `bench`.
+
+Entry point: `scenario_view(words, report, anchor)`; `largest`, a largest stable timestep in words.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from coursebuild.core.pages.figures import (
+    Grid,
+    about_reference,
+    bounded,
+    factor,
+    grid,
+    percent,
+    power,
+    said,
+    sentence,
+)
+from coursebuild.core.pages.strings import Strings
+from coursebuild.numerics.reports.bench import (
+    OrderRow,
+    ScenarioReport,
+    StableRow,
+    WorkPrecisionRow,
+)
+from coursebuild.numerics.reports.points import (
+    FEWEST_STEPS,
+    Quantity,
+    is_cut_short,
+    quantities,
+    seconds_text,
+    setting_text,
+    solving_parts,
+    status_text,
+    usual_setting,
+)
+
+_QUANTITIES = {
+    "seen": "measured.seen",
+    "position": "measured.position",
+    "attitude": "measured.attitude",
+    "velocity": "measured.velocity",
+}
+ORDERS = (
+    ("position", "measured.order_position"),
+    ("attitude", "measured.order_attitude"),
+    ("velocity", "measured.order_velocity"),
+)
+"""Orders that are fitted, with their titles."""
+
+
+class ScenarioView(Struct, frozen=True):
+    """A scenario."""
+
+    anchor: str
+    """Its id."""
+    name: str
+    title: str
+    about: tuple[str, ...]
+    """How long it takes and what it was held against, a sentence each."""
+    verdict: str
+    settings: Grid
+    notes: tuple[str, ...]
+    """Of runs that say nothing, or of another model."""
+    orders: Grid | None
+    stable: Grid | None
+
+
+def scenario_view(words: Strings, report: ScenarioReport, anchor: str) -> ScenarioView:
+    """What a page shows of a scenario; `anchor` is its id there, if it has one."""
+    return ScenarioView(
+        anchor=anchor,
+        name=report.name,
+        title=report.title or report.name,
+        about=tuple(_about(words, report)),
+        verdict=sentence(report.verdict.text),
+        settings=_settings(words, report),
+        notes=tuple(_notes(words, report)),
+        orders=_orders(words, report.orders),
+        stable=_stable(words, report),
+    )
+
+
+def _about(words: Strings, report: ScenarioReport) -> list[str]:
+    told = [words("measured.duration", time=seconds_text(report.duration))]
+    if report.horizon < report.duration:
+        told.append(words("measured.horizon", time=seconds_text(report.horizon)))
+        if report.lyapunov is not None:
+            told.append(said(words, "measured.chaotic", rate=power(report.lyapunov)))
+    if report.hold:
+        told.append(words("measured.hold", time=seconds_text(report.hold)))
+    usual = usual_setting(report.rows)
+    parts = [] if usual is None else solving_parts(usual)
+    if parts:
+        told.append(words("measured.usual", setting=", ".join(parts)))
+    return [*told, *about_reference(words, report.reference, report)]
+
+
+def _settings(words: Strings, report: ScenarioReport) -> Grid:
+    rows, usual = report.rows, usual_setting(report.rows)
+
+    def error(quantity: Quantity) -> tuple[str, list[str]]:
+        found: list[str] = [bounded(quantity.of(row), quantity.least) for row in rows]
+        key = _QUANTITIES.get(quantity.name)
+        return quantity.label if key is None else words(key), found
+
+    remarks = words("measured.remark")
+    columns: list[tuple[str, list[str]]] = [
+        (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
+        (words("measured.cost"), ["" if r.cost is None else f"{r.cost:.3g}" for r in rows]),
+        (words("measured.realtime"), [factor(row.realtime) for row in rows]),
+        *(error(quantity) for quantity in quantities(report) if _is_known(quantity, report)),
+        (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
+        (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
+        (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
+        (words("measured.slip"), [power(row.slip, 2) for row in rows]),
+        (words("measured.model_error"), [power(row.model_error, 2) for row in rows]),
+        (remarks, [_remark(words, report, row) for row in rows]),
+    ]
+    marked = tuple(n for n, row in enumerate(rows) if row.own)
+    label = words("measured.settings", title=report.title or report.name)
+    return grid(label, columns, words=(remarks,), marked=marked)
+
+
+def _is_known(quantity: Quantity, report: ScenarioReport) -> bool:
+    """Whether any error is more than what the reference does not resolve."""
+    errors = (quantity.of(row) for row in report.rows)
+    return any(one is not None and one > quantity.least * (1 + 1e-9) for one in errors)
+
+
+def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
+    parts = [words("measured.own")] if row.own else []
+    if row.status != "ok":
+        parts.append(status_text(row.status))
+    if row.refsafe:
+        parts.append("refsafe")
+    if row.front:
+        parts.append(words("measured.front"))
+    elif row.dominated_by is not None:
+        better = report.rows[row.dominated_by].setting
+        parts.append(words("measured.better", setting=setting_text(better, row.setting)))
+    return "; ".join(parts)
+
+
+def _notes(words: Strings, report: ScenarioReport) -> list[str]:
+    """Why runs were lost, those with the same reasons together."""
+    usual = usual_setting(report.rows)
+    together: dict[tuple[str, ...], list[str]] = {}
+    for row in report.rows:
+        if row.status != "ok":
+            told = (status_text(row.status), *row.reasons)
+            together.setdefault(told, []).append(setting_text(row.setting, usual))
+    notes = [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
+    softened = [setting_text(row.setting, usual) for row in report.rows if row.refsafe]
+    if softened:
+        notes.append(words("measured.refsafe", settings="; ".join(softened)))
+    return notes
+
+
+def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
+    shown = [o for o in orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
+    if not shown:
+        return None
+    columns = [(words("measured.integrator"), [one.integrator for one in shown])]
+    for name, key in ORDERS:
+        found: list[float | None] = [getattr(one, name) for one in shown]
+        cells = ["" if value is None else f"{value:.2f}" for value in found]
+        columns.append((words(key), cells))
+    return grid(words("measured.orders"), columns)
+
+
+def _stable(words: Strings, report: ScenarioReport) -> Grid | None:
+    rows = report.stable
+    if not rows:
+        return None
+    again, short = words("measured.islands"), is_cut_short(report)
+
+    def remark(one: StableRow) -> str:
+        if one.largest is None and short:
+            return words("measured.stable_short", steps=FEWEST_STEPS)
+        return "" if one.monotone else again
+
+    columns = [
+        (words("measured.integrator"), [one.integrator for one in rows]),
+        (words("measured.largest"), [largest(words, one.largest, one.searched) for one in rows]),
+        (words("measured.remark"), [remark(one) for one in rows]),
+    ]
+    return grid(words("measured.stable"), columns, words=(words("measured.remark"),))
+
+
+def largest(words: Strings, value: float | None, searched: tuple[float, float]) -> str:
+    """A largest stable timestep in words."""
+    if value is None:
+        return words("measured.stable_all", time=seconds_text(searched[1]))
+    if value == 0:
+        return words("measured.stable_none", time=seconds_text(searched[0]))
+    return seconds_text(value)

@@ -1,0 +1,286 @@
+"""A document as sections that are searched.
+
+Entry point: `document_sections(document, lead, labels, measured)`.
+
+1. The blocks are walked in order, what stands in containers included; a heading begins a section.
+2. Formulas become lines of plain text (`tex`); the names of their commands are kept beside.
+3. Answers and explanations of quizzes are left out: a search must not give them away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from html import unescape
+from typing import assert_never
+
+from coursebuild.core.features import kind_of_block
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    BlockQuote,
+    Callout,
+    CodeBlock,
+    Document,
+    Emphasis,
+    FeatureBlock,
+    FootnoteRef,
+    HardBreak,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Image,
+    Inline,
+    Lab,
+    Link,
+    ListBlock,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    RawInline,
+    Recording,
+    Script,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Term,
+    Text,
+    ThematicBreak,
+)
+from coursebuild.core.model.inlines import CodeSpan
+from coursebuild.core.pages.html_tree import HtmlContent, parse_html
+from coursebuild.core.pages.search.tex import plain_formula
+from coursebuild.core.pages.search.values import Kind, Section, SectionPiece
+from coursebuild.core.text.patterns import pattern
+
+_TAG = pattern(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
+
+
+def document_sections(
+    document: Document,
+    lead: Iterable[str],
+    labels: Mapping[str, str],
+    measured: Mapping[int, str] | None = None,
+) -> tuple[Section, ...]:
+    """The sections of a document.
+
+    Args:
+        document: with its prose, not its summary.
+        lead: paragraphs that stand above the document on its page.
+        labels: of the kinds of callouts, by name.
+        measured: what the reports that it shows are about, by their offset.
+    """
+    reader = SectionReader(labels, measured or {})
+    for text in lead:
+        reader.add("text", text)
+    reader.blocks(document.blocks)
+    for footnote in document.footnotes:
+        reader.blocks(footnote.blocks)
+    return reader.ended()
+
+
+class SectionReader:
+    """Collects the sections of a document."""
+
+    def __init__(self, labels: Mapping[str, str], measured: Mapping[int, str]) -> None:
+        self._labels = labels
+        self._measured = measured
+        self._done: list[Section] = []
+        self._begin("", "", 0)
+
+    def _begin(self, anchor: str, heading: str, level: int) -> None:
+        self._anchor, self._heading, self._level = anchor, heading, level
+        self._pieces: list[SectionPiece] = []
+        self._also: dict[str, None] = {}
+
+    def ended(self) -> tuple[Section, ...]:
+        """All sections; one with nothing in it only where it has a heading."""
+        if self._anchor or self._pieces or not self._done:
+            pieces, also = tuple(self._pieces), tuple(self._also)
+            self._done.append(Section(self._anchor, self._heading, self._level, pieces, also))
+        return tuple(self._done)
+
+    def add(self, kind: Kind, text: str) -> None:
+        """A piece of the section, unless there is nothing in it."""
+        text = text.strip("\n").rstrip() if kind in ("code", "output") else _line(text)
+        if text:
+            self._pieces.append(SectionPiece(kind, text))
+
+    def blocks(self, blocks: Iterable[Block]) -> None:
+        """Blocks in order."""
+        for block in blocks:
+            self._block(block)
+
+    def _block(self, block: Block) -> None:
+        match block:
+            case Paragraph() | HtmlFlow():
+                self.add("text", self.text(block.children))
+            case Heading():
+                heading = _line(self.text(block.children))
+                self.ended()
+                self._begin(block.anchor, heading, block.level)
+            case ListBlock():
+                for item in block.items:
+                    self.blocks(item.blocks)
+            case BlockQuote():
+                self.blocks(block.blocks)
+            case Callout():
+                label = self._labels.get(block.kind, block.kind)
+                self.add("text", f"{label}: {self.text(block.title)}" if block.title else label)
+                self.blocks(block.blocks)
+            case MathBlock():
+                self.add("formula", self._formula(block.tex.text))
+            case Table():
+                for row in (block.header, *block.rows):
+                    self.add("text", " | ".join(self.text(cell.children) for cell in row))
+            case HtmlBlock():
+                self.add("text", unescape(_TAG.sub(" ", block.html)))
+            case ThematicBreak():
+                pass
+            case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
+                self._code(block)
+            case Bench() | Lab():
+                self._card(block)
+            case FeatureBlock():
+                kind_of_block(block).index(self, block)
+            case _:
+                assert_never(block)
+
+    def _code(self, block: CodeBlock | PlainCode | Mjcf | Script | Recording) -> None:
+        match block:
+            case CodeBlock() | PlainCode() | Mjcf():
+                self.add("code", block.code.text)
+            case Script():
+                self._also[block.path] = None
+                self.add("code", block.code.text)
+            case Recording():
+                if isinstance(block.body, Table):
+                    self._block(block.body)
+                else:
+                    self.add("output", block.body.text)
+            case _:
+                assert_never(block)
+
+    def _card(self, block: Bench | Lab) -> None:
+        match block:
+            case Bench():
+                self._also[block.model] = None
+                self.add("text", self._measured.get(block.span.start, ""))
+            case Lab():
+                self.add("text", block.title)
+                self.blocks(block.note)
+                labels = [control.label for control in block.controls]
+                labels += [readout.label for readout in block.readouts]
+                self.add("text", ", ".join(filter(None, labels)))
+                if block.model is not None:
+                    self._also[block.model] = None
+                if block.xml is not None:
+                    self.add("code", block.xml.text)
+            case _:
+                assert_never(block)
+
+    def _formula(self, tex: str) -> str:
+        text, names = plain_formula(tex)
+        for name in names:
+            self._also[name] = None
+        return text
+
+    def text(self, inlines: Iterable[Inline]) -> str:
+        """The text of inlines, as the search has it."""
+        parts: list[str] = []
+        self._gather(inlines, parts)
+        return "".join(parts)
+
+    def _gather(self, inlines: Iterable[Inline], parts: list[str]) -> None:
+        for inline in inlines:
+            match inline:
+                case Text() | CodeSpan() | NumberBinding():
+                    parts.append(inline.text)
+                case Math():
+                    parts.append(self._formula(inline.tex.text))
+                    if inline.meaning is not None:
+                        self._also[inline.meaning.text] = None
+                case SoftBreak() | HardBreak():
+                    parts.append(" ")
+                case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+                    self._gather(inline.children, parts)
+                case Image():
+                    parts.append(inline.alt)
+                case RawInline():
+                    if inline.html.startswith(("<br", "<BR")):
+                        parts.append(" ")
+                case FootnoteRef():
+                    pass
+                case _:
+                    assert_never(inline)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+_HEADINGS = {f"h{level}": level for level in range(1, 7)}
+_HIDDEN = frozenset(("script", "style", "nav", "svg", "pre", "template", "button", "select"))
+"""Elements that say nothing to a search; code is known from the page's inputs."""
+_LINES = frozenset(
+    "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
+)
+
+
+def drawn_sections(body: str) -> tuple[Section, ...]:
+    """The sections of a page's body."""
+    reader = _Reader()
+    reader.read(parse_html(body))
+    reader.end_line()
+    reader.end_section()
+    return tuple(reader.done)
+
+
+class _Reader:
+    def __init__(self) -> None:
+        self.done: list[Section] = []
+        self._head: tuple[str, str, int] = ("", "", 0)
+        self._pieces: list[SectionPiece] = []
+        self._text: list[str] = []
+
+    def read(self, content: Iterable[HtmlContent]) -> None:
+        """Headings begin sections, other blocks lines."""
+        for child in content:
+            if isinstance(child, str):
+                self._text.append(child)
+            elif child.name in _HIDDEN:
+                continue
+            elif child.name in _HEADINGS:
+                self.end_line()
+                self.read(child.children)
+                heading = self._said()
+                if child.name != "h1":  # which is the page's title
+                    self.end_section()
+                    self._head = child.attributes.get("id", ""), heading, _HEADINGS[child.name]
+            elif child.name in _LINES:
+                self.end_line()
+                self.read(child.children)
+                self.end_line()
+            else:
+                self.read(child.children)
+
+    def _said(self) -> str:
+        text = " ".join("".join(self._text).split())
+        self._text.clear()
+        return text
+
+    def end_line(self) -> None:
+        """What was said since the last line is one."""
+        text = self._said()
+        if text:
+            self._pieces.append(SectionPiece("text", text))
+
+    def end_section(self) -> None:
+        """What stands between two headings is a section, unless there is nothing."""
+        if self._head[1] or self._pieces:
+            self.done.append(Section(*self._head, tuple(self._pieces)))
+        self._pieces = []

@@ -1,0 +1,143 @@
+"""The files that every page refers to: fonts, the style sheet, the page's script, the icon.
+
+Entry points: `page_facts(draft)` and `common_characters(library)`, by which they depend on the
+pages; `shared_files`, which makes them, with `needed_fonts`.
+
+The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
+names and the styles that were written in single elements: a page that changes touches these files
+only where it brings a character or a style that no page has, or takes the last one away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html import unescape
+
+from markupsafe import Markup
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.features import Feature, features
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages import fonts, formulas, styles
+from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
+from coursebuild.core.pages.frame import Draft, Names
+from coursebuild.core.pages.library import Library
+from coursebuild.core.text.patterns import pattern
+
+
+class PageFacts(Struct, frozen=True):
+    """What the shared files must know of a page."""
+
+    text: frozenset[str]
+    """Characters of its text, but those that every font has."""
+    mathematics: frozenset[str]
+    """Characters of its formulas, but those of ASCII; a blank where there is a formula."""
+    declarations: frozenset[str]
+    """Styles that were written in its elements."""
+
+
+def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
+    """A page without styles in its elements, and the declarations that were there."""
+    body, found = styles.hoist(formulas.glue(str(draft.body)))
+    return replace(draft, body=Markup(body)), found
+
+
+_FORMULA = pattern(r"(<math\b.*?</math>)", re.DOTALL)
+_SIGN = pattern(
+    r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
+    r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
+)
+"""What is not ASCII, or may be a character reference, as in `html.unescape`; tags are passed over.
+A match goes on to the next of these, or to the end: no place is looked at twice.
+"""
+
+
+def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
+    """The facts of a settled page."""
+    text, mathematics = page_characters(draft.body)
+    return PageFacts(text.union(draft.title) - fonts.BASE, mathematics, declarations)
+
+
+def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
+    """The characters of a page's text, but most of those of ASCII, and those of its formulas."""
+    parts = _FORMULA.split(html)
+    text = _characters("".join(parts[::2]))
+    mathematics = {c for c in _characters("\n".join(parts[1::2])) if not c.isascii()}
+    if len(parts) > 1:
+        mathematics.add(" ")
+    return frozenset(text), frozenset(mathematics)
+
+
+def _characters(html: str) -> set[str]:
+    """The characters of the text of a piece of HTML, but most of those of ASCII."""
+    return set[str]().union(*map(unescape, set(_SIGN.findall(html))))
+
+
+def common_characters(library: Library) -> frozenset[str]:
+    """The characters that any page may show: those of the interface and of the frame."""
+    course = library.course
+    text = {*course.title, *course.licence}
+    for page in course.pages:
+        text.update(page.title)
+    for _, words in library.words.entries:
+        text.update(words)
+    return frozenset(text)
+
+
+def needed_fonts(assets: Assets, facts: PageFacts) -> tuple[fonts.FontJob, ...]:
+    """The fonts that pages with these facts, taken together, need, to be cut."""
+    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
+    given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
+    text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
+    return fonts.font_jobs(given, text, mathematics)
+
+
+def shared_files(
+    assets: Assets, subset: Callable[[fonts.FontJob], bytes], facts: PageFacts
+) -> tuple[tuple[OutputFile, ...], Names]:
+    """The files for pages with these facts, taken together, and their names."""
+    files: list[OutputFile] = []
+
+    def publish(path: str, data: bytes) -> str:
+        name = hashed_name(f"assets/{path}", data)
+        files.append(OutputFile(name, data))
+        return name
+
+    def script(name: str) -> str:
+        return publish(name, page_script(assets.file(SCRIPTS[name])))
+
+    jobs = needed_fonts(assets, facts)
+    fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
+    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
+    own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
+    scripts = ((f.name, feature_script(f, assets)) for f in features() if f.mark)
+    names = Names(
+        style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
+        theme_script=script("theme.js"),
+        script=script("site.js"),
+        icon=publish("icon.svg", assets.template("icon.svg").encode()),
+        credits=publish("licences.txt", _licences(assets)),
+        touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
+        offline_script=script("offline.js"),
+        map_script=script("map.js"),
+        reader_script=script("reader.js"),
+        search_script=script("search.js"),
+        feature_scripts=tuple((n, publish(f"{n}.js", page_script(code))) for n, code in scripts),
+    )
+    return tuple(files), names
+
+
+def feature_script(feature: Feature, assets: Assets) -> bytes:
+    """The script of a feature: its own, or that of the same name in the bundle."""
+    return feature.script.encode() or assets.file(f"js/{feature.name}.js")
+
+
+def _licences(assets: Assets) -> bytes:
+    """The licences of fonts and libraries that the site ships."""
+    parts = []
+    for path, data in assets.files("licences"):
+        name = path.removeprefix("licences/").removesuffix(".txt")
+        parts.append(f"{name}\n{'=' * len(name)}\n\n{data.decode().strip()}\n")
+    return "\n\n".join(parts).encode()

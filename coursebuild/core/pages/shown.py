@@ -1,0 +1,250 @@
+"""What the page of a document looks up in the course and in its results.
+
+Entry point: `shown(library, place, document)`.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never
+from urllib.parse import urlsplit
+
+from coursebuild.core.model import (
+    Bench,
+    Block,
+    Callout,
+    Document,
+    ExampleTarget,
+    FeatureBlock,
+    Lab,
+    LessonTarget,
+    LevelTarget,
+    Link,
+    ModelTarget,
+    PageTarget,
+    Recording,
+    Script,
+    Target,
+    TermTarget,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    local_file,
+    resolve,
+    scenario_anchor,
+    walk_inlines,
+)
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.lab_files import LabFiles
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.lookup.references import owner_path
+from coursebuild.core.pages.page_inputs import (
+    ShownBench,
+    ShownCallout,
+    ShownDocument,
+    ShownLab,
+    ShownRecord,
+    ShownRun,
+    ShownVerdict,
+)
+
+
+def shown(library: Library, place: urls.Place, document: Document) -> ShownDocument:
+    """All that the document's page shows besides what stands in the document.
+
+    The summary of a document does as well as the document.
+    """
+    page = _Page(library, place, document)
+    for block in document_blocks(document):
+        page.note(block)
+    return ShownDocument(
+        engine=library.results.engine,
+        python=library.results.python,
+        hrefs=page.hrefs,
+        equations=page.equations,
+        callouts=page.callouts,
+        runs=page.runs(),
+        verdicts=page.verdicts,
+        labs=page.labs,
+        benches=page.benches,
+        keyframes=page.keyframes,
+        address=urls.absolute(library.course, place.path),
+    )
+
+
+class _Page:
+    """Collects what a document asks for."""
+
+    def __init__(self, library: Library, place: urls.Place, document: Document) -> None:
+        self.library = library
+        self.place = place
+        self.path = document.source.path
+        self.hrefs: dict[Target, str] = {}
+        self.equations: dict[Target, str] = {}
+        self.callouts: dict[str, ShownCallout] = {}
+        self.verdicts: dict[int, ShownVerdict] = {}
+        self.labs: dict[int, ShownLab] = {}
+        self.benches: dict[int, ShownBench] = {}
+        self.keyframes: dict[str, tuple[str, ...]] = {}
+        self.scripts: dict[str, set[int]] = {}
+        """Paths of scripts, and the numbers of the lines that are quoted."""
+
+    def note(self, block: Block) -> None:
+        """Note what a block asks for."""
+        match block:
+            case Script():
+                self.scripts.setdefault(block.path, set())
+            case Recording():
+                self._recording(block)
+            case Lab():
+                self._lab(block)
+            case Bench():
+                self.benches[block.span.start] = _shown_bench(self.library, self.place, block)
+            case FeatureBlock():
+                for script, line in block.quoted_lines():
+                    self.scripts.setdefault(script, set()).add(line)
+            case Callout():
+                library, kind = self.library, block.kind
+                words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))
+                self.callouts[kind] = words
+            case _:
+                pass
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Link):
+                self._link(inline.target)
+
+    def _recording(self, block: Recording) -> None:
+        if block.script is not None:
+            self.scripts.setdefault(block.script, set())
+        verdict = self.library.verdict(block)
+        if verdict is not None:
+            self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
+
+    def _lab(self, block: Lab) -> None:
+        files = self.library.labs.labs.get((block.span.path, block.span.start))
+        if files is not None:
+            self.labs[block.span.start] = _shown_lab(files)
+        if block.model is not None:
+            self._link(ModelTarget(block.model))
+            compiled = self.library.models.get(block.model)
+            if isinstance(block.key, int) and compiled is not None and compiled.facts is not None:
+                self.keyframes[block.model] = compiled.facts.keyframes
+
+    def _link(self, target: Target) -> None:
+        if target not in self.hrefs:
+            self.hrefs[target] = address(self.library, self.place, self.path, target)
+            name = equation_name(self.library, self.path, target)
+            if name:
+                self.equations[target] = name
+
+    def runs(self) -> dict[str, ShownRun]:
+        """What is shown of the scripts that ran."""
+        runs = self.library.runs
+        return {
+            path: _shown_run(runs[path], lines)
+            for path, lines in self.scripts.items()
+            if path in runs
+        }
+
+
+def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
+    if run.outcome is not Outcome.OK or not numbers:
+        return ShownRun(run.outcome, run.missing)
+    lines = run.stdout.split("\n")
+    asked = (
+        (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
+        for n in sorted(numbers)
+    )
+    return ShownRun(run.outcome, run.missing, tuple(asked))
+
+
+def _shown_lab(files: LabFiles) -> ShownLab:
+    result, static, record = files.result, files.result.static, None
+    if static is not None and files.picture is not None:
+        record = ShownRecord(
+            picture=files.picture,
+            size=static.size,
+            time=static.time,
+            readouts=static.readouts,
+            end=static.end,
+            plots=static.plots,
+            tried=len(result.tried),
+            parity=result.parity,
+        )
+    return ShownLab(result.name, files.config, files.script, record)
+
+
+def _shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
+    """What the reports have for a block on a page."""
+    scene = library.reports.scenes.get(bench.model)
+    scenarios = () if scene is None else scene.scenarios
+    named = (one for one in scenarios if bench.scenario in (None, one.name))
+    report = next(named, None)
+    declared = {
+        one.name
+        for each in library.course.declarations
+        if each.model == bench.model
+        for one in each.scenarios
+    }
+    anchor = "measured"
+    if report is not None and report.name in declared:
+        anchor = scenario_anchor(report.name)
+    href = place.href(urls.model_page_path(bench.model), anchor)
+    machine = None if scene is None or report is None else scene.machine
+    return ShownBench(href, report, machine)
+
+
+def address(library: Library, place: urls.Place, path: str, target: Target) -> str:
+    """The address of a link's target, from a place, in the document with a path."""
+    target = resolve(target, library.course, path)
+    match target:
+        case LessonTarget():
+            return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
+        case LevelTarget():
+            return place.href(urls.level_path(library.levels[target.id]))
+        case ModelTarget():
+            return place.href(urls.model_page_path(target.name), target.anchor)
+        case PageTarget():
+            return place.href(urls.page_path(library.pages[target.id]), target.anchor)
+        case ExampleTarget():
+            return place.href(target.path)
+        case TermTarget():
+            found = library.references.terms.get(target.id)
+            # In a preview the text that defined it may have changed just now.
+            path = place.path if found is None else owner_path(found.owner)
+            return place.href(path, f"term:{target.id}")
+        case UrlTarget():
+            return file_address(place, path, target.url)
+        case _:
+            assert_never(target)
+
+
+def equation_name(library: Library, path: str, target: Target) -> str:
+    """How another page calls a formula with a number; empty where a target is none."""
+    target = resolve(target, library.course, path)
+    if not isinstance(target, LessonTarget | PageTarget) or not target.anchor:
+        return ""
+    if not target.anchor.startswith("eq:"):
+        return ""
+    lesson = isinstance(target, LessonTarget)
+    owner = library.lessons[target.id] if lesson else library.pages[target.id]
+    if owner.document is None:
+        return ""
+    number = library.lexicon(owner.document).numbers.get(target.anchor)
+    if number is None:
+        return ""
+    if owner.document.source.path == path:
+        return f"({number})"
+    if lesson:
+        return library.words("equation.of_lesson", number=number, id=owner.id)
+    return library.words("equation.of_page", number=number, title=owner.title)
+
+
+def file_address(place: urls.Place, path: str, url: str) -> str:
+    """An address as written, but a file of the course becomes its place in the site."""
+    parts = urlsplit(url)
+    if parts.scheme or parts.netloc or not parts.path:
+        return url
+    site_path = urls.file_path(local_file(url, path))
+    return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]

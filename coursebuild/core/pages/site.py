@@ -1,0 +1,128 @@
+"""A course and what running it found, as the files of a site.
+
+Entry point: `render_site(course, results, assets, options)`.
+
+1. Every page is drawn without its frame.
+2. Punctuation is held to formulas, styles written in single elements become classes, and the fonts
+   are cut down to the characters that the pages use.
+3. The style sheet gets its name from its content, and every page its frame.
+4. Scripts, models, archives, files of the course, the sitemap and the rest follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from msgspec import Struct, field
+
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import OutputFile, Results
+from coursebuild.core.pages import fonts, meta, urls, zips
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.exports.files import ExportContext, Exports, OnDemand
+from coursebuild.core.pages.frame import Draft, frame
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.offline import facts_of, file_list, offline_files
+from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.pages.search.whole import site_search
+from coursebuild.core.pages.shared import (
+    PageFacts,
+    common_characters,
+    page_facts,
+    settled,
+    shared_files,
+)
+from coursebuild.numerics.reports import Reports
+
+
+class SiteOptions(Struct, frozen=True):
+    """What is not in the course itself."""
+
+    files: tuple[OutputFile, ...] = ()
+    """Files that pages show or link to, and that models pull in, by their path relative to the
+    project root."""
+    around: zips.Surroundings = field(default_factory=zips.Surroundings)
+    """What downloaded scripts need."""
+    reports: Reports = field(default_factory=Reports)
+    """What was measured, as far as it fits the course."""
+    subset: Callable[[fonts.FontJob], bytes] = fonts.subset_font
+    """How a font is cut: whoever calls may keep results, by a job's `key`."""
+
+
+def render_site(
+    course: Course, results: Results, assets: Assets, options: SiteOptions | None = None
+) -> tuple[OutputFile, ...]:
+    """The files of the site, sorted by path. The same values give the same bytes."""
+    options = options or SiteOptions()
+    library = Library.of(course, results, assets, reports=options.reports)
+    drafts, facts = [], []
+    drawn = tuple(entry.draft(library) for entry in page_list(library))
+    for draft, declarations in map(settled, drawn):
+        drafts.append(draft)
+        facts.append(page_facts(draft, declarations))
+    shared, names = shared_files(assets, options.subset, all_facts(library, facts))
+    files = [OutputFile(draft.path, frame(library, draft, names).encode()) for draft in drafts]
+    files += shared
+    files += library.labs.files
+    files += _downloads(library, options)
+    files += _machine_files(course, drafts)
+    files += site_search(library, drawn)
+    files += offline_files(course, assets)
+    files += _exports(library, options, drafts)
+    listed = file_list(names, "")
+    files.append(OutputFile(listed.path, listed.make(facts_of(files))))
+    return tuple(sorted(files, key=lambda file: file.path))
+
+
+def all_facts(library: Library, pages: Iterable[PageFacts]) -> PageFacts:
+    """The facts of all pages together, with those of what every page has around it."""
+    text: set[str] = {*common_characters(library)}
+    mathematics: set[str] = set()
+    declarations: set[str] = set()
+    for facts in pages:
+        text |= facts.text
+        mathematics |= facts.mathematics
+        declarations |= facts.declarations
+    return PageFacts(frozenset(text), frozenset(mathematics), frozenset(declarations))
+
+
+# --------------------------------------------------------------------------------- downloads
+
+
+def _downloads(library: Library, options: SiteOptions) -> Iterator[OutputFile]:
+    """Scripts, models, archives, and files of the course."""
+    for path, (script, _) in library.scripts.items():
+        yield OutputFile(path, script.code.text.encode())
+    for model in library.course.models:
+        yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
+    if library.scripts:
+        yield zips.course_zip(library, options.around)
+    for entry in library.course.lessons:
+        archive = zips.lesson_zip(library, options.around, entry)
+        if archive is not None:
+            yield archive
+    for file in options.files:
+        yield OutputFile(urls.file_path(file.path), file.data)
+
+
+def _exports(
+    library: Library, options: SiteOptions, drafts: Sequence[Draft]
+) -> Iterator[OutputFile]:
+    """What the site gives away besides its pages."""
+    bodies = {draft.path: visible(str(draft.body)) for draft in drafts}
+    context = ExportContext(
+        zips.lesson_archives(library, options.around),
+        options.around.imports,
+        frozenset(urls.file_path(file.path) for file in options.files),
+    )
+    for file in Exports(library, OnDemand(library, bodies.__getitem__), context).files():
+        yield file if isinstance(file, OutputFile) else OutputFile(file.path, file.make())
+
+
+def _machine_files(course: Course, drafts: Iterable[Draft]) -> Iterator[OutputFile]:
+    """What search engines look for."""
+    yield OutputFile(urls.ROBOTS, meta.robots(course))
+    if course.base_url:
+        indexed = (draft.path for draft in drafts if draft.indexed)
+        yield OutputFile(urls.SITEMAP, meta.sitemap(course, indexed))

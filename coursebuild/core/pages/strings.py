@@ -1,0 +1,91 @@
+"""The words of the interface: one file a language, read as an asset.
+
+Entry point: `parse_strings(text, fallback, language)`, which gives `Strings`; a template says
+`t("lesson.minutes", n=25)`.
+
+1. A file is TOML: tables of texts, addressed by their dotted path. `{name}` in a text is replaced
+   by a value.
+2. A text that depends on a number is a table with the forms that its language has, `other` among
+   them; the value `n` chooses (`plurals`).
+3. A key that a language lacks is taken from English; a key that English lacks is a programming
+   error (`KeyError`). Of a text with forms all are of one language.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+
+from msgspec import Struct
+
+from coursebuild.core.pages.plurals import CATEGORIES, category
+
+DEFAULT_LANGUAGE = "en"
+
+
+class Strings(Struct, frozen=True, dict=True):
+    """The interface's words in one language."""
+
+    entries: tuple[tuple[str, str], ...]
+    """Dotted key and text, sorted by key."""
+    language: str = DEFAULT_LANGUAGE
+    """Of the course that they are for."""
+
+    @classmethod
+    def of(cls, table: dict[str, str], language: str = DEFAULT_LANGUAGE) -> Strings:
+        """The words of a table: dotted key and text."""
+        return cls(tuple(sorted(table.items())), language)
+
+    @cached_property
+    def _table(self) -> dict[str, str]:
+        return dict(self.entries)
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """All keys."""
+        return frozenset(self._table)
+
+    def __call__(self, key: str, **values: str | int | float) -> str:
+        """The text of a key, with its values put in."""
+        text = self._table.get(key)
+        if text is None and "n" in values:
+            text = self._form(key, values["n"])
+        if text is None:
+            raise KeyError(f"no interface text {key!r}")
+        return text.format_map(values) if values else text
+
+    def _form(self, key: str, n: str | int | float) -> str | None:
+        """The form of a text that goes with a number."""
+        name = "other" if isinstance(n, str) else category(self.language, n)
+        return self._table.get(f"{key}.{name}", self._table.get(f"{key}.other"))
+
+    def has(self, key: str) -> bool:
+        """Whether there is a text of this key."""
+        return key in self._table
+
+
+def parse_strings(
+    text: str, fallback: Strings | None = None, language: str = DEFAULT_LANGUAGE
+) -> Strings:
+    """Read a file of texts; what it lacks comes from `fallback`."""
+    import tomllib
+
+    own = dict(_flatten(tomllib.loads(text), ""))
+    table = dict(fallback.entries) if fallback is not None else {}
+    for key in own:
+        stem, _, form = key.rpartition(".")
+        if form in CATEGORIES and f"{stem}.other" in own:
+            for other in CATEGORIES:
+                table.pop(f"{stem}.{other}", None)
+    table.update(own)
+    return Strings.of(table, language)
+
+
+def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]:
+    for name, value in table.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f"{prefix}{name}.")
+        elif isinstance(value, str):
+            yield prefix + name, value
+        else:
+            raise TypeError(f"interface text {prefix + name!r} is not a text")

@@ -1,0 +1,147 @@
+"""Styles that are written in single elements, as classes of the style sheet.
+
+Entry points: `hoist(html)`, which takes `style` attributes out of a page's text, and `style_rules`,
+the rules that take their place.
+
+The page's Content-Security-Policy allows no style in the page. Formulas come with some (the padding
+of a matrix's columns), and so may an author's HTML; each different declaration gets one class,
+named by its content.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+from collections.abc import Iterable
+from html import escape, unescape
+
+from coursebuild.core.text.patterns import pattern
+
+_PIECE = pattern(
+    r"""<!--.*?-->"""
+    r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]|"[^"]*"|'[^']*')*>.*?</(?P=raw)\s*>"""
+    r"""|<(?P<tag>[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>""",
+    re.DOTALL | re.IGNORECASE,
+)
+"""A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
+for one."""
+
+_PLAIN = pattern(
+    r"(?:[^<]++|</"
+    r"|<(?!(?:script|style|textarea|title)\b)[a-z][a-z0-9]*+"
+    r"""(?: (?!style[ />])[a-z0-9_:-]++(?:="[^"<>]*+")?)*+ ?/?>)*+"""
+)
+"""HTML as we and Temml write it: there, what looks like a style in a tag is one."""
+_OTHERS = pattern(
+    r"""(?:[^<]++|<(?![a-z]|!--)"""
+    r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
+    r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
+    re.IGNORECASE,
+)
+"""What has no style in it: texts, end tags, most tags. Where it ends, `_PIECE` may begin."""
+
+_ATTRIBUTE = pattern(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+
+
+def is_plain(html: str) -> bool:
+    """Whether all tags are written as we and Temml write them; what `hoist` gives is so as well."""
+    return _PLAIN.fullmatch(html) is not None
+
+
+def hoist(html: str, *, plain: bool | None = None) -> tuple[str, frozenset[str]]:
+    """The page with classes in place of `style` attributes, and what they stand for.
+
+    `plain`: what `is_plain` says, where that is known.
+    """
+    if is_plain(html) if plain is None else plain:
+        return _hoist_plain(html)
+    found: set[str] = set()
+    parts: list[str] = []
+    at = 0
+    while at < len(html):
+        others = _OTHERS.match(html, at)
+        end = at if others is None else others.end()
+        piece = _PIECE.match(html, end)
+        if piece is None:
+            parts.append(html[at : end + 1])
+            at = end + 1
+        else:
+            tag, declaration = _without_style(piece["tag"]) if piece["tag"] else (piece[0], "")
+            if declaration:
+                found.add(declaration)
+            parts += (html[at:end], tag)
+            at = piece.end()
+    return "".join(parts), frozenset(found)
+
+
+def _hoist_plain(html: str) -> tuple[str, frozenset[str]]:
+    """The same, where the page is as `_PLAIN` says."""
+    found: set[str] = set()
+    parts: list[str] = []
+    at = 0
+    style = html.find(' style="')
+    while style >= 0:
+        start, end = html.rfind("<", at, style), html.find(">", style)
+        if end < 0:  # what seems to be a tag has no end, nor does anything after it
+            break
+        if start < 0 or html.find(">", start, style) >= 0:  # it stands in a text
+            style = html.find(' style="', style + 1)
+            continue
+        tag, declaration = _without_style(html[start + 1 : end])
+        if declaration:
+            found.add(declaration)
+        parts += (html[at:start], tag)
+        at = end + 1
+        style = html.find(' style="', at)
+    return "".join((*parts, html[at:])), frozenset(found)
+
+
+@functools.lru_cache(maxsize=4096)
+def _without_style(tag: str) -> tuple[str, str]:
+    """The tag with this inside with a class in place of its style, and the style, if it has one."""
+    names = {name.lower(): value for name, value in _ATTRIBUTE.findall(tag)}
+    if "style" not in names:
+        return f"<{tag}>", ""
+    declaration = _normal(unescape(names["style"].strip("\"'")))
+    classes = [unescape(names.get("class", "").strip("\"'"))]
+    if declaration:
+        classes.append(class_name(declaration))
+    value = escape(" ".join(filter(None, classes)))
+    return f"<{_with_class(tag, value)}>", declaration
+
+
+def class_name(declaration: str) -> str:
+    """The class of a declaration."""
+    return "s" + hashlib.sha256(declaration.encode()).hexdigest()[:7]
+
+
+def style_rules(declarations: Iterable[str]) -> str:
+    """The rules of the classes, in the order of their names."""
+    rules = sorted(
+        f".{class_name(declaration)}{{{declaration}}}" for declaration in set(declarations)
+    )
+    return "".join(f"{rule}\n" for rule in rules)
+
+
+def _normal(declaration: str) -> str:
+    """One spelling of a declaration; empty for one that would reach out of its rule."""
+    text = " ".join(declaration.split()).strip("; ")
+    quotes = text.count('"') % 2 or text.count("'") % 2
+    return "" if quotes or re.search(r"[{}<\\]|/\*", text) else text
+
+
+def _with_class(tag: str, value: str) -> str:
+    """The inside of a tag with `class="value"` in place of its `style` and `class`."""
+    placed = False
+
+    def replace(match: re.Match[str]) -> str:
+        nonlocal placed
+        if match[1].lower() not in ("style", "class"):
+            return match[0]
+        if placed or not value:
+            return ""
+        placed = True
+        return f' class="{value}"'
+
+    return _ATTRIBUTE.sub(replace, tag)

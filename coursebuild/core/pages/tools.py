@@ -1,0 +1,75 @@
+"""What pages are drawn with, whatever they show: words, templates, formulas.
+
+Entry point: `Tools`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+from jinja2 import Environment
+from markupsafe import Markup
+from msgspec import Struct, field
+
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.quantities import text_html
+from coursebuild.core.pages.strings import Strings
+
+_SLOT = "\ue000"
+"""Stands for a value; no template has it."""
+
+Mark: TypeAlias = Callable[[str, str], tuple[Markup, ...]]
+"""Gives the lines of code in a language, their tokens marked."""
+
+
+def mark_now(language: str, code: str) -> tuple[Markup, ...]:
+    """See `highlight.highlight_lines`, which is imported when there is something to mark."""
+    from coursebuild.core.pages.highlight import highlight_lines
+
+    return highlight_lines(language, code)
+
+
+class Tools(Struct, frozen=True):
+    """The interface's words in the course's language, the templates, and formulas as MathML."""
+
+    words: Strings
+    templates: Environment
+    formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
+    mark: Mark = mark_now
+    """How code is marked: whoever calls may keep what was marked before."""
+    around: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """What templates write around their only value, as far as it is known."""
+
+    def render(self, template: str, **values: object) -> Markup:
+        """A filled-in template, without its last line end.
+
+        It sees `t`, the interface's words, and `authored`, see `text`.
+        """
+        seen = {"t": self.words, "authored": self.text, **values}
+        return Markup(self.templates.get_template(template).render(seen).rstrip("\n"))
+
+    def text(self, text: str) -> Markup:
+        """Text of an author that is not Markdown, with its quantities kept together."""
+        return text_html(text, direction(self.words.language))
+
+    def enclose(self, template: str, name: str, html: Markup) -> Markup:
+        """The same for a template that writes one value, once and as it is, whatever it may be."""
+        if template not in self.around:
+            whole = str(self.render(template, **{name: Markup(_SLOT)}))
+            before, _, after = whole.partition(_SLOT)
+            self.around[template] = (before, after)
+        before, after = self.around[template]
+        return Markup(f"{before}{html}{after}")
+
+    def highlight(self, language: str, code: str) -> Markup:
+        """Code with its tokens marked."""
+        return Markup("\n".join(self.mark(language, code)))
+
+    def mathml(self, tex: str, display: bool) -> Markup:
+        """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
+        found = self.formulas[Formula(tex, display)]
+        if isinstance(found, MathError):
+            raise ValueError(f"formula {tex!r} does not parse: {found.message}")
+        return Markup(found)

@@ -1,0 +1,150 @@
+"""Where each thing of the course stands in the site, and how one page refers to another.
+
+Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the site's root), and
+`Place`, the point from which a page refers to others.
+
+1. A site path is plain text, as the file is named on disk; it is percent-encoded only when it
+   becomes part of an address.
+2. Every address is relative, so that the site works in any folder, from a disk and under any base.
+   The page for missing addresses is served at every depth, so its addresses begin with the path of
+   the course's base address instead.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from urllib.parse import quote, urlsplit
+
+from msgspec import Struct
+
+from coursebuild.core.model import Course, Lesson, Level, Page
+from coursebuild.core.text.patterns import pattern
+
+HOME = "index.html"
+NOT_FOUND = "404.html"
+EXAMPLES_ZIP = "examples.zip"
+PROGRESS = "progress/index.html"
+REVIEW = "review/index.html"
+NUMERICS = "numerics/index.html"
+"""In a folder that no page of a course can have."""
+SEARCH = "search/index.html"
+SEARCH_INDEX = "search/index.js"
+"""The one file of the search's index whose name is always the same."""
+GLOSSARY = "glossary/index.html"
+SYMBOLS = "symbols/index.html"
+SITEMAP = "sitemap.xml"
+ROBOTS = "robots.txt"
+OFFLINE = "offline/index.html"
+MANIFEST = "manifest.webmanifest"
+WORKER = "service-worker.js"
+"""In the root, since a worker serves the folder that it lies in."""
+FILES = "files.json"
+"""The list of what the worker may keep."""
+
+
+def lesson_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.html`."""
+    return f"lessons/{lesson.id}-{lesson.slug}.html"
+
+
+def lesson_zip_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.zip`: the scripts of one lesson."""
+    return f"lessons/{lesson.id}-{lesson.slug}.zip"
+
+
+def notebook_path(lesson: Lesson) -> str:
+    """`lessons/4.2-mass-and-inertia.ipynb`: the lesson as a Jupyter notebook."""
+    return f"lessons/{lesson.id}-{lesson.slug}.ipynb"
+
+
+_WITHOUT_MARKDOWN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
+"""Pages that say nothing but what a script fills in."""
+
+
+def markdown_path(page: str) -> str | None:
+    """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
+    if page in _WITHOUT_MARKDOWN:
+        return None
+    return f"{page.removesuffix('.html')}.md"
+
+
+def level_path(level: Level) -> str:
+    """`levels/4.html`."""
+    return f"levels/{level.id}.html"
+
+
+def model_page_path(name: str) -> str:
+    """`models/tumbling_box.html`."""
+    return f"models/{name}.html"
+
+
+def model_file_path(name: str) -> str:
+    """`models/tumbling_box.xml`: the model itself."""
+    return f"models/{name}.xml"
+
+
+def page_path(page: Page) -> str:
+    """`about.html`."""
+    return f"{page.id}.html"
+
+
+def file_path(path: str) -> str:
+    """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
+
+    What a model pulls in lies beside the model, as in the course.
+    """
+    return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
+
+
+def absolute(course: Course, path: str) -> str:
+    """The full address of a site path, or the empty text where the course has no base address."""
+    if not course.base_url:
+        return ""
+    return course.base_url.rstrip("/") + "/" + encode("" if path == HOME else path)
+
+
+def base_path(course: Course) -> str:
+    """The path of the course's base address, with a slash at both ends."""
+    path = urlsplit(course.base_url).path.strip("/")
+    return f"/{path}/" if path else "/"
+
+
+_UNRESERVED = pattern("[A-Za-z0-9/~._+@,-]*+")
+"""What stays as it is in an address."""
+
+
+def encode(path: str) -> str:
+    """A site path as part of an address; colons are encoded, since one may read as a scheme."""
+    return path if _UNRESERVED.fullmatch(path) else quote(path, safe="/~-._+@,")
+
+
+def quoted(anchor: str) -> str:
+    """An anchor as part of an address."""
+    return quote(anchor, safe="-._~:")
+
+
+class Place(Struct, frozen=True):
+    """The page that addresses are written for."""
+
+    path: str
+    """Its site path."""
+    root: str | None = None
+    """What every address begins with; `None`: addresses are relative to `path`."""
+
+    def href(self, path: str, anchor: str | None = None) -> str:
+        """The address of a site path, and of an anchor there."""
+        fragment = f"#{quote(anchor, safe='')}" if anchor else ""
+        if self.root is not None:
+            return self.root + encode("" if path == HOME else path) + fragment
+        if path == self.path:
+            return fragment or encode(posixpath.basename(path))
+        return encode(_relative(path, self.path)) + fragment
+
+
+def _relative(path: str, start: str) -> str:
+    """A site path as seen from the page at `start`."""
+    ends, starts = path.split("/"), start.split("/")[:-1]
+    shared = 0
+    while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
+        shared += 1
+    return "/".join([".."] * (len(starts) - shared) + ends[shared:])

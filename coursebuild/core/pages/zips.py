@@ -1,0 +1,287 @@
+"""Scripts as archives that run elsewhere, with models, `mjcourse` and exact requirements.
+
+Entry points: `archives`; `course_zip`, `lesson_zip`; `imported_modules` says which packages whoever
+calls should give the versions of.
+
+The bytes depend on the content alone: entries in order of their paths, one fixed date, one fixed
+way to compress.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from msgspec import Struct
+
+from coursebuild.core.model import Course, Lesson, Script
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library, document_scripts, models_named, owners
+from coursebuild.core.text.source import Excerpt
+
+_NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+class Package(Struct, frozen=True):
+    """An installed package that scripts import."""
+
+    module: str
+    """What a script imports: `yaml`."""
+    name: str
+    """What an installer calls it: `PyYAML`."""
+    version: str
+
+
+def imports(text: str) -> frozenset[str]:
+    """Top-level modules that a Python text imports by name; none where it does not parse."""
+    from coursebuild.core.pages.folding import imported  # with the parser
+
+    return imported(text)
+
+
+def _imports_of(code: Excerpt) -> frozenset[str]:
+    return imports(code.text)
+
+
+def _path(part: tuple[str, object]) -> str:
+    return part[0]
+
+
+class Surroundings(Struct, frozen=True):
+    """What scripts need around them, besides the course itself."""
+
+    packages: tuple[Package, ...] = ()
+    library: tuple[OutputFile, ...] = ()
+    """Files of the package `mjcourse`, by path relative to the folder that holds it."""
+    model_files: tuple[OutputFile, ...] = ()
+    """Files in `models/` that are no MJCF (meshes, height fields), by path relative to the project
+    root."""
+    imports: Callable[[str], frozenset[str]] = imports
+    """What a Python text imports: whoever calls may know it already."""
+    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of
+    """What the code of a script imports, likewise."""
+
+
+class Archive(Struct, frozen=True):
+    """An archive that is not packed yet."""
+
+    path: str
+    """Site path."""
+    parts: Mapping[str, bytes | Excerpt]
+    """What is in it by path: code, which may be away, or bytes."""
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What is in it, all as bytes."""
+        return {
+            path: part if isinstance(part, bytes) else part.text.encode()
+            for path, part in self.parts.items()
+        }
+
+    @property
+    def key(self) -> str:
+        """A hash of all that is in it."""
+        digest = hashlib.sha256()
+        for path, part in sorted(self.parts.items(), key=_path):
+            own = hashlib.sha256(part).digest() if isinstance(part, bytes) else part.digest
+            digest.update(f"{path}\0".encode() + own)
+        return digest.hexdigest()
+
+    def packed(self) -> bytes:
+        """Its bytes."""
+        return pack(self.files)
+
+
+def archives(library: Library, around: Surroundings) -> Iterator[Callable[[], Archive | None]]:
+    """What makes that of the course and those of its lessons, or `None` for one without scripts."""
+    if library.scripts:
+        yield functools.partial(course_archive, library, around)
+    by_module = _by_module(library)
+    for lesson in library.order:
+        yield functools.partial(lesson_archive, library, around, lesson, by_module)
+
+
+def course_archive(library: Library, around: Surroundings) -> Archive:
+    """All scripts of the course."""
+    scripts = tuple(script for script, _ in library.scripts.values())
+    folder = _slug(library.course.title)
+    files = _files(library, around, scripts, folder, _by_module(library))
+    return Archive(urls.EXAMPLES_ZIP, files)
+
+
+def lesson_archive(
+    library: Library,
+    around: Surroundings,
+    lesson: Lesson,
+    by_module: Mapping[str, Script] | None = None,
+) -> Archive | None:
+    """The scripts of a lesson and those that they import; `None` where it has none.
+
+    `by_module` are all scripts by what imports them.
+    """
+    scripts = document_scripts(lesson.document) if lesson.document is not None else ()
+    if not scripts:
+        return None
+    by_module = _by_module(library) if by_module is None else by_module
+    needed = _with_siblings(by_module, around, scripts)
+    files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
+    return Archive(urls.lesson_zip_path(lesson), files)
+
+
+def lesson_archives(
+    library: Library, around: Surroundings
+) -> dict[str, tuple[str, Callable[[], Archive | None]]]:
+    """Those of the lessons that have scripts, by site path, each with an empty key."""
+    by_module = _by_module(library)
+    return {
+        urls.lesson_zip_path(lesson): (
+            "",
+            functools.partial(lesson_archive, library, around, lesson, by_module),
+        )
+        for lesson in library.order
+        if lesson.document is not None and document_scripts(lesson.document)
+    }
+
+
+def course_zip(library: Library, around: Surroundings) -> OutputFile:
+    """The archive of the course, packed."""
+    archive = course_archive(library, around)
+    return OutputFile(archive.path, archive.packed())
+
+
+def lesson_zip(library: Library, around: Surroundings, lesson: Lesson) -> OutputFile | None:
+    """The archive of a lesson, packed; `None` where it has no script."""
+    archive = lesson_archive(library, around, lesson)
+    return None if archive is None else OutputFile(archive.path, archive.packed())
+
+
+def imported_modules(
+    course: Course,
+    library: Iterable[OutputFile] = (),
+    imports: Callable[[str], frozenset[str]] = imports,
+    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of,
+) -> tuple[str, ...]:
+    """Top-level modules of others that the scripts, and the package they come with, import."""
+    documents = (owner.document for owner in owners(course))
+    scripts = [
+        script
+        for document in documents
+        if document is not None
+        for script in document_scripts(document)
+    ]
+    own = {_module(script.path) for script in scripts} | {"mjcourse"}
+    found = {name for script in scripts for name in imports_of(script.code)}
+    texts = (file.data.decode() for file in library if file.path.endswith(".py"))
+    found |= {name for text in texts for name in imports(text)}
+    return tuple(sorted(found - own - sys.stdlib_module_names))
+
+
+def _module(path: str) -> str:
+    return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
+
+
+def _by_module(library: Library) -> dict[str, Script]:
+    return {_module(path): script for path, (script, _) in library.scripts.items()}
+
+
+def _with_siblings(
+    by_module: Mapping[str, Script], around: Surroundings, scripts: Iterable[Script]
+) -> tuple[Script, ...]:
+    found: dict[str, Script] = {}
+    waiting = list(scripts)
+    while waiting:
+        script = waiting.pop()
+        if script.path not in found:
+            found[script.path] = script
+            named = around.imports_of(script.code)
+            waiting += [by_module[name] for name in named if name in by_module]
+    return tuple(found[path] for path in sorted(found))
+
+
+def _files(
+    library: Library,
+    around: Surroundings,
+    scripts: tuple[Script, ...],
+    folder: str,
+    own: Mapping[str, Script],
+) -> dict[str, bytes | Excerpt]:
+    """What is in an archive of one folder.
+
+    `mjcourse` lies beside the scripts, where Python looks first.
+    """
+    files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
+    modules = [around.imports_of(script.code) for script in scripts]
+    if any("mjcourse" in names for names in modules):
+        files |= {f"examples/{file.path}": file.data for file in around.library}
+        modules += [
+            around.imports(file.data.decode())
+            for file in around.library
+            if file.path.endswith(".py")
+        ]
+    files |= _models(library, around, scripts)
+    files["requirements.txt"] = _requirements(library, around.packages, modules, own)
+    first = scripts[0].path
+    readme = library.words("zip.readme", title=library.course.title, script=first)
+    files["README.md"] = f"{readme.strip()}\n".encode()
+    return {f"{folder}/{path}": data for path, data in files.items()}
+
+
+def _models(
+    library: Library, around: Surroundings, scripts: tuple[Script, ...]
+) -> Mapping[str, bytes]:
+    """The models that scripts name, and the files that these pull in."""
+    if not library.course.models:
+        return {}
+    sources = {model.source.path: model.source.text.encode() for model in library.course.models}
+    others = {file.path: file.data for file in around.model_files}
+    named = {name for script in scripts for name in models_named(script)}
+    found: dict[str, bytes] = {}
+    for model in library.course.models:
+        if model.name in named:
+            found[model.source.path] = sources[model.source.path]
+            compiled = library.models.get(model.name)
+            facts = compiled.facts if compiled is not None else None
+            for path in facts.includes if facts is not None else ():
+                if (data := sources.get(path, others.get(path))) is not None:
+                    found[path] = data
+    return found
+
+
+def _requirements(
+    library: Library,
+    packages: Iterable[Package],
+    modules: Iterable[frozenset[str]],
+    own: Mapping[str, Script],
+) -> bytes:
+    """One line for each package that is imported, with its exact version where it is known."""
+    known = {package.module: f"{package.name}=={package.version}" for package in packages}
+    known.setdefault("mujoco", f"mujoco=={library.results.engine}")
+    named = {name for names in modules for name in names} - _NEVER_REQUIRED
+    # To subtract the keys would look at every script of the course.
+    used = (known.get(name, name) for name in named if name not in own)
+    return "".join(f"{line}\n" for line in sorted(used)).encode()
+
+
+def _slug(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "course"
+
+
+def pack(files: Mapping[str, bytes]) -> bytes:
+    """An archive of these files, by path."""
+    import io
+    import zipfile
+
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for path in sorted(files):
+            entry = zipfile.ZipInfo(path, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = 0o100644 << 16
+            archive.writestr(entry, files[path], compresslevel=9)
+    return out.getvalue()

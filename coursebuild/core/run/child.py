@@ -1,0 +1,143 @@
+"""A child process that answers JSON lines, for work that may crash or hang.
+
+Entry point: `JsonChild`, a context manager.
+
+1. The child runs a file of this package in a temporary folder and a clean environment. It says
+   `ready`, then answers each line with one line.
+2. It is started when it is first asked, and again after it died. A request gives `None` when the
+   child did not answer; `death()` says why.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any, Self
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.runner import clean_environment
+
+_START = 120.0
+"""Seconds in which the child must be ready."""
+
+
+class JsonChild:
+    """The child and its folder."""
+
+    def __init__(
+        self, script: str, seconds: float, python: str | None = None, patience: float = 10.0
+    ) -> None:
+        """A child ends itself, by SIGPROF, after so many seconds of processor time for a request.
+
+        One that does not compute is waited for `patience` times as long.
+        """
+        self._python = python or sys.executable
+        self._script = script
+        self._seconds = seconds
+        self._patience = patience
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._interrupted = False
+        self._buffer = b""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def ask(self, request: Any) -> Any:
+        """The child's answer; `None` if it died, or said nothing for too long.
+
+        Raises:
+            EffectError: MuJoCo cannot be loaded, or somebody interrupted.
+        """
+        process = self._process or self._start()
+        assert process.stdin is not None
+        if self._interrupted:
+            raise EffectError("interrupted")
+        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()
+        line = self._read_line(self._seconds * self._patience)
+        return None if line is None else json.loads(line)
+
+    def stop(self) -> None:
+        """End the child, whatever it does."""
+        process, self._process, self._buffer = self._process, None, b""
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
+
+    def interrupt(self) -> None:
+        """From another thread: end the child; what it is asked gets no answer any more."""
+        self._interrupted = True
+        if (process := self._process) is not None:
+            process.kill()
+
+    def death(self) -> str:
+        """What ended the child, after it gave no answer."""
+        assert self._process is not None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(1.0)
+        status = self._process.returncode
+        self.stop()
+        if status is None or status == -signal.SIGPROF:
+            return f"took longer than {self._seconds:g} s"
+        if status < 0:
+            return f"crashed ({signal.Signals(-status).name})"
+        return f"ended with status {status}"
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="coursebuild-")
+        with tempfile.TemporaryFile() as errors:
+            self._process = process = subprocess.Popen(
+                [self._python, "-E", "-P", self._script],
+                cwd=self._folder.name,
+                env=clean_environment(os.environ),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,
+            )
+            if self._read_line(_START) != b"ready":
+                self.stop()
+                errors.seek(0)
+                said = errors.read().decode("utf-8", "replace").strip().splitlines()
+                raise EffectError(
+                    f"MuJoCo cannot be loaded: {said[-1] if said else 'the import crashed'}"
+                )
+        return process
+
+    def _read_line(self, seconds: float) -> bytes | None:
+        """The next line of the child; `None` if it died, or said nothing for so long."""
+        assert self._process is not None and self._process.stdout is not None
+        until = time.monotonic() + seconds
+        parts = [self._buffer]
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._process.stdout, selectors.EVENT_READ)
+            while b"\n" not in parts[-1]:
+                if not selector.select(max(0.0, until - time.monotonic())):
+                    return None
+                data = os.read(self._process.stdout.fileno(), 1 << 20)
+                if not data:
+                    return None
+                parts.append(data)
+        line, _, self._buffer = b"".join(parts).partition(b"\n")
+        return line

@@ -1,0 +1,332 @@
+"""A script run again with its initial states a little elsewhere: which printed digits hold?
+
+Entry points: `install`, in a process that is to run so; `last_look`, at an `MjData` that the script
+lets go of.
+
+1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
+   them is an initial state, all of it for new data and after the clock went back. Before MuJoCo
+   next computes from it, each number x becomes x (1 ± SIZE). Quaternions keep their length.
+2. The sign belongs to the place of the number and to the number of the run: equal states are moved
+   equally, so that what a script compares (two timesteps, a difference quotient) stays comparable.
+   Runs come in pairs with opposite signs; those of the second pair are half as far away.
+3. Zeros stay zero: most often they say that something rests or moves in a plane, which holds
+   exactly, on every machine. But a kinematic tree that has nothing but zeros when it begins would
+   not be moved at all: its coordinates become ±SIZE, and its bodies turn by as much.
+4. A state that the script puts back bit by bit is no initial state: it was moved already. Nor is a
+   correction in the last places, such as the length of a quaternion.
+5. The final state is told, with the sizes that it is compared by (`trajectory_extent`).
+
+The model, the time, controls and forces stay as they are.
+"""
+
+from __future__ import annotations
+
+import _weakref
+import sys
+
+from coursebuild.core.run import mujoco_tracing
+from coursebuild.core.run.trajectory_extent import TrajectoryExtent
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from types import ModuleType
+    from typing import Any
+
+SIZE = 1e-12
+"""Relative; of what is all zero absolute, in rad, m, or what else the coordinate is in."""
+_CORRECTION = 1e-9
+"""Changes smaller than this part of the largest number of a field correct a rounding."""
+_COMPUTING = (
+    "mj_step",
+    "mj_step1",
+    "mj_forward",
+    "mj_forwardSkip",
+    "mj_inverse",
+    "mj_inverseSkip",
+    "mj_fwdPosition",
+    "mj_fwdKinematics",
+    "mj_kinematics",
+    "mj_collision",
+    "mj_energyPos",
+    "mj_energyVel",
+    "mjd_transitionFD",
+    "mjd_inverseFD",
+)
+"""Functions before which an initial state is complete."""
+_INTEGRATING = ("mj_step2", "mj_Euler", "mj_implicit", "mj_RungeKutta")
+"""Functions that go on with what was computed."""
+_MOST_KNOWN = 500_000
+_MOST_NUMBERS = 8192
+"""Numbers of all final states that are told."""
+_FIELDS = ("qpos", "qvel", "act")
+
+
+def install(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
+    """Move the initial states of this process from now on; the run's number counts from 1."""
+    global _perturbation
+    _perturbation = _Perturbation(mujoco, numpy, run)
+    _perturbation.install()
+
+
+def last_look(data: Any) -> None:
+    """Tell of the final state of an `MjData`."""
+    if _perturbation is not None:
+        _perturbation.last_look(data)
+
+
+_perturbation: _Perturbation | None = None
+
+
+class _Perturbation:
+    def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
+        self._mujoco = mujoco
+        self._numpy = numpy
+        self._run = run
+        self._extents: dict[int, TrajectoryExtent] = {}
+        self._known: set[int] = set()
+        self._plans: dict[int, tuple[Any, _Plan]] = {}
+        self._count = 0
+        self._numbers = 0
+        self._rollout = False
+        self._told = False
+
+    def install(self) -> None:
+        mujoco, tracing = self._mujoco, mujoco_tracing
+        functions = [(name, self._before) for name in _COMPUTING]
+        functions += [(name, self._nothing) for name in _INTEGRATING]
+        for name, before in functions:
+            real = getattr(mujoco, name, None)
+            if real is not None:
+                made = tracing.wrapped(real, before, self._after)
+                tracing.replace_function(mujoco, name, made)
+        for name in ("mj_stateSize", "mj_getState"):
+            real = getattr(mujoco, name, None)
+            if real is not None:
+                tracing.replace_function(mujoco, name, tracing.wrapped(real, self._look_for))
+        data: Any = mujoco.MjData
+        real = data.__dict__["__init__"].__get__(None, data)
+        data.__init__ = tracing.wrapped(real, self._look_for)
+
+    # --- before and after MuJoCo computes
+
+    def _before(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        model, data = _model_and_data(args, keywords)
+        extent = self._extents.get(id(data))
+        if extent is None or extent.of() is not data:
+            extent = self._extents[id(data)] = TrajectoryExtent(data, self._count)
+            self._count += 1
+        elif _states(data) == extent.states and data.time >= extent.time:
+            return
+        self._move(model, data, extent)
+
+    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], made: Any) -> None:
+        data = _model_and_data(args, keywords)[1]
+        extent = self._extents.get(id(data))
+        if extent is not None and extent.of() is data:
+            extent.cover(data)
+            self._remember(extent, data)
+
+    def _nothing(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        """It goes on with a state that was looked at."""
+
+    def _remember(self, extent: TrajectoryExtent, data: Any) -> None:
+        extent.time = data.time
+        extent.states = states = _states(data)
+        if len(self._known) < _MOST_KNOWN:
+            self._known.update(hash((i, state)) for i, state in enumerate(states))
+
+    def _move(self, model: Any, data: Any, extent: TrajectoryExtent) -> None:
+        begins = not extent.states or data.time < extent.time
+        plan = self._plan(model)
+        arrays = [getattr(data, name) for name in _FIELDS]
+        befores = extent.states if extent.states else (None,) * len(_FIELDS)
+        new = [
+            self._new(i, array, before, begins)
+            for i, (array, before) in enumerate(zip(arrays, befores, strict=True))
+        ]
+        qpos, qvel, act = arrays
+        zeros = qpos == 0
+        moved = plan.move(qpos, qvel, act, new, begins)
+        if begins:
+            extent.begin(data.time)
+        extent.cover(data)
+        extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
+        if moved and not self._told:
+            self._told = True
+            self._note("p")
+        self._remember(extent, data)
+
+    def _new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
+        """Which numbers of a field are those of an initial state."""
+        numpy = self._numpy
+        if hash((field, array.tobytes())) in self._known:
+            return numpy.zeros(len(array), bool)
+        if begins or before is None:
+            return numpy.ones(len(array), bool)
+        old = numpy.frombuffer(before)
+        if len(old) != len(array):
+            return numpy.ones(len(array), bool)
+        largest = max(float(numpy.abs(array).max(initial=0.0)), 1e-300)
+        return ~(numpy.abs(array - old) <= _CORRECTION * largest)
+
+    def _plan(self, model: Any) -> _Plan:
+        known = self._plans.get(id(model))
+        if known is not None and known[0]() is model:
+            return known[1]
+        plan = _Plan(self._mujoco, self._numpy, model, self._run)
+        self._plans[id(model)] = _weakref.ref(model), plan
+        return plan
+
+    # --- rollouts
+
+    def _look_for(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        """Wrap the module of rollouts, once the script has imported it."""
+        module = None if self._rollout else sys.modules.get("mujoco._rollout")
+        owner: Any = getattr(module, "Rollout", None)
+        if owner is None:
+            return
+        self._rollout = True
+        real = owner.__dict__["rollout"].__get__(None, owner)
+
+        def rollout(*args: Any, **keywords: Any) -> Any:
+            """As MuJoCo's, from states that were moved."""
+            try:  # noqa: SIM105 (contextlib may not be loaded)
+                args = self._moved_rollout(args)
+            except Exception:  # MuJoCo itself says what is wrong with its arguments
+                pass
+            return real(*args, **keywords)
+
+        owner.rollout = rollout
+
+    def _moved_rollout(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
+        models, initial = args[1], args[5]
+        states = self._numpy.array(initial, dtype=float, copy=True)
+        rows = states.reshape(-1, states.shape[-1])
+        models = models if isinstance(models, list) else [models]
+        for i, row in enumerate(rows):
+            model = models[min(i, len(models) - 1)]
+            nq, nv, na = int(model.nq), int(model.nv), int(model.na)
+            qpos, qvel = row[1 : 1 + nq], row[1 + nq : 1 + nq + nv]  # the time comes first
+            act = row[1 + nq + nv : 1 + nq + nv + na]
+            fields = (qpos, qvel, act)
+            new = [self._new(k, array, None, True) for k, array in enumerate(fields)]
+            if self._plan(model).move(*fields, new, True) and not self._told:
+                self._told = True
+                self._note("p")
+        return (*args[:5], states, *args[6:])
+
+    # --- the end
+
+    def last_look(self, data: Any) -> None:
+        extent = self._extents.get(id(data))
+        if extent is None or extent.of() is not data:
+            return
+        del self._extents[id(data)]
+        numbers = [*data.qpos.tolist(), *data.qvel.tolist()]
+        self._numbers += len(numbers)
+        if self._numbers <= _MOST_NUMBERS:
+            parts = [str(extent.number), str(len(data.qpos))]
+            parts += [x.hex() for x in (*extent.sizes(), *numbers)]
+            self._note(f"s{' '.join(parts)}")
+
+    def _note(self, record: str) -> None:
+        if mujoco_tracing.tracer is not None:
+            mujoco_tracing.tracer.moved(record)
+
+
+class _Plan:
+    """What of a state of a model is moved, and in which direction."""
+
+    def __init__(self, mujoco: Any, numpy: Any, model: Any, run: int) -> None:
+        free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+        self._numpy = numpy
+        tree_of_dof = numpy.array(model.dof_treeid)
+        kinds, starts = model.jnt_type, model.jnt_qposadr
+        trees = tree_of_dof[model.jnt_dofadr] if model.njnt else numpy.zeros(0, int)
+        self._tree_of_qpos = numpy.full(int(model.nq), -1)
+        self._plain = numpy.ones(int(model.nq), bool)
+        """Numbers that are no part of a quaternion."""
+        self._quaternions: list[tuple[int, int]] = []
+        """Of each its place in qpos and its tree."""
+        for kind, at, tree in zip(kinds, starts, trees, strict=True):
+            kind, at, tree = int(kind), int(at), int(tree)
+            place = at + 3 if kind == free else at
+            if kind in (free, ball):
+                self._plain[place : place + 4] = False
+                self._quaternions.append((place, tree))
+                self._tree_of_qpos[at : place + 4] = tree
+            else:
+                self._tree_of_qpos[at] = tree
+        self._tree_of_dof = tree_of_dof
+        self._signs = [
+            _signs(numpy, field, int(size), run)
+            for field, size in enumerate((model.nq, model.nv, model.na))
+        ]
+
+    def move(self, qpos: Any, qvel: Any, act: Any, new: list[Any], begins: bool) -> bool:
+        """Move what is new, in place; whether anything was."""
+        numpy = self._numpy
+        before = [array.copy() for array in (qpos, qvel, act)]
+        which = (new[0] & self._plain, *new[1:])
+        for array, signs, these in zip((qpos, qvel, act), self._signs, which, strict=True):
+            array[these] *= 1.0 + SIZE * signs[these]
+        signs = self._signs[0]
+        for at, _ in self._quaternions:
+            part = slice(at, at + 4)
+            if new[0][part].any():
+                old = before[0][part]
+                length = numpy.linalg.norm(old)
+                turned = old * (1.0 + SIZE * signs[part])
+                norm = numpy.linalg.norm(turned)
+                qpos[part] = turned * (length / norm) if norm > 0 and (old != 0).sum() > 1 else old
+        if begins:
+            self._move_what_rests(before, qpos, new[0])
+        return any(
+            not numpy.array_equal(one, other, equal_nan=True)
+            for one, other in zip(before, (qpos, qvel, act), strict=True)
+        )
+
+    def _move_what_rests(self, before: list[Any], qpos: Any, new: Any) -> None:
+        """Move trees that have nothing but zeros, and bodies that are not turned."""
+        numpy, signs = self._numpy, self._signs[0]
+        q, v = before[0], before[1]
+        resting = set(self._tree_of_qpos.tolist()) - {-1}
+        resting -= set(self._tree_of_qpos[self._plain & (q != 0)].tolist())
+        resting -= set(self._tree_of_dof[v != 0].tolist())
+        for at, tree in self._quaternions:
+            if (q[at : at + 4] != 0).sum() > 1:
+                resting.discard(tree)
+        if not resting:
+            return
+        still = numpy.isin(self._tree_of_qpos, sorted(resting)) & new
+        qpos[still & self._plain] = SIZE * signs[still & self._plain]
+        for at, tree in self._quaternions:
+            if tree in resting and new[at : at + 4].all():
+                qpos[at + 1 : at + 4] = 0.5 * SIZE * signs[at + 1 : at + 4]
+
+
+def _signs(numpy: Any, field: int, size: int, run: int) -> Any:
+    """The directions of a field's numbers, by the number of the run.
+
+    The second run of a pair has the opposite ones of the first; each further pair is half as far
+    away, with every second number in the other direction.
+    """
+    pair, second = divmod(run - 1, 2)
+    found = []
+    for i in range(size):
+        mixed = (i * 0x9E3779B1 + field * 0x85EBCA77 + 0x27D4EB2F) & 0xFFFFFFFF
+        mixed = ((mixed ^ (mixed >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
+        mixed = ((mixed ^ (mixed >> 12)) * 0x297A2D39) & 0xFFFFFFFF
+        odd = (mixed >> 16) + pair * i
+        found.append(1.0 if odd & 1 else -1.0)
+    return numpy.array(found) * ((-1.0 if second else 1.0) * 0.5**pair)
+
+
+def _states(data: Any) -> tuple[bytes, ...]:
+    return data.qpos.tobytes(), data.qvel.tobytes(), data.act.tobytes()
+
+
+def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[Any, Any]:
+    model = args[0] if args else keywords["m"]
+    return model, args[1] if len(args) > 1 else keywords["d"]

@@ -1,0 +1,115 @@
+"""The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
+
+Entry points: `LabEngine.trial`, `LabEngine.mistakes`. See docs/labs.md for what is asked and
+answered.
+
+The engine is started when it is first needed, and again after a trial that ran too long or took too
+much memory: such a trial is told as what it is, and takes no other along.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.lab_files import script_path, wasm_path
+from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+
+_MEMORY = 1 << 30
+"""Bytes: the engine's WebAssembly memory counts."""
+_START_SECONDS = 60.0
+_PIECES = Path(__file__).with_name("lab_pieces.js")
+
+
+class LabEngine:
+    """Tries labs, one after the other; a context manager for use in one thread."""
+
+    def __init__(self, memory: int = _MEMORY) -> None:
+        self._memory = memory
+        self._isolate: Isolate | None = None
+        self._stopped = False
+        self.version = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free V8's memory; the engine can be used again."""
+        if self._isolate is not None:
+            self._isolate.close()
+            self._isolate = None
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and what comes after, by a `StoppedError` there."""
+        self._stopped = True
+        if (isolate := self._isolate) is not None:
+            isolate.stop()
+
+    def mistakes(self, pieces: Sequence[tuple[str, str, str, bool]]) -> list[str | None]:
+        """For each piece of code: why it cannot be part of a lab, or `None`.
+
+        A piece is its code, its form, the function that it becomes, and whether it reads `value`.
+        """
+        isolate = self._ready()
+        names = ("code", "form", "text", "takesValue")
+        request = json.dumps([dict(zip(names, piece, strict=True)) for piece in pieces])
+        found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
+        return found
+
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        """The reply to a trial's request; `seconds` of processor time is what it may take.
+
+        A trial that had to be ended gives a reply with one failure, of the kind `timeout`, at the
+        entry whose code was running, or else at what was tried.
+        """
+        isolate = self._ready()
+        try:
+            isolate.fill("mjb", mjb)
+            text = isolate.call("trial", json.dumps(request), seconds)
+        except LimitError as error:
+            return self._ended(isolate, "timeout", str(error))
+        except ScriptError as error:  # lab code has broken what all share
+            return self._ended(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
+        reply: dict[str, Any] = json.loads(text)
+        if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
+            self.close()  # what ended or was changed cannot be trusted with the rest
+        return reply
+
+    def _ended(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
+        entry: list[str | int] = []
+        with contextlib.suppress(LimitError, ScriptError):
+            told = json.loads(isolate.call("trying", "", _START_SECONDS))
+            entry = told["stuck"] or told["trying"]
+            if kind == "timeout" and told["stuck"] is None:
+                message = "did not finish in time"
+        self.close()
+        failure = {"entry": entry, "kind": kind, "message": message, "at": None}
+        return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
+
+    def _ready(self) -> Isolate:
+        if self._stopped:
+            raise StoppedError
+        isolate = self._isolate or self._start()
+        if self._stopped:  # before there was anything to stop
+            raise StoppedError
+        return isolate
+
+    def _start(self) -> Isolate:
+        scripts = (path.read_text(encoding="utf-8") for path in (script_path(), _PIECES))
+        self._isolate = isolate = Isolate(*scripts, memory=self._memory)
+        try:
+            isolate.fill("wasm", wasm_path().read_bytes())
+            isolate.call("boot", "", _START_SECONDS)
+            self.version = isolate.call("booted", "", _START_SECONDS)
+        except (LimitError, ScriptError) as error:
+            self.close()
+            why = str(error).splitlines()[0]
+            raise EffectError(f"the browser's engine does not start: {why}") from None
+        return isolate

@@ -1,0 +1,31 @@
+"""The files that a trial runs besides the lab itself.
+
+Entry points: `wasm_path`, `script_path`, `engine_digest`. They are apart from `lab_engine`, as who
+only asks for the digest needs no V8.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from pathlib import Path
+
+from coursebuild.core.files.resources import assets_dir
+
+
+def wasm_path() -> Path:
+    """MuJoCo, as browsers have it."""
+    return assets_dir() / "mujoco" / "mujoco.wasm"
+
+
+def script_path() -> Path:
+    """The script that tries labs."""
+    return assets_dir() / "js" / "lab-trial.js"
+
+
+@functools.lru_cache(maxsize=1)
+def engine_digest() -> str:
+    """A hash of both."""
+    digest = hashlib.sha256(wasm_path().read_bytes())
+    digest.update(script_path().read_bytes())
+    return digest.hexdigest()

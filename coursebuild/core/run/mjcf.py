@@ -1,0 +1,202 @@
+"""Compiling MJCF with MuJoCo itself, in a child process.
+
+Entry points: `compile_all`, `compile_models`, `compile_texts`; `model_files`, what a model is made
+of; `readable_error`, for people.
+
+1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
+2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
+3. The messages are MuJoCo's own and whole, but for the paths of this machine; the line is taken out
+   of them where it is one of the compiled text, and not of a file that it includes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from coursebuild.core.model import MjcfModel
+from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.run import mjcf_worker
+from coursebuild.core.run.child import JsonChild
+from coursebuild.core.run.mujoco_files import ModelFiles
+
+TIMEOUT = 60.0
+"""Seconds that one model may take; large meshes take some."""
+_TEXT_NAME = ".coursebuild-text.xml"
+TEXT_PATH = f"models/{_TEXT_NAME}"
+"""Where a text would stand; no file has this name."""
+
+
+def compile_all(
+    root: Path,
+    models: Sequence[MjcfModel],
+    texts: Sequence[str],
+    *,
+    timeout: float = TIMEOUT,
+    python: str | None = None,
+) -> tuple[tuple[CompileResult, ...], tuple[CompileResult, ...]]:
+    """Compile models of the course and texts as if they stood in `models/`, all in one child.
+
+    `python` is another interpreter than the one that runs this, with a MuJoCo of its own.
+
+    Returns:
+        A result for each model, and one for each text.
+
+    Raises:
+        EffectError: MuJoCo cannot be loaded.
+    """
+    root = root.resolve()
+    jobs = [(model.source.path, model.source.text) for model in models]
+    jobs += [(TEXT_PATH, text) for text in texts]
+    if not jobs:
+        return (), ()
+    with _Compiler(root, timeout, python) as compiler:
+        results = tuple(compiler.compile(*job) for job in jobs)
+    return results[: len(models)], results[len(models) :]
+
+
+def compile_models(
+    root: Path, models: Sequence[MjcfModel], *, timeout: float = TIMEOUT
+) -> tuple[CompileResult, ...]:
+    """See `compile_all`."""
+    return compile_all(root, models, (), timeout=timeout)[0]
+
+
+def compile_texts(
+    root: Path, texts: Sequence[str], *, timeout: float = TIMEOUT
+) -> tuple[CompileResult, ...]:
+    """See `compile_all`."""
+    return compile_all(root, (), texts, timeout=timeout)[1]
+
+
+class _Compiler(JsonChild):
+    """The child that compiles."""
+
+    def __init__(self, root: Path, timeout: float, python: str | None) -> None:
+        super().__init__(mjcf_worker.__file__, timeout, python)
+        self.root = root
+        self.timeout = timeout
+
+    def compile(self, path: str, text: str) -> CompileResult:
+        request: mjcf_worker.CompileRequest = {
+            "path": str(self.root / path),
+            "text": text,
+            "limit": self.timeout,
+        }
+        reply: mjcf_worker.CompileReply | None = self.ask(request)
+        if reply is None:
+            return CompileResult(f"MuJoCo's compiler {self.death()}")
+        facts = reply["facts"]
+        if facts is not None:
+            return CompileResult("", facts=_facts(facts, parts(self.root, path, text)))
+        message = self._without_paths(reply["error"].strip())
+        return CompileResult(message, error_line(message, text))
+
+    def _without_paths(self, message: str) -> str:
+        """The message as it would be on any machine."""
+        message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
+        return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
+
+
+def _facts(facts: mjcf_worker.CompiledFacts, parts: Iterable[str]) -> ModelFacts:
+    return ModelFacts(
+        bodies=facts["bodies"],
+        geoms=facts["geoms"],
+        joints=facts["joints"],
+        nq=facts["nq"],
+        nv=facts["nv"],
+        nu=facts["nu"],
+        timestep=facts["timestep"],
+        integrator=facts["integrator"],
+        total_mass=facts["total_mass"],
+        keyframes=tuple(facts["keyframes"]),
+        sites=tuple(facts["sites"]),
+        body_names=tuple(facts["body_names"]),
+        includes=tuple(parts),
+        sensors=tuple(facts["sensors"]),
+    )
+
+
+def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
+    """Every file that MuJoCo looks for when it compiles a text, besides that of the text itself.
+
+    Those that are not there are among them: it would compile something else if they were.
+
+    Args:
+        root: the course folder.
+        path: where the text stands, or would, relative to it.
+        text: the model.
+
+    Returns:
+        Paths relative to the root, or absolute where they lie outside, sorted.
+    """
+    found: set[str] = set()
+    ModelFiles(re, found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
+    inside = {_from_root(root, file) for file in found}
+    # MuJoCo puts absolute paths one behind the other; nothing is there, on any machine.
+    nowhere = f"{root}/".lstrip("/")
+    return tuple(sorted(file for file in inside if file != path and nowhere not in file[1:]))
+
+
+def parts(root: Path, path: str, text: str) -> tuple[str, ...]:
+    """Those of the `model_files` that are there."""
+    return tuple(file for file in model_files(root, path, text) if (root / file).is_file())
+
+
+def _from_root(root: Path, file: str) -> str:
+    full = Path(os.path.normpath(file))
+    return full.relative_to(root).as_posix() if full.is_relative_to(root) else full.as_posix()
+
+
+_LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)
+_NAMED = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
+
+
+def error_line(message: str, text: str) -> int | None:
+    """The line of `text`, from 1, that a message of MuJoCo's speaks of; `None` if of none.
+
+    MuJoCo gives line 0 for what comes from an included file. It gives no hint for what comes from
+    an attached model: there the line counts only if the name of the element stands on it or below
+    it.
+    """
+    numbers = [int(a or b) for a, b in _LINE.findall(message)]
+    lines = text.splitlines()
+    # A message about an inner file is quoted before the place of the element that pulls it in.
+    if not numbers or not 1 <= numbers[-1] <= max(len(lines), 1):
+        return None
+    line = numbers[-1]
+    named = _NAMED.search(message)
+    if named and "<attach" in text:
+        name = named.group(1)
+        if not name or name not in "\n".join(lines[line - 1 : line + 3]):
+            return None
+    return line
+
+
+_NOISE = re.compile(r"^(?:XML Error|Error|ParseXML)\s*[:=]\s*")
+_PLACE = re.compile(r"\n?Element name '([^']*)', id -?\d+(?:, line \d+)?\s*$")
+_ELEMENT = re.compile(r"\n?Element '([^']*)', line \d+\s*")
+_CAPITAL = re.compile(r"^[A-Z](?=[a-z]*\b)")
+_PARSER = re.compile(
+    r"XML parse error \d+:\s*Error=(?:XML_)?(?:ERROR_)?(\w+) ErrorID=\d+ \(0x[0-9a-f]+\)"
+    r" Line number=\d+(?:: )?(?:XMLElement name=(\S+))?"
+)
+
+
+def readable_error(error: str) -> str:
+    """A message of MuJoCo's as one line in our style: no prefixes, no line numbers."""
+    text = _PARSER.sub(_parser_words, error)
+    while (shorter := _NOISE.sub("", text)) != text:
+        text = shorter
+    text = _PLACE.sub(lambda m: f" (element `{m.group(1)}`)" if m.group(1) else "", text)
+    text = _ELEMENT.sub(lambda m: f" in <{m.group(1)}> ", text)
+    text = " ".join(text.split()).rstrip(". ")
+    return _CAPITAL.sub(lambda m: m.group().lower(), text)
+
+
+def _parser_words(match: re.Match[str]) -> str:
+    kind = match.group(1).removeprefix("PARSING_").replace("_", " ").lower()
+    where = f" <{match.group(2)}>" if match.group(2) else ""
+    return f"not well-formed XML ({kind}{where})"

@@ -1,0 +1,183 @@
+"""MuJoCo's functions that open files, wrapped so that a `Tracer` hears of the files.
+
+Entry point: `wrap`, once MuJoCo has been imported; nothing is noted until `tracer` is set.
+
+What a version of MuJoCo does not have is passed over.
+
+A wrapper has the name and the documentation of what it wraps, and takes itself out of the traceback
+of whatever that raises.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from coursebuild.core.run.mujoco_files import ModelFiles
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from types import ModuleType
+    from typing import Any
+
+    from coursebuild.core.run.tracing import Tracer
+
+    _Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
+    _After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
+
+tracer: Tracer | None = None
+"""Who takes the notes; nobody does before it is set."""
+
+_WRITERS = (
+    ("mj_saveModel", 1),
+    ("mj_saveLastXML", 0),
+    ("mj_printModel", 1),
+    ("mj_printFormattedModel", 1),
+    ("mj_printData", 2),
+    ("mj_printFormattedData", 2),
+    ("mj_printScene", 1),
+    ("mj_printFormattedScene", 1),
+)
+"""Functions that write a file, and the position of its name."""
+
+
+def wrap(mujoco: ModuleType, re: ModuleType) -> None:
+    """Wrap the functions of an imported MuJoCo."""
+    files = ModelFiles(re, _read)
+    model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
+
+    def path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        files.of_path(_text(_get(args, keywords, 0, "filename")), _given(args, keywords))
+
+    def string(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        files.of_text(_get(args, keywords, 0, "xml"), _given(args, keywords))
+
+    def spec_path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        name = _text(_get(args, keywords, 0, "filename"))
+        files.of_path(name, _given(args, keywords), assets=False)
+
+    def spec_string(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        files.of_text(_get(args, keywords, 0, "xml"), _given(args, keywords), assets=False)
+
+    def binary(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        name = _text(_get(args, keywords, 0, "filename"))
+        if name not in _given(args, keywords):
+            _read(name)
+
+    def compile(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        files.of_spec(args[0])
+
+    def attach(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        files.of_spec(_get(args, keywords, 1, "child"))
+
+    of_class: tuple[tuple[Any, str, _Before], ...] = (
+        (model, "from_xml_path", path),
+        (model, "from_xml_string", string),
+        (model, "from_binary_path", binary),
+        (spec, "from_file", spec_path),
+        (spec, "from_string", spec_string),
+    )
+    for owner, name, before in of_class:
+        if hasattr(owner, name):
+            setattr(owner, name, staticmethod(wrapped(getattr(owner, name), before)))
+    of_spec: tuple[tuple[str, _Before], ...] = (
+        ("compile", compile),
+        ("recompile", compile),
+        ("attach", attach),
+        ("to_file", _writer(1)),
+    )
+    for name, before in of_spec:
+        if name in getattr(spec, "__dict__", ()):
+            setattr(spec, name, wrapped(vars(spec)[name].__get__(None, spec), before))
+    functions: list[tuple[str, _Before]] = [
+        ("mj_loadPluginLibrary", _library),
+        ("mj_loadAllPluginLibraries", _library),
+        ("mju_getXMLDependencies", path),
+        *[(name, _writer(position)) for name, position in _WRITERS],
+    ]
+    for name, before in functions:
+        real = getattr(mujoco, name, None)
+        if real is not None:
+            replace_function(mujoco, name, wrapped(real, before))
+
+
+def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+    at = _text(_get(args, keywords, 0, "path", "directory"))
+    if tracer is not None:
+        tracer.library(at)
+
+
+def _writer(position: int) -> _Before:
+    """Notes a file that is written, whose name is at a position."""
+
+    def write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        at = _get(args, keywords, position, "filename")
+        if at is not None and tracer is not None:
+            tracer.write(at)
+
+    return write
+
+
+def wrapped(
+    real: Callable[..., Any],
+    before: _Before,
+    after: _After | None = None,
+    *,
+    like: Callable[..., Any] | None = None,
+) -> Callable[..., Any]:
+    """A function that does what another does, and something before, and with its result after.
+
+    `like` is the one whose name it has, where that is another one.
+    """
+
+    def wrapper(*args: Any, **keywords: Any) -> Any:
+        if tracer is not None:
+            try:  # noqa: SIM105 (contextlib may not be loaded)
+                before(args, keywords)
+            except Exception:  # MuJoCo itself says what is wrong with its arguments
+                pass
+        try:
+            result = real(*args, **keywords)
+        except BaseException as error:
+            if error.__traceback__ is not None:
+                error.__traceback__ = error.__traceback__.tb_next
+            raise  # which, unlike naming the error, adds no entry to the traceback
+        if after is not None and tracer is not None:
+            try:  # noqa: SIM105
+                after(args, keywords, result)
+            except Exception:  # what was asked for has been done
+                pass
+        return result
+
+    for attribute in ("__module__", "__name__", "__qualname__", "__doc__"):
+        setattr(wrapper, attribute, getattr(like or real, attribute, None))
+    return wrapper
+
+
+def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> None:
+    """Put a function in the place of one of MuJoCo's, wherever it is found."""
+    real = getattr(mujoco, name)
+    for module in (mujoco, sys.modules.get(real.__module__ or "")):
+        if module is not None and module.__dict__.get(name) is real:
+            setattr(module, name, new)
+
+
+def _read(path: str) -> None:
+    if tracer is not None:
+        tracer.read(path)
+
+
+def _get(args: tuple[Any, ...], keywords: Mapping[str, Any], position: int, *names: str) -> Any:
+    if len(args) > position:
+        return args[position]
+    return next((keywords[name] for name in names if name in keywords), None)
+
+
+def _given(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the files that are handed over as bytes."""
+    tables = [value for value in (*args[1:], *keywords.values()) if hasattr(value, "keys")]
+    return tuple(str(name) for table in tables for name in table.keys())  # noqa: SIM118
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "surrogateescape") if isinstance(value, bytes) else value

@@ -1,0 +1,85 @@
+"""MuJoCo natively, for labs: models as MJB files, and runs repeated beside WebAssembly's.
+
+Entry point: `NativeEngine`, a context manager around a child process.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from coursebuild.core.run import native_worker
+from coursebuild.core.run.child import JsonChild
+
+
+class NativeError(Exception):
+    """Native MuJoCo did not do what it was asked; the text says why."""
+
+
+class NativeEngine(JsonChild):
+    """The child that runs MuJoCo.
+
+    Args:
+        root: the course's folder.
+        seconds: what one model, or one run, may take.
+    """
+
+    def __init__(self, root: Path, seconds: float = 120.0) -> None:
+        super().__init__(native_worker.__file__, seconds)
+        self._root = root.resolve()
+        self._limit = seconds
+
+    def save(self, path: str, text: str) -> bytes:
+        """A model as an MJB file, of a text that stands, or would stand, at a path of the course.
+
+        The same text and files give the same bytes wherever the course lies.
+
+        Raises:
+            NativeError: it does not compile (which has been found before), or the child died.
+            EffectError: MuJoCo cannot be loaded.
+        """
+        request = {"task": "save", "path": str(self._root / path), "text": text}
+        return base64.b64decode(self._request(request)["mjb"])
+
+    def parity(self, mjb: bytes, run: dict[str, Any], horizon: int) -> dict[str, Any]:
+        """A recorded run of the browser's engine, repeated: where and by how much it differs.
+
+        `run` is the `parity` part of a trial's reply; the size of a difference counts up to the
+        step `horizon`.
+
+        Raises:
+            NativeError: the model cannot be loaded, or the child died.
+            EffectError: MuJoCo cannot be loaded.
+        """
+        model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
+        return self._request({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
+
+    def script(self, request: dict[str, Any]) -> dict[str, Any]:
+        """What running an exported script natively gives, or its `failure` in words.
+
+        `request` has its `path` in the course (nothing need be there), its `text`, its `buttons`,
+        `others` (the text with other values), and `near`, the step whose state is told.
+
+        Raises:
+            NativeError: the child died.
+            EffectError: MuJoCo cannot be loaded.
+        """
+        library = str(Path(__file__).resolve().parents[3])
+        return self._request({"task": "script", "library": library, **request})
+
+    def _request(self, request: dict[str, Any]) -> dict[str, Any]:
+        reply: dict[str, Any] | None = self.ask({**request, "limit": self._limit})
+        if reply is None:
+            raise NativeError(self.death())
+        if reply["error"]:
+            raise NativeError(f"says: {reply['error'].strip()}")
+        return reply
+
+
+@functools.lru_cache(maxsize=1)
+def native_digest() -> str:
+    """A hash of how a run is repeated and compared."""
+    return hashlib.sha256(Path(native_worker.__file__).read_bytes()).hexdigest()

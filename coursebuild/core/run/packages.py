@@ -1,0 +1,172 @@
+"""Which version of what is installed gives a module, without importing anything.
+
+Entry points: `Installed`; `distributions`, `library_files`, for archives of scripts.
+
+Reading what each distribution provides takes a quarter of a second, so the whole map is kept until
+one of the folders with installed packages changes. A module that no distribution names, and one of
+this tool's own, is known by the content of its files.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.util
+import json
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coursebuild.core.engine.digests import Digests
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.model.results import OutputFile
+
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution
+
+ABSENT = ""
+_OURS = "coursebuild"
+_LIBRARY = Path(__file__).resolve().parents[3]
+_TICK = 2_000_000_000
+"""The coarsest clock of a file system, ns."""
+_FOLDERS = ("site-packages", "dist-packages")
+
+
+def site_folders() -> tuple[str, ...]:
+    """The folders with installed packages that scripts see too."""
+    return tuple(path for path in sys.path if Path(path).name in _FOLDERS)
+
+
+class Installed:
+    """What is installed for the interpreter that runs the scripts."""
+
+    def __init__(self, store: Memo, digests: Digests, folders: Sequence[str] | None = None) -> None:
+        self._digests = digests
+        self._folders = site_folders() if folders is None else tuple(folders)
+        self._store = store
+        self._map: Mapping[str, str] | None = None
+        self._found: dict[str, str] = {}
+
+    def version(self, module: str) -> str:
+        """Such as `numpy 2.4.6`; empty where there is no such module."""
+        if module not in self._found:
+            self._found[module] = self._version(module)
+        return self._found[module]
+
+    def _version(self, module: str) -> str:
+        if self._map is None:
+            self._map = _provided(self._store, self._folders)
+        named = self._map.get(module)
+        if named is not None:
+            return named
+        spec = _spec(module, self._folders) or _spec(module, [str(_LIBRARY)])
+        return ABSENT if spec is None else f"files {self._content(spec)}"
+
+    def _content(self, spec: ModuleSpec) -> str:
+        """A hash of a module's files."""
+        if not spec.submodule_search_locations:
+            return self._digests.file(spec.origin or "")[:16]
+        digest = hashlib.sha256()
+        for top in sorted(spec.submodule_search_locations):
+            for file in sorted(Path(top).rglob("*")):
+                if "__pycache__" not in file.parts and file.is_file():
+                    state = self._digests.file(str(file))
+                    digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
+        return digest.hexdigest()[:16]
+
+
+def distributions(store: Memo, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
+    """(module, distribution, version) of each top-level module that an installed package provides.
+
+    Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
+    """
+    wanted = sorted(set(modules))
+    provided = _provided(store, site_folders()) if wanted else {}
+    found = []
+    for module in wanted:
+        name, _, version = provided.get(module, "").split(", ")[0].rpartition(" ")
+        if name:
+            found.append((module, name, version))
+    return tuple(found)
+
+
+def library_files() -> tuple[OutputFile, ...]:
+    """The source files of `mjcourse`, by path relative to the folder that holds the package."""
+    spec = importlib.util.find_spec("mjcourse")
+    if spec is None or spec.origin is None:
+        return ()
+    folder = Path(spec.origin).parent
+    files = (p for p in folder.rglob("*") if p.suffix == ".py" or p.name == "py.typed")
+    return tuple(
+        OutputFile(path.relative_to(folder.parent).as_posix(), path.read_bytes())
+        for path in sorted(files)
+        if "__pycache__" not in path.parts
+    )
+
+
+def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
+    with contextlib.suppress(ImportError, ValueError):
+        return PathFinder.find_spec(module, list(folders))
+    return None
+
+
+def _provided(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
+    """The distributions, with versions, of each top-level module in these folders."""
+    key = _signature(folders)
+    kept = store.peek("installed", key) if key is not None else None
+    with contextlib.suppress(ValueError, AttributeError, RecursionError):
+        if kept is not None:
+            return {str(k): str(v) for k, v in json.loads(kept).items()}
+    found = _scan(folders)
+    if key is not None:
+        store.put("installed", key, json.dumps(found, sort_keys=True).encode(), local=True)
+    return found
+
+
+def _signature(folders: Sequence[str]) -> str | None:
+    """A hash that differs when something was installed; `None` right after that."""
+    parts: list[object] = [3, sys.version]
+    for folder in folders:
+        try:
+            status = Path(folder).stat()
+        except OSError:
+            parts.append((folder, None))
+            continue
+        latest = max(status.st_mtime_ns, status.st_ctime_ns)
+        if latest + _TICK >= time.time_ns():
+            return None
+        parts.append((folder, status.st_ino, status.st_mtime_ns, status.st_ctime_ns))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def _scan(folders: Sequence[str]) -> dict[str, str]:
+    import importlib.metadata  # it takes longer than all else that a run with nothing to do needs
+
+    found: dict[str, set[str]] = {}
+    seen: set[str] = set()
+    for distribution in importlib.metadata.distributions(path=list(folders)):
+        name = distribution.metadata["Name"] or ""
+        if name in seen or name == _OURS:  # the first on the path counts
+            continue
+        seen.add(name)
+        for module in _modules(distribution):
+            found.setdefault(module, set()).add(f"{name} {distribution.version}")
+    return {module: ", ".join(sorted(names)) for module, names in found.items()}
+
+
+def _modules(distribution: Distribution) -> set[str]:
+    """The top-level modules of a distribution."""
+    listed = distribution.read_text("top_level.txt")
+    if listed:
+        return {module.rpartition("/")[2] for module in listed.split()}
+    modules = set()
+    for file in distribution.files or ():
+        first = file.parts[0] if file.parts else ""
+        if len(file.parts) > 1 and first.isidentifier():
+            modules.add(first)
+        elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
+            modules.add(first.split(".")[0])
+    return modules

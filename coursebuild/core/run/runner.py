@@ -1,0 +1,415 @@
+"""Running the lessons' scripts, each in a process, a session and an environment of its own.
+
+Entry points: `run_scripts`; `ScriptServer`, which stays warm between runs.
+
+1. A server imports, once, the packages that the scripts import (see `forkserver`), and forks
+   `parallel` supervisors, which fork the scripts. Where that cannot be, supervisors are started and
+   start an interpreter for each script (see `supervisor`); the results are the same.
+2. The supervisors are given one script after another; what they report becomes a `ScriptRun` each:
+   UTF-8 is decoded, CRLF becomes LF.
+3. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
+   they run and exit.
+
+A script's environment is made here and says nothing of who runs it, but for what finding programs,
+libraries and graphics needs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Self, TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign, Trace
+from coursebuild.core.run import supervisor
+from coursebuild.core.run.notes import Notes
+from coursebuild.core.run.surroundings import OtherEnvironment, library_folder, wanted_packages
+from coursebuild.core.run.surroundings import clean_environment as clean_environment
+from coursebuild.core.run.watching import STDERR_KEPT
+from coursebuild.core.run.workers import ForkServer, ServerLostError, Worker, spawn_worker
+
+
+class RunStarted(Struct, frozen=True):
+    """A script was handed to a supervisor."""
+
+    path: str
+    total: int
+    """How many scripts are run in all."""
+
+
+class RunFinished(Struct, frozen=True):
+    """A script is through, one way or another."""
+
+    run: ScriptRun
+    done: int
+    """How many are through, with this one."""
+    total: int
+
+
+RunEvent: TypeAlias = RunStarted | RunFinished
+
+
+class RunStoppedError(Exception):
+    """Whoever asked for scripts to be run wants them no more; what ran was ended."""
+
+
+_PATIENCE = 0.1
+"""Seconds after which it is asked again whether a run is still wanted."""
+
+_LOG = "MUJOCO_LOG.TXT"
+"""What MuJoCo writes where it runs when it warns, in a process that a script has started."""
+
+
+def run_scripts(
+    root: Path,
+    jobs: Sequence[ScriptJob],
+    *,
+    parallel: int,
+    on_event: Callable[[RunEvent], None] | None = None,
+    order: Sequence[int] | None = None,
+    fork: bool = True,
+) -> tuple[ScriptRun, ...]:
+    """Run scripts; those marked `norun` are not, and cause no event.
+
+    Args:
+        root: the course folder, which becomes the working directory.
+        jobs: what to run.
+        parallel: how many at a time, at least 1.
+        on_event: is told of every start and end, in this thread. What it raises ends the run.
+        order: indices of jobs in the order of their start; without it they start as they stand.
+        fork: let a server fork the scripts, where it can.
+
+    Returns:
+        What each did, in the order of the jobs.
+
+    Raises:
+        EffectError: there is no place for temporary files.
+    """
+    with ScriptServer(fork=fork) as server:
+        return server.run(root, jobs, parallel=parallel, on_event=on_event, order=order)
+
+
+class ScriptServer:
+    """Runs scripts, again and again: what they import stays imported in a process apart.
+
+    The process is started when scripts are first run; a new one takes its place when it has died,
+    when packages of other versions were installed, and when the environment is another one.
+
+    Args:
+        fork: let a server fork the scripts, where it can.
+        place: another interpreter that is to run them.
+    """
+
+    def __init__(self, *, fork: bool = True, place: OtherEnvironment | None = None) -> None:
+        self._place = place
+        self._fork = fork and sys.platform == "linux"
+        self._server: ForkServer | None = None
+        self._idle: list[Worker] = []
+        """Supervisors that wait for the next run."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the process."""
+        self._dismiss_idle()
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+
+    def expect(self, packages: Sequence[str]) -> None:
+        """Begin to import packages that scripts will import, without waiting for it."""
+        if not self._fork:
+            return
+        environment = _environment(self._place)
+        with contextlib.suppress(ServerLostError, OSError):  # which the run will find too
+            self._usable(environment).expect(packages)
+
+    def run(
+        self,
+        root: Path,
+        jobs: Sequence[ScriptJob],
+        *,
+        parallel: int,
+        on_event: Callable[[RunEvent], None] | None = None,
+        order: Sequence[int] | None = None,
+        unwanted: Callable[[frozenset[str]], bool] | None = None,
+    ) -> tuple[ScriptRun, ...]:
+        """As `run_scripts`; one run at a time.
+
+        `unwanted` is asked now and then, with the paths of the scripts that run, whether to stop.
+
+        Raises:
+            RunStoppedError: it said so.
+        """
+        work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order, self._place)
+        if not work.waiting:
+            return work.results()
+        busy: set[Worker] = set()
+        work.scratch = _scratch()
+        log = work.root / _LOG
+        had_log = os.path.lexists(log)
+        try:
+            with selectors.DefaultSelector() as selector:
+                for _ in range(min(max(parallel, 1), len(work.waiting))):
+                    self._start(busy, selector, work)
+                while busy:
+                    for key, _ in selector.select(None if unwanted is None else _PATIENCE):
+                        self._hear(key.data, busy, selector, work)
+                    if unwanted is not None and unwanted(work.running(busy)):
+                        raise RunStoppedError
+        finally:
+            for worker in busy:
+                worker.dismiss()  # all of them, before waiting for any
+            for worker in busy:
+                worker.close()
+            supervisor.remove_folder(work.scratch)
+            if not had_log:
+                with contextlib.suppress(OSError):
+                    log.unlink()
+        return work.results()
+
+    def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
+        worker = self._worker(work)
+        busy.add(worker)
+        selector.register(worker, selectors.EVENT_READ, worker)
+        work.next(worker)
+
+    def _hear(
+        self, worker: Worker, busy: set[Worker], selector: selectors.BaseSelector, work: _Work
+    ) -> None:
+        there = work.hear(worker)
+        if there and worker.job is not None:
+            return
+        selector.unregister(worker)
+        busy.remove(worker)
+        if there:
+            self._idle.append(worker)
+            return
+        worker.close()
+        if work.waiting:
+            self._start(busy, selector, work)
+
+    def _worker(self, work: _Work) -> Worker:
+        for _ in range(2):  # a server that dies while it is asked is replaced once
+            if not self._fork:
+                break
+            server = self._usable(work.environment)
+            try:
+                if server.load(work.packages()):
+                    self._dismiss_idle()  # they were forked before that
+                return self._idle_worker(work) or server.worker(work.scratch)
+            except ServerLostError:
+                self.close()
+        return self._idle_worker(work) or spawn_worker(work.environment, work.python)
+
+    def _usable(self, environment: Mapping[str, str]) -> ForkServer:
+        if self._server is not None and not self._server.usable(environment):
+            self.close()
+        if self._server is None:
+            python = None if self._place is None else self._place.python
+            self._server = ForkServer(environment, python)
+        return self._server
+
+    def _idle_worker(self, work: _Work) -> Worker | None:
+        while self._idle:
+            worker = self._idle.pop()
+            worker.rested = True
+            if worker.environment == work.environment and worker.is_there():
+                return worker
+            worker.close()
+        return None
+
+    def _dismiss_idle(self) -> None:
+        while self._idle:
+            self._idle.pop().close()
+
+
+class _Work:
+    """What is to be done, and what is done."""
+
+    def __init__(
+        self,
+        root: Path,
+        jobs: Sequence[ScriptJob],
+        tell: Callable[[RunEvent], None],
+        order: Sequence[int] | None,
+        place: OtherEnvironment | None,
+    ) -> None:
+        self.root = root
+        self.jobs = jobs
+        self.tell = tell
+        self.environment = _environment(place)
+        self.python = None if place is None else place.python
+        self.library = library_folder() if place is None else place.packages
+        self.scratch = ""
+        self.runs: dict[int, ScriptRun] = {
+            i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
+            for i, job in enumerate(jobs)
+            if job.norun
+        }
+        self.waiting = [i for i in order or range(len(jobs)) if i not in self.runs]
+        self.total = len(self.waiting)
+        self.done = 0
+        self.told: set[int] = set()
+        """The jobs whose start was told."""
+        self._packages: tuple[str, ...] | None = None
+
+    def packages(self) -> tuple[str, ...]:
+        """What is worth importing before."""
+        if self._packages is None:
+            self._packages = wanted_packages(self.root / self.jobs[i].path for i in self.waiting)
+        return self._packages
+
+    def next(self, worker: Worker) -> None:
+        """Hand over the next job, if there is one."""
+        if not self.waiting:
+            return
+        index = self.waiting.pop(0)
+        if index not in self.told:
+            self.told.add(index)
+            self.tell(RunStarted(self.jobs[index].path, self.total))
+        worker.give(index, self._message(self.jobs[index]))
+
+    def hear(self, worker: Worker) -> bool:
+        """Take what a supervisor says; `False` when it is gone."""
+        if not worker.read():
+            if worker.job is not None:
+                index, worker.job = worker.job, None
+                if worker.rested:  # it may have been as good as gone before it was given the job
+                    self.waiting.insert(0, index)
+                    return False
+                self._finish(index, _lost(self.jobs[index].path, worker.status()))
+            return False
+        if worker.job is not None and (report := worker.take_report()) is not None:
+            index, worker.job = worker.job, None
+            worker.rested = False
+            self._finish(index, _script_run(self.jobs[index].path, *report))
+            self.next(worker)
+        return True
+
+    def running(self, busy: Iterable[Worker]) -> frozenset[str]:
+        """The paths of what these supervisors run."""
+        return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
+
+    def results(self) -> tuple[ScriptRun, ...]:
+        return tuple(self.runs[i] for i in range(len(self.jobs)))
+
+    def _message(self, job: ScriptJob) -> bytes:
+        request: supervisor.Job = {
+            "root": str(self.root),
+            "path": job.path,
+            "args": list(job.args),
+            "timeout": job.timeout,
+            "requires": list(job.requires),
+            "environment": self.environment,
+            "scratch": self.scratch,
+            "library": self.library,
+            "perturbation": job.perturbation,
+        }
+        return json.dumps(request).encode()
+
+    def _finish(self, index: int, run: ScriptRun) -> None:
+        self.runs[index] = run
+        self.done += 1
+        self.tell(RunFinished(run, self.done, self.total))
+
+
+def _environment(place: OtherEnvironment | None) -> dict[str, str]:
+    clean = clean_environment(os.environ)
+    return clean if place is None else place.environment(clean)
+
+
+def _script_run(
+    path: str, report: supervisor.ChildReport, out: bytes, err: bytes, trace: bytes
+) -> ScriptRun:
+    stdout, is_text = _decode(out)
+    outcome, status = _outcome(report)
+    if outcome is Outcome.OK and not is_text:
+        outcome = Outcome.ENCODING
+    if len(err) == STDERR_KEPT:
+        err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
+    return ScriptRun(
+        path,
+        outcome,
+        status,
+        stdout,
+        _decode(err)[0],
+        report["seconds"],
+        missing=tuple(report["missing"]),
+        trace=_trace(json.loads(trace)) if trace else None,
+    )
+
+
+def _trace(notes: Notes) -> Trace:
+    return Trace(
+        files=tuple(notes["files"]),
+        folders=tuple(notes["folders"]),
+        outside=tuple(notes["outside"]),
+        modules=tuple(notes["modules"]),
+        opaque=notes["opaque"],
+        divergences=tuple(_divergence(*fields) for fields in notes["divergences"]),
+        moved=notes["moved"],
+        states=tuple(notes["states"]),
+    )
+
+
+def _divergence(sign: str, detail: str, time: str, model: str, path: str, line: str) -> Divergence:
+    depth, *geoms = detail.split("\x1f")
+    return Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
+
+
+def _outcome(report: supervisor.ChildReport) -> tuple[Outcome, int]:
+    status = report["status"]
+    match report["end"]:
+        case "missing":
+            return Outcome.SKIPPED, 0
+        case "timeout":
+            return Outcome.TIMEOUT, -status
+        case "output-limit":
+            return Outcome.OUTPUT_LIMIT, -status
+        case "unstartable":
+            return Outcome.FAILED, status
+        case "exit":
+            if status < 0:
+                return Outcome.KILLED, -status
+            return (Outcome.FAILED if status else Outcome.OK), status
+
+
+def _decode(data: bytes) -> tuple[str, bool]:
+    """Text with LF line ends, other bytes than UTF-8 made visible; whether there were none."""
+    try:
+        text, is_text = data.decode("utf-8"), True
+    except UnicodeDecodeError:
+        text, is_text = data.decode("utf-8", "backslashreplace"), False
+    return text.replace("\r\n", "\n"), is_text
+
+
+def _lost(path: str, status: int) -> ScriptRun:
+    """The result of a script whose supervisor died under it."""
+    if status >= 0:
+        raise RuntimeError(f"the supervisor of {path} failed with status {status}")
+    name = signal.Signals(-status).name
+    text = f"the process that supervises this script was ended by {name}\n"
+    return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)
+
+
+def _scratch() -> str:
+    """A folder for the scripts' temporary folders."""
+    try:
+        return tempfile.mkdtemp(prefix="coursebuild-")
+    except OSError as error:
+        raise EffectError(f"there is no place for temporary files: {reason(error)}") from None

@@ -1,0 +1,309 @@
+"""JavaScript in this process: V8 with limits on time and memory, and Temml in it.
+
+Entry points: `MathEngine.typeset`; `Isolate`, for other scripts; `start`, before copies of this
+process are made.
+
+1. mini-racer brings V8, which runs scripts in a thread of its own, and tells an event loop when one
+   has ended. Each isolate has such a loop, in one more thread. Both end when it is closed, so that
+   this process can be forked again.
+2. Formulas cross the border many at a time, as JSON (see `typeset.js`).
+3. When a batch hits a limit, its isolate is thrown away, and its formulas go one by one, so that
+   one of them gets the blame.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import atexit
+import contextlib
+import json
+import re
+import threading
+import time
+from collections.abc import Coroutine, Iterator, Sequence
+from concurrent.futures import CancelledError, Future
+from pathlib import Path
+from typing import Any, Self, TypedDict
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.resources import assets_dir
+from coursebuild.core.model.results import Formula, MathError
+
+_FLAGS = (
+    "--single-threaded",
+    "--wasm-sync-tier-up",
+    "--no-opt",
+    "--invocation-count-for-maglev=2000",
+)
+"""V8 has no threads here that would compile hot WebAssembly anew, and would stay with its first,
+several times slower code; so it does that at once, where it is. Of the two compilers for hot
+JavaScript the slower one is left out: typesetting a course would be over before it pays, and takes
+a fifth less without; the code of labs runs as fast with the other. That one compiles a function
+after 2,000 calls: as early as V8 does by itself, it took a quarter of the time of typesetting."""
+_MEMORY = 128 << 20
+"""Bytes of JavaScript objects."""
+_START_SECONDS = 20.0
+_BATCH = 100
+"""Formulas at a time; one takes about 0.3 ms."""
+_BATCH_SECONDS = 20.0
+_SINGLE_SECONDS = 5.0
+_LONGEST_MESSAGE = 160
+_SLOWEST = 10.0
+"""How many times longer than on an idle machine a script may take before it is ended."""
+
+
+class StoppedError(BaseException):
+    """Another thread has asked for the end of what ran.
+
+    Like a `KeyboardInterrupt` it is no failure that anything on its way might deal with.
+    """
+
+
+class LimitError(Exception):
+    """A script ran too long or took too much memory; its isolate should not be used any more."""
+
+
+class ScriptError(Exception):
+    """A script threw or does not parse; the text says what and where."""
+
+
+def start() -> None:
+    """Start V8, where it does not run yet; no thread begins, and copies of this process share it.
+
+    Raises:
+        EffectError: it is not there.
+    """
+    try:
+        from py_mini_racer import LibNotFoundError, init_mini_racer
+
+        init_mini_racer(flags=_FLAGS, ignore_duplicate_init=True)
+    except (ImportError, OSError, AttributeError) as error:
+        raise _missing(error) from None
+    except LibNotFoundError as error:
+        raise _missing(error) from None
+
+
+def _missing(error: Exception) -> EffectError:
+    help = "run `pip install coursebuild` again"
+    return EffectError(f"mini-racer's V8 cannot be used: {error}", help=help)
+
+
+class Isolate:
+    """A JavaScript context of its own, with some scripts loaded, for one thread at a time.
+
+    Close it: a process that ends with V8 running may hang.
+    """
+
+    def __init__(self, *scripts: str, memory: int = _MEMORY) -> None:
+        start()
+        from py_mini_racer import mini_racer
+
+        self._memory = memory
+        self._lock = threading.Lock()
+        """Held while the following two are looked at or changed."""
+        self._running: Future[Any] | None = None
+        self._is_stopped = False
+        self._life = contextlib.ExitStack()
+        self._loop = self._life.enter_context(_event_loop())
+        self._racer = self._life.enter_context(mini_racer(self._loop))
+        self._racer.set_hard_memory_limit(memory)
+        self._life.callback(lambda: self._submit(_end_tasks()).result())
+        atexit.register(self.close)
+        for script in scripts:
+            self._evaluate(script, _START_SECONDS)
+
+    def close(self) -> None:
+        """End what runs, and free all memory; the isolate cannot be used any more."""
+        atexit.unregister(self.close)
+        self.stop()
+        self._life.close()
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and all that comes after, by a `StoppedError`."""
+        with self._lock:
+            self._is_stopped = True
+            if self._running is not None:
+                self._running.cancel()
+
+    def call(self, function: str, argument: str, seconds: float) -> str:
+        """Call a global function from string to string.
+
+        Raises:
+            LimitError: it ran for more than `seconds`, or took too much memory.
+            ScriptError: it threw.
+        """
+        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds)
+        if not isinstance(result, str):
+            raise TypeError(f"{function} returned no string")
+        return result
+
+    def fill(self, name: str, data: bytes) -> None:
+        """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
+        place = self._evaluate(f"reserve({json.dumps(name)}, {len(data)})", _START_SECONDS)
+        assert isinstance(place, memoryview)
+        place[:] = data
+
+    def _evaluate(self, code: str, seconds: float) -> object:
+        from py_mini_racer import JSEvalException, JSOOMException
+
+        with self._lock:
+            if self._is_stopped:
+                raise StoppedError
+            self._running = running = self._submit(self._in_time(code, seconds))
+        try:
+            return running.result()
+        except CancelledError:
+            raise StoppedError from None
+        except JSOOMException:
+            raise LimitError(f"took more than {self._memory >> 20} MiB") from None
+        except JSEvalException as error:
+            raise ScriptError(str(error)) from None
+        finally:
+            running.cancel()  # where this thread was interrupted
+            self._running = None
+
+    def _submit(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
+        return asyncio.run_coroutine_threadsafe(work, self._loop)
+
+    async def _in_time(self, code: str, seconds: float) -> object:
+        """The value of a script, in the loop's thread.
+
+        Processor time is what counts, since other work on this machine must not end a good script;
+        no more of it than has passed, as other threads of this process take some too.
+        """
+        task = asyncio.ensure_future(self._racer.eval_cancelable(code))
+        began, began_work = time.monotonic(), time.process_time()
+        try:
+            spent = 0.0
+            while spent < seconds:
+                done, _ = await asyncio.wait((task,), timeout=max(seconds - spent, 0.01))
+                if done:
+                    return task.result()
+                passed = time.monotonic() - began
+                spent = max(min(passed, time.process_time() - began_work), passed / _SLOWEST)
+        finally:
+            task.cancel()
+        # Where the script came to its own end just now, V8 would end the next one in its place.
+        await asyncio.gather(task, self._racer.eval_cancelable("0"), return_exceptions=True)
+        raise LimitError(f"ran for more than {seconds:g} s")
+
+
+@contextlib.contextmanager
+def _event_loop() -> Iterator[asyncio.AbstractEventLoop]:
+    """An event loop in a thread of its own."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever, name="v8", daemon=True)
+    thread.start()
+    try:
+        yield loop
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
+
+
+async def _end_tasks() -> None:
+    """Cancel what the running loop still does, and wait until it has ended."""
+    tasks = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+class _Failure(TypedDict):
+    message: str
+    position: int | None
+
+
+class MathEngine:
+    """Typesets formulas; a context manager. May be used by several threads, one at a time."""
+
+    def __init__(self) -> None:
+        self._isolate: Isolate | None = None
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free V8's memory; the engine can be used again."""
+        if self._isolate is not None:
+            self._isolate.close()
+            self._isolate = None
+
+    def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
+        """The MathML of each formula, or why there is none; no macro outlives its formula.
+
+        Raises:
+            EffectError: Temml or V8 is not there.
+        """
+        with self._lock:
+            return [
+                result
+                for start in range(0, len(formulas), _BATCH)
+                for result in self._batch(formulas[start : start + _BATCH])
+            ]
+
+    def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
+        try:
+            yield from self._call(
+                formulas, _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
+            )
+        except LimitError as error:
+            self.close()
+            if len(formulas) > 1:
+                for formula in formulas:
+                    yield from self._batch([formula])
+            else:
+                yield MathError(f"the formula {error}", None)
+
+    def _call(self, formulas: Sequence[Formula], seconds: float) -> list[str | MathError]:
+        if self._isolate is None:
+            self._isolate = Isolate(*_scripts())
+        request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
+        replies: list[str | _Failure] = json.loads(self._isolate.call("typeset", request, seconds))
+        return [_result(f, reply) for f, reply in zip(formulas, replies, strict=True)]
+
+
+def _scripts() -> tuple[str, ...]:
+    paths = (assets_dir() / "temml" / "temml.min.js", Path(__file__).with_name("typeset.js"))
+    return tuple(path.read_text(encoding="utf-8") for path in paths)
+
+
+def _result(formula: Formula, reply: str | _Failure) -> str | MathError:
+    if isinstance(reply, str):
+        return reply
+    position = reply["position"]
+    if position is not None:
+        position = _code_points(formula.tex, position)
+    return MathError(readable(reply["message"]), position)
+
+
+def _code_points(text: str, utf16: int) -> int:
+    """An offset in UTF-16 units as one in code points."""
+    units = text.encode("utf-16-le", "surrogatepass")[: 2 * utf16]
+    return len(units.decode("utf-16-le", "ignore"))
+
+
+_WORDING = (
+    (re.compile(r"^Unsupported function name: "), "unknown command "),
+    (re.compile(r"^Expected 'EOF', got (.*)$", re.DOTALL), r"unexpected \1"),
+    (re.compile(r"^Too many expansions.*$", re.DOTALL), "a macro expands without end"),
+    (re.compile(r"'EOF'"), "the end of the formula"),
+    (re.compile(r"^it "), "the formula "),
+)
+_CAPITAL = re.compile(r"^[A-Z](?=[a-z]*\b)")
+
+
+def readable(message: str) -> str:
+    """Temml's message in our style: lower case, one line, no full stop, not too long."""
+    message = " ".join(message.removeprefix("ParseError:").split())
+    for pattern, words in _WORDING:
+        message = pattern.sub(words, message)
+    message = _CAPITAL.sub(lambda m: m.group().lower(), message)
+    if len(message) > _LONGEST_MESSAGE:
+        message = message[: _LONGEST_MESSAGE - 1] + "…"
+    return message.rstrip(".")

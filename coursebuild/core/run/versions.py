@@ -1,0 +1,54 @@
+"""The versions of what runs the scripts, found without importing any of it.
+
+Entry points: `python_version`, `engine_version`, `package_version`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from coursebuild.core.files.errors import EffectError
+
+
+def python_version() -> str:
+    """Of the interpreter that runs this tool and the scripts, such as `3.11.7`."""
+    return sys.version.split()[0]
+
+
+def engine_version() -> str:
+    """Of the installed MuJoCo, such as `3.14.0`.
+
+    Raises:
+        EffectError: there is none.
+    """
+    version = _version("mujoco")
+    if version is None:
+        raise EffectError(
+            "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
+        )
+    return version
+
+
+def package_version(name: str) -> str:
+    """Of an installed distribution; `none` where there is none."""
+    return _version(name) or "none"
+
+
+def _version(name: str) -> str | None:
+    """The version of a distribution, by the name of the folder that says what it is."""
+    start = f"{name.replace('-', '_').lower()}-"
+    for folder in sys.path:
+        try:
+            found = [e for e in os.listdir(folder or ".") if e.lower().startswith(start)]  # noqa: PTH208
+        except OSError:
+            continue
+        for entry in sorted(found):
+            if entry.endswith(".dist-info"):
+                return entry[len(start) : -len(".dist-info")]
+    import importlib.metadata  # which reads more, and takes longer than all else
+
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

@@ -1,0 +1,196 @@
+"""A script that runs: its output, its limits, and the end of everything that it started.
+
+Entry point: `Watched`, used by `supervisor`, whose process has one thread and is the one that
+orphans of the script become children of.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from coursebuild.core.run.notes import Notes
+
+_EXITING = 0x4
+"""A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
+STDOUT_LIMIT = 1 << 20
+"""Bytes that a script may print."""
+STDERR_KEPT = 1 << 16
+"""Bytes of its error output that are kept, from the end."""
+GRACE = 0.5
+"""Seconds between asking a script that ran too long where it is, and killing it."""
+
+_CHUNK = 1 << 16
+
+
+class Launched(NamedTuple):
+    """The process of a script, and the ends of its pipes that are read here."""
+
+    pid: int
+    stdout: int
+    stderr: int
+    notes: Callable[[], Notes | None]
+    """What it looked at, once it has ended; `None` where nobody took notes."""
+
+
+def has_ended(parent: int) -> bool:
+    """Whether the process that started this one has ended, or is about to.
+
+    One that ends closes its files before its children get another parent: who finds its end of a
+    pipe closed may still find it as its parent. Linux says of such a process that it is exiting.
+    """
+    if os.getppid() != parent:
+        return True
+    try:
+        with open(f"/proc/{parent}/stat", "rb") as file:  # noqa: PTH123 (as cheap as can be)
+            state, *fields = file.read().rpartition(b")")[2].split()
+        return state in (b"Z", b"X") or bool(int(fields[5]) & _EXITING)
+    except (OSError, ValueError, IndexError):
+        return False
+
+
+class Watched:
+    """One script, from its start until nothing of it is left."""
+
+    def __init__(self, launched: Launched, start: float, timeout: float, awake: int) -> None:
+        self.pid = launched.pid
+        self.awake = awake
+        self.stdout = bytearray()
+        self.stderr = bytearray()
+        self.over: Literal["exit", "timeout", "output-limit"] = "exit"
+        self.seconds = 0.0
+        self.start = start
+        self.deadline = start + timeout
+        self.status: int | None = None
+        self.pipes = {launched.stdout: self.stdout, launched.stderr: self.stderr}
+        self._opened = (launched.stdout, launched.stderr)
+        for fd in self.pipes:
+            os.set_blocking(fd, False)
+
+    def watch(self, tool: int, parent: int) -> None:
+        """Return when the script has ended, or must.
+
+        Exit when `tool` closes its pipe, and when the parent of this process is no more `parent`,
+        which it was before the script was started.
+        """
+        while not self._ended():
+            now = time.monotonic()
+            if now >= self.deadline:
+                self._ask_where()
+                return
+            ready = self._wait(min(self.deadline - now, 1.0), [tool])
+            if tool in ready or os.getppid() != parent:
+                sys.exit(0)  # `end` and the removal of the folder happen on the way out
+            if len(self.stdout) > STDOUT_LIMIT:
+                self.over = "output-limit"
+                return
+
+    def end(self) -> None:
+        """Kill whatever is left, and take what it had printed."""
+        self.seconds = time.monotonic() - self.start
+        with contextlib.suppress(OSError):
+            os.killpg(self.pid, signal.SIGKILL)
+        self._kill_descendants(time.monotonic() + 5.0)
+        for fd in list(self.pipes):
+            while self._read(fd):
+                pass
+        if self.over == "exit" and len(self.stdout) > STDOUT_LIMIT:
+            self.over = "output-limit"
+        for fd in self._opened:
+            os.close(fd)
+
+    def exit_status(self) -> int:
+        """Minus the signal's number where one ended it, which it does where a limit was reached."""
+        if self.status is None or self.over != "exit":
+            return -signal.SIGKILL
+        return self.status
+
+    def _ask_where(self) -> None:
+        """Let the script say where it hangs: Python's fault handler answers SIGABRT."""
+        self.over = "timeout"
+        with contextlib.suppress(OSError):
+            os.kill(self.pid, signal.SIGABRT)
+        until = time.monotonic() + GRACE
+        while not self._ended() and (left := until - time.monotonic()) > 0:
+            self._wait(left, [])
+            if len(self.stdout) > STDOUT_LIMIT:
+                return
+
+    def _wait(self, seconds: float, others: list[int]) -> set[int]:
+        """Wait for a pipe, the end of a child, or one of `others`; returns which of these."""
+        poll = select.poll()
+        for fd in (*self.pipes, self.awake, *others):
+            poll.register(fd, select.POLLIN)
+        ready = {fd for fd, _ in poll.poll(max(1.0, seconds * 1000.0))}
+        if self.awake in ready:
+            with contextlib.suppress(BlockingIOError):
+                os.read(self.awake, _CHUNK)
+        for fd in ready & self.pipes.keys():
+            self._read(fd)
+        return ready.intersection(others)
+
+    def _read(self, fd: int) -> bool:
+        """Take what a pipe holds, at most a chunk; whether there may be more."""
+        try:
+            data = os.read(fd, _CHUNK)
+        except BlockingIOError:
+            return False
+        if not data:
+            self.pipes.pop(fd, None)
+            return False
+        kept = self.pipes[fd]
+        kept += data
+        if kept is self.stderr and len(kept) > 4 * STDERR_KEPT:
+            del kept[:-STDERR_KEPT]
+        return kept is self.stderr or len(kept) <= STDOUT_LIMIT
+
+    def _ended(self) -> bool:
+        """Reap every child that has ended; whether the script is among them."""
+        with contextlib.suppress(ChildProcessError):
+            while (child := os.waitpid(-1, os.WNOHANG))[0]:
+                if child[0] == self.pid:
+                    self.status = os.waitstatus_to_exitcode(child[1])
+        return self.status is not None
+
+    def _kill_descendants(self, until: float) -> None:
+        """Kill every process that the script left: a dying one hands its children on to us."""
+        while time.monotonic() < until:
+            self._ended()
+            children = list(_children())
+            if not children and self.status is not None:
+                return
+            for child in children:
+                with contextlib.suppress(OSError):
+                    os.kill(child, signal.SIGKILL)
+            if self.status is None:
+                with contextlib.suppress(OSError):
+                    os.kill(self.pid, signal.SIGKILL)
+            time.sleep(0.001)
+
+
+def _children() -> Iterator[int]:
+    """The children of this process that are alive or not yet reaped, where the system can tell."""
+    me = os.getpid()
+    try:
+        listed = os.open(f"/proc/self/task/{me}/children", os.O_RDONLY)
+    except OSError:
+        pass
+    else:
+        try:
+            yield from map(int, os.read(listed, _CHUNK).split())
+        finally:
+            os.close(listed)
+        return
+    with contextlib.suppress(OSError):
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                # The name, in parentheses, may hold anything; the parent is the second field after.
+                if int((entry / "stat").read_text().rpartition(")")[2].split()[1]) == me:
+                    yield int(entry.name)

@@ -1,0 +1,198 @@
+"""What was printed, line by line with its numbers, and which of these a bound number may mean.
+
+Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of a run);
+`Shown.of`, `shows`, `text_places`.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from msgspec import Struct
+
+from coursebuild.core.model import Recording, Table
+from coursebuild.core.scripts.celltext import plain
+from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.numbers import (
+    Number,
+    round_like,
+    scan,
+    scan_prose,
+    within_half_unit,
+)
+from coursebuild.core.scripts.tables import RowCell, table_rows
+from coursebuild.core.text.source import Excerpt, Span
+
+Locate = Callable[[int, int], Span]
+
+
+class PrintedLine(Struct, frozen=True):
+    """A line of output, or a row of a recorded table with its cells joined."""
+
+    text: str
+    locate: Locate | None
+    """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
+
+    @property
+    def numbers(self) -> tuple[Number, ...]:
+        """Its numbers: of most lines nobody asks for them."""
+        return _numbers(self.text)
+
+
+@functools.lru_cache(maxsize=512)
+def _numbers(text: str) -> tuple[Number, ...]:
+    return scan(text)
+
+
+def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
+    """The lines of an output that is not recorded."""
+    return tuple(PrintedLine(text, None) for text in Side.of(stdout).texts)
+
+
+def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
+    """The lines of a recorded output, as the author sees them: no filter is applied."""
+    if isinstance(recording.body, Table):
+        return tuple(_row_line(row) for row in table_rows(recording.body) if row)
+    side = Side.of(recording.body.text)
+    return tuple(
+        PrintedLine(line.text, _in_fence(recording.body, side, index))
+        for index, line in enumerate(side.lines)
+    )
+
+
+def _in_fence(body: Excerpt, side: Side, line: int) -> Locate:
+    return lambda start, end: body.span(*side.origin(line, start, end))
+
+
+def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
+    starts: list[int] = []
+    at = 0
+    for cell in row:
+        starts.append(at)
+        at += len(cell.mapped.text) + 1
+    text = " ".join(cell.mapped.text for cell in row)
+
+    def locate(start: int, end: int) -> Span:
+        first = bisect_right(starts, start) - 1
+        last = max(first, bisect_right(starts, max(start, end - 1)) - 1)
+        low, _ = row[first].mapped.origin(start - starts[first], start - starts[first])
+        _, high = row[last].mapped.origin(0, min(end - starts[last], len(row[last].mapped.text)))
+        return Span(row[first].cell.span.source, low, max(low, high))
+
+    return PrintedLine(text, locate)
+
+
+def shows(shown: Number, printed: Number) -> bool:
+    """Whether a number in prose is a printed one, rounded to the digits shown."""
+    if not (shown.finite and printed.finite):
+        return (shown.value.is_nan() and printed.value.is_nan()) or shown.value == printed.value
+    if shown.integer and printed.integer:
+        return shown.value == printed.value
+    return within_half_unit(shown, printed.value)
+
+
+class Window(Struct, frozen=True):
+    """Numbers of one printed line, one after the other."""
+
+    line: PrintedLine
+    numbers: tuple[Number, ...]
+
+    @property
+    def text(self) -> str:
+        """The numbers as printed."""
+        return ", ".join(number.text for number in self.numbers)
+
+
+class Shown(Struct, frozen=True):
+    """What a binding shows: its numbers and the text around them; `before` is all without any."""
+
+    before: str
+    numbers: tuple[Number, ...]
+    after: str
+
+    @classmethod
+    def of(cls, text: str) -> Shown:
+        """The numbers and the plain text of a binding."""
+        numbers = scan_prose(text)
+        if not numbers:
+            return cls(plain(text), (), "")
+        return cls(plain(text[: numbers[0].start]), numbers, plain(text[numbers[-1].end :]))
+
+    def shows(self, window: Window) -> bool:
+        """Whether the printed numbers are those shown, rounded."""
+        pairs = zip(self.numbers, window.numbers, strict=True)
+        return all(shows(shown, printed) for shown, printed in pairs)
+
+    def rewritten(self, text: str, window: Window) -> str | None:
+        """The binding's text with printed numbers in it, rounded to the digits that it shows.
+
+        `None` where its notation is not that of a printed number.
+        """
+        parts: list[str] = []
+        at = 0
+        for number, printed in zip(self.numbers, window.numbers, strict=True):
+            rounded = round_like(number, printed.value) if printed.finite else None
+            if rounded is None:
+                return None
+            parts += (text[at : number.start], rounded)
+            at = number.end
+        return "".join((*parts, text[at:]))
+
+    def is_in(self, lines: Sequence[PrintedLine]) -> bool:
+        """Whether printed numbers that may be meant are those shown, rounded."""
+        if self.before or self.after:
+            return any(map(self.shows, self.windows(lines)))
+        # Any number may be meant. Most stand in a line as they are shown, which comes first here.
+        first = self.numbers[0].text
+        likeliest = sorted(lines, key=lambda line: first not in line.text)
+        return any(self.shows(window) for line in likeliest for window in self._in(line))
+
+    def _in(self, line: PrintedLine) -> Iterator[Window]:
+        count, numbers = len(self.numbers), line.numbers
+        for first in range(len(numbers) - count + 1):
+            yield Window(line, numbers[first : first + count])
+
+    def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
+        """The printed numbers that may be meant, by number and by the text around them."""
+        windows = [window for line in lines for window in self._in(line)]
+        for pattern, side in self._sides():
+            windows = [w for w in windows if side(w, pattern)] or windows
+        return windows
+
+    def stands_beside(self, window: Window) -> bool:
+        """Whether the text around the numbers stands around the printed ones as well."""
+        return all(side(window, pattern) for pattern, side in self._sides())
+
+    def _sides(self) -> Iterator[tuple[str, Callable[[Window, str], bool]]]:
+        for pattern, side in ((self.after, _followed), (self.before, _preceded)):
+            if pattern:
+                yield pattern, side
+
+
+def _followed(window: Window, text: str) -> bool:
+    rest = window.line.text[window.numbers[-1].end :].lstrip().replace("\u2212", "-")
+    return re.match(_whole_words(text), rest) is not None
+
+
+def _preceded(window: Window, text: str) -> bool:
+    start = window.numbers[0].start
+    before = plain(window.line.text[max(0, start - 4 * len(text) - 200) : start])
+    return re.search(_whole_words(text) + r"\Z", before) is not None
+
+
+def _whole_words(text: str) -> str:
+    """A pattern for a text, its white space of any width, that does not begin or end in a word."""
+    lead = r"(?<!\w)" if text[:1].isalnum() else ""
+    tail = r"(?!\w)" if text[-1:].isalnum() else ""
+    return lead + r"\s+".join(re.escape(word) for word in text.split()) + tail
+
+
+def text_places(text: str, lines: Iterable[PrintedLine]) -> Iterator[tuple[PrintedLine, int, int]]:
+    """Where a text stands in printed lines: whole words only, white space of any width."""
+    pattern = re.compile(_whole_words(text))
+    for line in lines:
+        for found in pattern.finditer(line.text.replace("\u2212", "-")):
+            yield line, found.start(), found.end()

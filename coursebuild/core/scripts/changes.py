@@ -1,0 +1,186 @@
+"""The differences between a recorded line and the line that ran, and their classes.
+
+Entry points: `differences` (inside one line), `number_kind`.
+
+1. Lines that differ in their numbers only: each pair of numbers that does not match.
+2. Other lines are cut into numbers, words, signs and white space, and these are aligned: numbers
+   that stand for each other are compared, the rest is text. White space that differs is named only
+   where nothing else does: columns shift when a number gets wider.
+3. A recorded line with an ellipsis that does not fit is different as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from msgspec import Struct
+
+from coursebuild.core.model.results import Change, DriftKind
+from coursebuild.core.scripts.lines import LineMatcher
+from coursebuild.core.scripts.numbers import (
+    Number,
+    agreeing_digits,
+    difference,
+    relative_error,
+    scan,
+    unit,
+)
+from coursebuild.core.scripts.pairing import MATCH, Keys, pair
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Span
+
+_PART = pattern(r"\s+|\w+|[^\w\s]")
+_SPACE, _NUMBER = 1, 4
+
+
+class Difference(Struct, frozen=True):
+    """A stretch of a recorded line, and the stretch of the line that ran which stands there."""
+
+    start: int
+    end: int
+    ran_start: int
+    ran_end: int
+    numbers: tuple[Number, Number] | None = None
+    """Recorded and ran, where both are a number."""
+
+
+def number_kind(recorded: Number, ran: Number) -> DriftKind:
+    """The class of a difference between two numbers.
+
+    It is rounding where a number with a point or an exponent is off by no more than one unit of its
+    last recorded place; a count that is off by one is not. The same value, written in another way,
+    is text.
+    """
+    if not (recorded.finite and ran.finite):
+        return DriftKind.NUMERIC
+    gap = difference(recorded.value, ran.value)
+    if gap == 0:
+        return DriftKind.TEXT
+    near = recorded.inexact and gap <= unit(recorded.place)
+    return DriftKind.ROUNDING if near else DriftKind.NUMERIC
+
+
+def number_change(
+    span: Span, recorded: str, ran: str, ran_line: int, numbers: tuple[Number, Number]
+) -> Change:
+    """The change of a number at a place of the lesson."""
+    error = relative_error(numbers[0].value, numbers[1].value)
+    size = None if error is None else float(error)
+    return Change(
+        number_kind(*numbers),
+        span,
+        recorded,
+        ran,
+        ran_line,
+        None if size == float("inf") else size,
+        None if error is None else agreeing_digits(error),
+    )
+
+
+def differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    """Where a line that ran differs from the recorded one; at least one difference."""
+    pairs = matcher.pairs(recorded, ran)
+    if pairs is not None:
+        numeric = tuple(
+            Difference(a.start, a.end, b.start, b.end, (a, b))
+            for a, b in pairs
+            if not matcher.same(a, b)
+        )
+        if numeric:
+            return numeric
+    if not matcher.elides(recorded):
+        found = _token_differences(recorded, ran, matcher)
+        if found:
+            return found
+    return (Difference(0, len(recorded), 0, len(ran)),)
+
+
+class _Token(Struct, frozen=True):
+    start: int
+    end: int
+    text: str
+    number: Number | None = None
+
+
+def _tokens(text: str) -> Iterator[_Token]:
+    at = 0
+    for number in (*scan(text), None):
+        stop = len(text) if number is None else number.start
+        for found in _PART.finditer(text, at, stop):
+            yield _Token(found.start(), found.end(), found.group())
+        if number is not None:
+            yield _Token(number.start, number.end, number.text, number)
+            at = number.end
+
+
+def _token_differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    left, right = tuple(_tokens(recorded)), tuple(_tokens(ran))
+
+    def weight(i: int, j: int) -> int:
+        a, b = left[i], right[j]
+        if a.number is not None and b.number is not None:
+            return MATCH if matcher.same(a.number, b.number) else _NUMBER
+        if a.text.isspace() and b.text.isspace():
+            return _SPACE
+        return MATCH if a.text == b.text else 0
+
+    pairs = pair(
+        Keys([t.text for t in left], ["0" if t.number else t.text for t in left]),
+        Keys([t.text for t in right], ["0" if t.number else t.text for t in right]),
+        weight,
+    )
+    found: list[Difference] = []
+    i = j = 0
+    for i_pair, j_pair in (*pairs, (len(left), len(right))):
+        if i < i_pair or j < j_pair:
+            found.append(_stretch(left, i, i_pair, right, j, j_pair, len(recorded), len(ran)))
+        if i_pair < len(left):
+            a, b = left[i_pair], right[j_pair]
+            if a.number is not None and b.number is not None:
+                if not matcher.same(a.number, b.number):
+                    both = (a.number, b.number)
+                    found.append(Difference(a.start, a.end, b.start, b.end, both))
+            elif a.text != b.text:
+                found.append(Difference(a.start, a.end, b.start, b.end))
+        i, j = i_pair + 1, j_pair + 1
+    return _merged(found, recorded, ran)
+
+
+def _stretch(
+    left: tuple[_Token, ...],
+    i: int,
+    i_stop: int,
+    right: tuple[_Token, ...],
+    j: int,
+    j_stop: int,
+    left_end: int,
+    right_end: int,
+) -> Difference:
+    start = left[i].start if i < len(left) else left_end
+    ran_start = right[j].start if j < len(right) else right_end
+    end = left[i_stop - 1].end if i_stop > i else start
+    ran_end = right[j_stop - 1].end if j_stop > j else ran_start
+    return Difference(start, end, ran_start, ran_end)
+
+
+def _merged(found: list[Difference], recorded: str, ran: str) -> tuple[Difference, ...]:
+    """Without white space where there is more; texts with only white space between them as one."""
+
+    def blank(d: Difference) -> bool:
+        return not (recorded[d.start : d.end].strip() or ran[d.ran_start : d.ran_end].strip())
+
+    visible = [d for d in found if not blank(d)] or found
+    merged: list[Difference] = []
+    for d in visible:
+        last = merged[-1] if merged else None
+        if (
+            last is not None
+            and last.numbers is None
+            and d.numbers is None
+            and not recorded[last.end : d.start].strip()
+            and not ran[last.ran_end : d.ran_start].strip()
+        ):
+            merged[-1] = Difference(last.start, d.end, last.ran_start, d.ran_end)
+        else:
+            merged.append(d)
+    return tuple(merged)

@@ -1,0 +1,324 @@
+"""What the result of a script depends on, and in which words to say that it changed.
+
+Entry points: `group_key`, `needs`, `input_changes`, `state_changes`, `forgotten`.
+
+1. What is known before a script runs (`Inputs`) names a group of results.
+2. What it looked at while it ran (a `Trace`) names its needs; each with its state at that time is a
+   `Dependency`. Modules sought in vain beside the script, which are many, are one of them.
+3. A result holds as long as every state is as it was.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+import hashlib
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import assert_never
+
+from msgspec import Struct
+
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.core.text.patterns import pattern
+
+VERSION = "3"
+"""To be changed with how scripts are run and watched: older results then count no more."""
+
+ABSENT = "absent"
+FOLDER = "folder"
+SPECIAL = "special"
+"""States of files that are none; other states are hashes, or say why nothing can be read."""
+
+_MISSING_MODULE = pattern(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
+_PERTURBATION = "moved states"
+"""Another name, once what is kept of such runs means something else: then they run again."""
+_SHOWN = 6
+"""Names of modules that are shown of a list."""
+_CHANGING = ("/proc/", "/sys/", "/dev/")
+
+
+class Kind(enum.Enum):
+    """What sort of thing a script looked at."""
+
+    FILE = "file"
+    """Of the project, by its path there."""
+    LISTING = "listing"
+    """The names in a folder of the project."""
+    SOUGHT = "sought"
+    """Modules that were looked for in a folder of the project (`folder/{one,two}`); its state is
+    which of them are there."""
+    OUTSIDE = "outside"
+    """A file elsewhere on this machine, by its absolute path."""
+    MODULE = "module"
+    """An installed one, by its name; its state is which versions of what provide it."""
+    PLACE = "place"
+    """Where something lies on this machine, for a script that printed it."""
+
+    __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
+
+
+class Need(Struct, frozen=True, order=True):
+    """Something whose state counts."""
+
+    kind: Kind
+    name: str
+
+
+class Dependency(Struct, frozen=True):
+    """Something that a script looked at, and how it was then."""
+
+    kind: Kind
+    name: str
+    state: str
+
+    @property
+    def need(self) -> Need:
+        """Without its state."""
+        return Need(self.kind, self.name)
+
+
+class Inputs(Struct, frozen=True):
+    """All that counts and is known before a script runs."""
+
+    path: str
+    text: str
+    """Hash of the script."""
+    args: tuple[str, ...]
+    timeout: float
+    requires: tuple[str, ...]
+    around: tuple[tuple[str, str], ...]
+    """What runs it, by name: the interpreter, the platform, variables of the environment."""
+    version: str = VERSION
+
+
+def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
+    """What is known of a job whose file holds this text."""
+    return inputs_by(job, hashlib.sha256(text).hexdigest(), around)
+
+
+def inputs_by(job: ScriptJob, digest: str, around: tuple[tuple[str, str], ...]) -> Inputs:
+    """The same by the SHA-256 of the file, in hexadecimal digits."""
+    if job.perturbation:
+        around = tuple(sorted((*around, (_PERTURBATION, str(job.perturbation)))))
+    return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
+
+
+def is_perturbed(inputs: Inputs) -> bool:
+    """Whether these are of a run whose initial states are moved."""
+    return any(name == _PERTURBATION for name, _ in inputs.around)
+
+
+def group_key(inputs: Inputs) -> str:
+    """The name of the group of results that these inputs can have."""
+    parts = [
+        inputs.path,
+        inputs.text,
+        inputs.args,
+        inputs.timeout,
+        inputs.requires,
+        inputs.around,
+        inputs.version,
+    ]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def result_key(dependencies: Iterable[Dependency]) -> str:
+    """The name of a result in its group."""
+    parts = sorted((d.kind.value, d.name, d.state) for d in dependencies)
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def needs(
+    run: ScriptRun, requires: Iterable[str], places: Iterable[tuple[str, str]]
+) -> tuple[Need, ...]:
+    """All whose state the result of a traced run depends on, sorted.
+
+    `places` are folders of this machine by name: `library` is the one that holds `mjcourse`.
+    """
+    trace = run.trace
+    assert trace is not None
+    found = {Need(Kind.FILE, path) for path in trace.files}
+    found |= {Need(Kind.LISTING, path) for path in trace.folders}
+    found |= {Need(Kind.MODULE, name) for name in _modules(trace, requires)}
+    known = dict(places)
+    ours = f"{known['library'].rstrip('/')}/mjcourse/"
+    for path in trace.outside:
+        # It may lie elsewhere on another machine, and is the same.
+        inside = path.startswith(ours)
+        found.add(Need(Kind.MODULE, "mjcourse") if inside else Need(Kind.OUTSIDE, path))
+    for name, folder in known.items():
+        if len(folder) > 1 and folder in run.stdout:
+            found.add(Need(Kind.PLACE, name))
+    return tuple(sorted(found, key=lambda need: (need.kind.value, need.name)))
+
+
+def folded(needed: Sequence[Need], state: Callable[[Need], str]) -> tuple[Need, ...]:
+    """The same needs, sorted, with modules that were looked for in vain as one for each folder.
+
+    An import of `json` looks for `json.py` and `json/__init__.py` beside the script, and so do all
+    the imports that this one makes: hundreds of files that are not there.
+    """
+    files = {need.name: need for need in needed if need.kind is Kind.FILE}
+    rest = {need for need in needed if need.kind is not Kind.FILE}
+    modules: dict[str, list[str]] = {}
+    vain: set[str] = set()
+    for name in sorted(files):  # a module comes before what would be in it as a package
+        package = name.removesuffix(".py")
+        pair = name, f"{package}/__init__.py"
+        folder, _, module = package.rpartition("/")
+        is_module = package != name and pair[1] in files and module.isidentifier()
+        if is_module and name not in vain and all(state(files[one]) == ABSENT for one in pair):
+            modules.setdefault(folder, []).append(module)
+            vain.update(pair)
+    rest.update(need for name, need in files.items() if name not in vain)
+    for folder, names in modules.items():
+        rest.add(Need(Kind.SOUGHT, f"{folder}/{{{','.join(sorted(names))}}}"))
+    return tuple(sorted(rest, key=lambda need: (need.kind.value, need.name)))
+
+
+def sought(name: str) -> tuple[str, tuple[str, ...]]:
+    """The folder and the modules of a need of the kind `SOUGHT`."""
+    folder, _, modules = name.rpartition("/{")
+    return folder, tuple(modules.removesuffix("}").split(","))
+
+
+@functools.lru_cache(maxsize=64)
+def sought_files(name: str) -> tuple[str, ...]:
+    """The files that were looked for, of a need of the kind `SOUGHT`."""
+    folder, modules = sought(name)
+    before = f"{folder}/" if folder else ""  # the project's own folder has no name
+    return tuple(f"{before}{module}{end}" for module in modules for end in (".py", "/__init__.py"))
+
+
+def _modules(trace: Trace, requires: Iterable[str]) -> Iterator[str]:
+    yield from trace.modules
+    yield from (name.partition(".")[0] for name in requires)
+
+
+def forgotten(run: ScriptRun) -> str:
+    """Why the result of a run is not remembered, as the end of a sentence; empty if it is."""
+    match run.outcome:
+        case Outcome.TIMEOUT:
+            return "it was stopped after its time limit"
+        case Outcome.KILLED:
+            return "a signal ended it"
+        case Outcome.SKIPPED:
+            return f"it needs {', '.join(run.missing)}"
+        case Outcome.NORUN:
+            return "its lesson says `norun`"
+        case Outcome.FAILED if _MISSING_MODULE.search(run.stderr):
+            return "it did not find a module"
+        case Outcome.OK | Outcome.FAILED | Outcome.OUTPUT_LIMIT | Outcome.ENCODING:
+            pass
+        case _:
+            assert_never(run.outcome)
+    if run.trace is None:
+        return "nobody could watch what it looks at"
+    changing = next((p for p in run.trace.outside if p.startswith(_CHANGING)), None)
+    if changing is not None and changing != "/dev/null":
+        return f"it reads {changing}"
+    return run.trace.opaque
+
+
+# --- what changed
+
+
+def input_changes(old: Inputs, new: Inputs) -> list[str]:
+    """What is different, each as a clause."""
+    found = []
+    if old.text != new.text:
+        found.append("its text changed")
+    if old.args != new.args:
+        found.append(f"its arguments changed: {_list(old.args)} → {_list(new.args)}")
+    if old.timeout != new.timeout:
+        found.append(f"its option `timeout` changed: {old.timeout:g} → {new.timeout:g}")
+    if old.requires != new.requires:
+        found.append(
+            f"its option `requires` changed: {_list(old.requires)} → {_list(new.requires)}"
+        )
+    before, now = dict(old.around), dict(new.around)
+    for name in sorted({*before, *now}):
+        one, two = before.get(name, "unset"), now.get(name, "unset")
+        if one != two:
+            found.append(f"{name}: {one} → {two}")
+    if old.version != new.version:
+        found.append("this version of coursebuild runs scripts in another way")
+    return found
+
+
+def state_changes(
+    dependencies: Iterable[Dependency], state: Callable[[Need], str]
+) -> Iterator[str]:
+    """What is no longer as it was, each as a clause, in order; nothing where a result holds."""
+    for dependency in dependencies:
+        now = state(dependency.need)
+        # What a device gives is never known to be the same.
+        if now != dependency.state or now == SPECIAL:
+            yield _change(dependency, now)
+
+
+def _change(old: Dependency, now: str) -> str:
+    match old.kind:
+        case Kind.FILE | Kind.OUTSIDE:
+            return f"{old.name} {_became(old.state, now)}"
+        case Kind.LISTING:
+            if ABSENT in (old.state, now):
+                return f"the folder {old.name} {_became(old.state, now)}"
+            return f"the list of files in {old.name} changed"
+        case Kind.SOUGHT:
+            folder = sought(old.name)[0]
+            return f"{folder} has a file now with the name of a module: {now}"
+        case Kind.MODULE:
+            if not now:
+                return f"{old.name} is no longer installed (it was {old.state})"
+            if not old.state:
+                return f"{old.name} is installed now: {now}"
+            if now.startswith("files "):
+                return f"the files of the module {old.name} changed"
+            return f"{old.state} → {now}"
+        case Kind.PLACE:
+            return f"it printed a path of this machine: {old.state} → {now}"
+        case _:
+            assert_never(old.kind)
+
+
+def _became(old: str, now: str) -> str:
+    if now == ABSENT:
+        return "is gone"
+    if old == ABSENT:
+        return "appeared"
+    if now == FOLDER:
+        return "is a folder now"
+    if now.startswith("unreadable"):
+        return f"is {now}"
+    return "may have changed" if now == SPECIAL else "changed"
+
+
+def _list(items: tuple[str, ...]) -> str:
+    return " ".join(items) if items else "none"
+
+
+def described(dependency: Dependency) -> str:
+    """A dependency as a line of a list."""
+    match dependency.kind:
+        case Kind.FILE | Kind.OUTSIDE:
+            return dependency.name + (" (not there)" if dependency.state == ABSENT else "")
+        case Kind.LISTING:
+            return f"the list of files in {dependency.name or '.'}"
+        case Kind.SOUGHT:
+            folder, modules = sought(dependency.name)
+            shown = ", ".join(modules[:_SHOWN])
+            more = f" and {len(modules) - _SHOWN} more" if len(modules) > _SHOWN else ""
+            return f"no file of {folder} having the name of a module ({shown}{more})"
+        case Kind.MODULE:
+            if not dependency.state:
+                return f"the module {dependency.name} (not installed)"
+            if dependency.state.startswith("files "):
+                return f"the files of the module {dependency.name}"
+            return dependency.state
+        case Kind.PLACE:
+            return f"that {dependency.state} is where it is: it printed that"
+        case _:
+            assert_never(dependency.kind)

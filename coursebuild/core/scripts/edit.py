@@ -1,0 +1,254 @@
+"""A new output, put into the lesson by span.
+
+Entry points: `updated_body` (what to write into one recorded output), `apply_edits`.
+
+1. A recording that matches is left alone; it must match both of two runs. A volatile one takes the
+   text of the first run.
+2. The new lines of a fence are those of the first run. Lines with `...`, and lines that match only
+   after a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
+   indentation) are those of the lesson.
+3. What was made is compared with both runs before it is offered: an output that differs from run to
+   run, or that the lesson's text cannot hold, is refused with the reason.
+
+Tables are brought up to date number by number: see `tableedit`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from coursebuild.core.model import Comparison, Filter, Mode, Recording, Table
+from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
+from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
+from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.repeat import unstable
+from coursebuild.core.scripts.tableedit import updated_table
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
+from coursebuild.core.text.source import Excerpt, Span
+
+_FENCE = re.compile(r"`{3,}|~{3,}")
+_LABEL = 60
+
+
+def apply_edits(text: str, edits: Iterable[Edit]) -> str:
+    """The text with edits applied by offset.
+
+    Raises `ValueError` for edits that overlap, stand at the same place, or belong to another text:
+    each is a bug of whoever made them.
+    """
+    parts: list[str] = []
+    at = 0
+    last: tuple[int, int] | None = None
+    for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
+        start, end = edit.span.start, edit.span.end
+        if edit.span.source.text != text:
+            raise ValueError(f"an edit of another text than {edit.span.path} is now")
+        if start < at or end < start or (start, end) == last:
+            raise ValueError(f"edits overlap at offset {start} of {edit.span.path}")
+        parts += (text[at:start], edit.text)
+        at = end
+        last = (start, end)
+    return "".join((*parts, text[at:]))
+
+
+def updated_body(
+    recording: Recording,
+    comparison: Comparison,
+    filters: tuple[Filter, ...],
+    first: str,
+    second: str,
+) -> Edit | Diagnostic | None:
+    """What to write into a recording whose script printed `first` and then, run again, `second`.
+
+    `None` where it matches already; a diagnostic where it cannot be brought up to date.
+    """
+    if not first.strip():
+        return refused(recording.caption_span, "the script printed nothing to record", "")
+    if isinstance(recording.body, Table):
+        return updated_table(recording, recording.body, comparison, filters, first, second)
+    body = recording.body
+    if comparison.mode is Mode.VOLATILE:
+        if Side.of(body.text).texts == Side.of(first).texts:
+            return None
+        return _fence_edit(recording, list(Side.of(first).texts))
+    recorded, ran, again = (Side.of(text, filters) for text in (body.text, first, second))
+    lines: list[str] | Diagnostic
+    if same_lines(recorded, ran, comparison):
+        if same_lines(recorded, again, comparison):
+            return None
+        return unstable(recording, recorded, again, comparison)
+    lines = _new_lines(body, recorded, ran, comparison, filters)
+    if isinstance(lines, Diagnostic):
+        return lines
+    new = Side.of("\n".join(lines), filters)
+    if not same_lines(new, again, comparison):
+        return unstable(recording, new, again, comparison)
+    return _fence_edit(recording, lines)
+
+
+def refused(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
+    """An output that cannot be brought up to date."""
+    return diagnose("output-not-updatable", span, message, label=label, help=help_text)
+
+
+# ------------------------------------------------------------------------------------ new lines
+
+
+def _new_lines(
+    body: Excerpt,
+    recorded: Side,
+    ran: Side,
+    comparison: Comparison,
+    filters: tuple[Filter, ...],
+) -> list[str] | Diagnostic:
+    """The lines to record; they match the run."""
+    printed = list(Side.of(ran.raw).texts)
+    tries: list[list[str]] = []
+    if filters or comparison.ellipsis:
+        kept = _Kept(body, recorded, ran, LineMatcher(comparison)).lines()
+        if isinstance(kept, Diagnostic):
+            return kept
+        tries.append(kept)
+    if not comparison.ellipsis:
+        tries.append(printed)
+    for lines in tries:
+        if same_lines(Side.of("\n".join(lines), filters), ran, comparison):
+            return lines
+    return refused(
+        body.span().first_line(),
+        "no text was found that matches what the script prints",
+        "bring it up to date by hand: a `...` or a filter stands in the way",
+    )
+
+
+class _Kept:
+    """Builds new lines around what the author wrote on purpose."""
+
+    def __init__(self, body: Excerpt, recorded: Side, ran: Side, matcher: LineMatcher) -> None:
+        self.body, self.recorded, self.ran, self.matcher = body, recorded, ran, matcher
+
+    def lines(self) -> list[str] | Diagnostic:
+        steps = align(self.recorded, self.ran, self.matcher)
+        lines: list[str] = []
+        for index, step in enumerate(steps):
+            made = self._of_step(step, steps, index)
+            if isinstance(made, Diagnostic):
+                return made
+            lines += made
+        return lines
+
+    def _of_step(self, step: Step, steps: Sequence[Step], index: int) -> Iterable[str] | Diagnostic:
+        match step.kind:
+            case StepKind.SAME:
+                if self._on_purpose(step):
+                    return self.recorded.raw_lines(step.recorded)
+                return self.ran.raw_lines(step.ran)
+            case StepKind.DIFFERS:
+                if self.matcher.elides(self.recorded.lines[step.recorded].text):
+                    return self._with_numbers(step)
+                return self.ran.raw_lines(step.ran)
+            case StepKind.MISSING:
+                if _beside_elided(steps, index):
+                    return self._lost(step.recorded, "this line was not printed where `...` is")
+                return ()
+            case StepKind.EXTRA:
+                return self.ran.raw_lines(step.ran)
+            case StepKind.ELLIPSIS:
+                return self.recorded.raw_lines(step.recorded)
+            case StepKind.ELIDED:
+                return ()
+
+    def _on_purpose(self, step: Step) -> bool:
+        """Whether a line that matches does so by an ellipsis or a filter."""
+        text = self.recorded.lines[step.recorded].text
+        return (
+            self.matcher.elides(text)
+            or self.recorded.raw_lines(step.recorded) != (text,)
+            or self.ran.raw_lines(step.ran) != (self.ran.lines[step.ran].text,)
+        )
+
+    def _with_numbers(self, step: Step) -> Iterable[str] | Diagnostic:
+        """A line with `...` that fits but for its numbers, with the numbers of the run."""
+        text = self.recorded.lines[step.recorded].text
+        pairs = self.matcher.pairs(text, self.ran.lines[step.ran].text)
+        if pairs is None or self.recorded.raw_lines(step.recorded) != (text,):
+            return self._lost(step.recorded, "this line no longer fits what the script prints")
+        parts: list[str] = []
+        at = 0
+        for recorded, ran in pairs:
+            if not self.matcher.same(recorded, ran):
+                parts += (text[at : recorded.start], ran.text)
+                at = recorded.end
+        return ("".join((*parts, text[at:])),)
+
+    def _lost(self, line: int, label: str) -> Diagnostic:
+        start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line].text))
+        return refused(
+            self.body.span(start, end),
+            f"an output with `{ELLIPSIS}` cannot be brought up to date here",
+            f"write the line anew by hand, or take the `{ELLIPSIS}` away and update again",
+            label,
+        )
+
+
+def _beside_elided(steps: Sequence[Step], index: int) -> bool:
+    """Whether lines are elided between the pairs of lines around a step."""
+    pairs = (StepKind.SAME, StepKind.DIFFERS)
+    for way in (-1, 1):
+        at = index + way
+        while 0 <= at < len(steps) and steps[at].kind not in pairs:
+            if steps[at].kind is StepKind.ELIDED:
+                return True
+            at += way
+    return False
+
+
+# ---------------------------------------------------------------------------------------- fences
+
+
+def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic:
+    """Replace the lines between the fences."""
+    source = recording.body_span.source
+    start = _line_start(recording.body_span, recording.body_span.start)
+    end = _line_start(recording.body_span, recording.body_span.end)
+    found = _FENCE.search(source.text, _line_start(recording.body_span, start - 1), start)
+    fence = found.group() if found else "```"
+    fence_span = Span(source, *found.span()) if found else recording.caption_span
+    trouble = _unholdable(lines, fence, fence_span)
+    if trouble is not None:
+        return trouble
+    before = source.text[:start]
+    line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"
+    blank = recording.prefix.rstrip()
+    text = "".join((recording.prefix + line if line else blank) + line_end for line in lines)
+    return Edit(Span(source, start, end), text)
+
+
+def _line_start(span: Span, offset: int) -> int:
+    """The offset at which the line of an offset begins."""
+    source = span.source
+    line, _ = source.position(max(offset, 0))
+    return source.line_starts[line - 1]
+
+
+def _unholdable(lines: Sequence[str], fence: str, fence_span: Span) -> Diagnostic | None:
+    """Why a fence cannot hold these lines."""
+    for number, line in enumerate(lines, start=1):
+        if "\x00" in line:
+            return refused(
+                fence_span,
+                f"line {number} of the output has a NUL character, which Markdown cannot hold",
+                "print text only",
+            )
+    mark = re.escape(fence[0])
+    closing = re.compile(rf" {{0,3}}({mark}{{{len(fence)},}})[ \t]*")
+    runs = [len(found[1]) for line in lines if (found := closing.fullmatch(line))]
+    if not runs:
+        return None
+    marks = "backticks" if fence[0] == "`" else "tildes"
+    return refused(
+        fence_span,
+        "the output has a line that would close this fence",
+        f"open and close it with {max(runs) + 1} {marks}, then update again",
+    )

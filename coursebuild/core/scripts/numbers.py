@@ -1,0 +1,200 @@
+"""Numbers in text: where they stand and their exact values.
+
+Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 10⁻¹¹`),
+`within_half_unit`, `within_tolerance`, `relative_error`, `agreeing_digits`, `round_like`.
+
+1. One regular expression walks the text. Its first alternatives take what only looks like a number:
+   words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day, hexadecimal
+   literals, hashes. They stay text, as do powers (`m^2`). No alternative can start inside what
+   another one gave up, so that the walk is linear.
+2. A number may carry a unit of letters (`12.5ms`); letters with a digit among them make the whole
+   thing text (`4x4`).
+3. Values are decimals as written: nothing is rounded on the way, so that a border such as half a
+   unit of the last place is exact. What no floating-point format can mean (more than 1000
+   characters, exponents of more than four digits) is text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from decimal import Context, Decimal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.text.patterns import pattern
+
+_SIGN = "[+\\-\u2212]"
+_MAGNITUDE = rf"(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE]{_SIGN}?[0-9]{{1,4}})?"
+# No digit, no further `.1`, and no letters with a digit or underscore among them may follow.
+_ENDS = r"(?![0-9])(?!\.[0-9])(?![^\W\d_]*[\d_])"
+_HEX = "[0-9a-fA-F]"
+_LOOKS_LIKE_A_NUMBER = "|".join(
+    (
+        rf"{_HEX}{{8}}(?:-{_HEX}{{4}}){{3}}-{_HEX}{{12}}(?!\w)",  # UUID
+        rf"0[xXbBoO]{_HEX}\w*",  # 0x1f
+        r"(?=[0-9]+[a-f])[0-9a-f]{7,}(?!\w)",  # hash
+        r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?![0-9])(?:T[0-9:.,+\-Z]*)?",  # date
+        r"[0-9]+/[0-9]+/[0-9]+(?![0-9])",  # date
+        r"(?<![0-9]:)[0-9]{1,3}(?::[0-9]{2})+(?:[.,][0-9]+)?(?![0-9:])",  # time of day
+        r"[0-9]+(?:\.[0-9]+){2,}[\w.]*(?:[-+:][\w.]+)*",  # version, address
+        r"(?<![0-9]-)[0-9]+(?:-[0-9]+)+(?![\w.])",  # 10-20
+        rf"[0-9]+(?:\.[0-9]*)?[eE]{_SIGN}?[0-9]{{5,}}",  # past any exponent
+    )
+)
+_SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
+_TOKEN = pattern(
+    rf"(?P<imaginary>(?<=[0-9.]){_SIGN}{_MAGNITUDE}(?=[jJ](?!\w)))"
+    rf"|(?<![\w.^])(?<!\^[+\-])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
+    rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
+    r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
+)
+_NOTATION = pattern(
+    rf"(?P<sign>{_SIGN})?(?P<whole>[0-9]*)(?:\.(?P<decimals>[0-9]*))?"
+    rf"(?:(?P<mark>[eE])(?P<power_sign>{_SIGN})?(?P<power>[0-9]+))?"
+)
+
+_LONGEST = 1000
+_EXACT = Context(prec=40_000)
+_QUOTIENT = Context(prec=34)
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
+_POWER = pattern(
+    rf"\s*[×·]\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
+)
+
+
+class Number(Struct, frozen=True):
+    """A number and the half-open range `[start, end)` of its text."""
+
+    start: int
+    end: int
+    text: str
+    value: Decimal
+    """Exact; NaN and infinities for `nan` and `inf`."""
+    place: int
+    """Power of ten of the last written place: -3 for `6.641`, -4 for `1.5e-3`, 0 for `nan`."""
+    integer: bool
+    """Written without a point and without an exponent."""
+
+    @property
+    def finite(self) -> bool:
+        """Whether it is neither `nan` nor `inf`."""
+        return self.value.is_finite()
+
+    @property
+    def inexact(self) -> bool:
+        """Whether it has a point or an exponent, so that it stands for a rounded value."""
+        return self.finite and not self.integer
+
+
+def _number(start: int, text: str) -> Number:
+    value = Decimal(text.replace("\u2212", "-"))
+    exponent = value.as_tuple().exponent
+    place = exponent if isinstance(exponent, int) else 0
+    integer = value.is_finite() and not any(c in text for c in ".eE")
+    return Number(start, start + len(text), text, value, place, integer)
+
+
+def scan(text: str) -> tuple[Number, ...]:
+    """The numbers of a text, in order."""
+    return tuple(_scan(text))
+
+
+def _scan(text: str) -> Iterator[Number]:
+    for found in _TOKEN.finditer(text):
+        kind = found.lastgroup
+        if kind in ("number", "imaginary", "special") and found.end() - found.start() <= _LONGEST:
+            yield _number(found.start(), found.group())
+
+
+def scan_prose(text: str) -> tuple[Number, ...]:
+    """The numbers of a text that a person wrote: `3.9 × 10⁻¹¹` and `3.9·10^-11` are one number."""
+    numbers: list[Number] = []
+    for number in _scan(text):
+        if numbers and number.start < numbers[-1].end:
+            continue
+        power = _POWER.match(text, number.end)
+        if power is None or not number.finite:
+            numbers.append(number)
+            continue
+        written = power["caret"] or power["raised"].translate(_SUPERSCRIPTS)
+        shift = int(written.replace("\u2212", "-"))
+        end = power.end()
+        numbers.append(
+            replace(
+                number,
+                end=end,
+                text=text[number.start : end],
+                value=number.value.scaleb(shift, _EXACT),
+                place=number.place + shift,
+                integer=False,
+            )
+        )
+    return tuple(numbers)
+
+
+def difference(a: Decimal, b: Decimal) -> Decimal:
+    """`|a - b|`, exact; both are finite."""
+    return _EXACT.abs(_EXACT.subtract(a, b))
+
+
+def unit(place: int) -> Decimal:
+    """One unit of a place: `10**place`, exact."""
+    return Decimal((0, (1,), place))
+
+
+def within_half_unit(written: Number, value: Decimal) -> bool:
+    """Whether `value` is within half a unit of the last place of `written`, borders included."""
+    gap = difference(written.value, value)
+    return _EXACT.add(gap, gap) <= unit(written.place)
+
+
+def within_tolerance(written: Decimal, value: Decimal, rtol: Decimal, atol: Decimal) -> bool:
+    """Whether `|value - written| <= atol + rtol * |written|`, exactly; all finite."""
+    return difference(written, value) <= _EXACT.add(
+        atol, _EXACT.multiply(rtol, _EXACT.abs(written))
+    )
+
+
+def relative_error(recorded: Decimal, ran: Decimal) -> Decimal | None:
+    """`|ran - recorded| / |recorded|` to 34 digits; `None` where it does not exist."""
+    if not (recorded.is_finite() and ran.is_finite()) or recorded == 0:
+        return None
+    return _QUOTIENT.divide(difference(recorded, ran), _EXACT.abs(recorded))
+
+
+def agreeing_digits(error: Decimal) -> int | None:
+    """Leading digits that agree: `floor(-log10(error))`, at least 0; `None` for no error at all."""
+    if error == 0:
+        return None
+    power = error.adjusted()
+    return max(0, -power if error == unit(power) else -power - 1)
+
+
+def round_like(written: Number, value: Decimal) -> str | None:
+    """`value` (finite) rounded to as many decimals as `written` shows, in its notation.
+
+    A plus sign and a U+2212 minus are kept where `written` has them, exponents keep their width.
+    `None` where the notation is not a machine's (`3.9 × 10⁻¹¹`, `nan`).
+    """
+    found = _NOTATION.fullmatch(written.text)
+    if found is None:
+        return None
+    decimals = len(found["decimals"] or "")
+    if found["mark"]:
+        mantissa, _, power = f"{abs(value):.{decimals}e}".partition("e")
+        width = len(found["power"])
+        sign = found["power_sign"] or ""
+        minus_power = "\u2212" if sign == "\u2212" else "-"
+        shown_sign = minus_power if int(power) < 0 else "+" if sign == "+" or width > 1 else ""
+        exponent = f"{found['mark']}{shown_sign}{abs(int(power)):0{width}d}"
+    else:
+        mantissa, exponent = f"{abs(value):.{decimals}f}", ""
+    if found["decimals"] == "":
+        mantissa += "."
+    if not found["whole"]:
+        mantissa = mantissa.removeprefix("0")
+    negative = value < 0 and any(c in "123456789" for c in mantissa)
+    minus = "\u2212" if found["sign"] == "\u2212" else "-"
+    return f"{minus if negative else '+' if found['sign'] == '+' else ''}{mantissa}{exponent}"

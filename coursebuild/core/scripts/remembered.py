@@ -1,0 +1,103 @@
+"""The result of a script as it is kept: what it depends on, and what it did.
+
+Entry points: `BindingRecord`, `to_bytes`, `from_bytes`, `Record.run`.
+
+Paths of the machine in what a script wrote to its error output are taken out before it is kept, and
+those of the machine that reads it are put in.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+
+import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Trace
+from coursebuild.core.scripts.dependencies import Dependency, Inputs, Kind, sought_files
+
+REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
+_MARK = "\0"
+
+
+class BindingRecord(Struct, frozen=True):
+    """One run of a script."""
+
+    inputs: Inputs
+    dependencies: tuple[Dependency, ...]
+    outcome: Outcome
+    status: int
+    seconds: float
+    made: int
+    """When, in seconds since 1970."""
+    forgotten: str
+    """Why it is not remembered, as the end of a sentence; empty where it is."""
+    stdout: str = ""
+    stderr: str = ""
+    """Of one that is not remembered both are left out."""
+    divergences: tuple[Divergence, ...] = ()
+    moved: bool = False
+    states: tuple[str, ...] = ()
+
+    def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
+        """The run as if it had been made here; see `to_bytes` for the places."""
+        names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
+        for one in self.dependencies:
+            names[one.kind].append(one.name)
+        for name in names[Kind.SOUGHT]:
+            names[Kind.FILE] += sought_files(name)
+        return ScriptRun(
+            self.inputs.path,
+            self.outcome,
+            self.status,
+            self.stdout,
+            _put_in(self.stderr, places),
+            self.seconds,
+            cached=True,
+            trace=Trace(
+                files=tuple(sorted(names[Kind.FILE])),
+                folders=tuple(sorted(names[Kind.LISTING])),
+                outside=tuple(sorted(names[Kind.OUTSIDE])),
+                modules=tuple(sorted(names[Kind.MODULE])),
+                opaque="",
+                divergences=self.divergences,
+                moved=self.moved,
+                states=self.states,
+            ),
+        )
+
+
+def to_bytes(record: BindingRecord, places: Iterable[tuple[str, str]]) -> bytes:
+    """As JSON; `places` are folders of this machine, each with a name, the longer ones first."""
+    stderr = _take_out(record.stderr, places)
+    kept = replace(record, seconds=round(record.seconds, 4), stderr=stderr)
+    # Names of files may hold bytes that are no text; only escapes can carry them.
+    return json.dumps(msgspec.to_builtins(kept), ensure_ascii=True).encode()
+
+
+def from_bytes(data: bytes) -> BindingRecord | None:
+    """The record that JSON holds; `None` where it holds none."""
+    try:
+        try:
+            return msgspec.json.decode(data, type=BindingRecord)
+        except msgspec.DecodeError:  # perhaps for an escape that is half a letter
+            return msgspec.convert(json.loads(data), BindingRecord)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:
+    text = text.replace(_MARK, "\ufffd")
+    for name, folder in places:
+        pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
+        text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
+    return text
+
+
+def _put_in(text: str, places: Iterable[tuple[str, str]]) -> str:
+    for name, folder in places if _MARK in text else ():
+        text = text.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
+    return text

@@ -1,0 +1,148 @@
+"""Two runs of a script, with nothing changed that it depends on, that do not do the same.
+
+Entry points: `repeat_findings`, about what is remembered and a later run; `unstable`, about two
+runs of which the output is to be recorded.
+
+An output that its lesson calls volatile may differ, and so may one that matches what is recorded
+both times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from coursebuild.core.model import Comparison, Course, Mode, Recording, Table, document_blocks
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.scripts.align import Step, StepKind, align
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.lines import LineMatcher
+from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+
+_LINES = 12
+_WIDTH = 120
+_NAMED, _QUOTED = 10, 80
+
+
+def repeat_findings(
+    course: Course,
+    extractions: Iterable[Extraction],
+    differing: Sequence[tuple[ScriptRun, ScriptRun]],
+) -> tuple[Diagnostic, ...]:
+    """A warning for each script; `differing` holds what is remembered and what was done now."""
+    by_path = {extraction.path: extraction for extraction in extractions}
+    found = []
+    for before, now in differing:
+        extraction = by_path.get(now.path)
+        if extraction is not None and not _may_differ(course, before, now):
+            found.append(_told(extraction, before, now))
+    return tuple(found)
+
+
+def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
+    if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
+        return False
+    recordings = [
+        block
+        for document in course.documents
+        for block in document_blocks(document)
+        if isinstance(block, Recording) and block.script == now.path and block.readable
+    ]
+    return bool(recordings) and all(_both_hold(course, r, before, now) for r in recordings)
+
+
+def _both_hold(course: Course, recording: Recording, before: ScriptRun, now: ScriptRun) -> bool:
+    comparison: Comparison = recording.comparison or course.comparison
+    if comparison.mode is Mode.VOLATILE:
+        return True
+    verdicts = (compare(recording, comparison, course.filters, run.stdout) for run in (before, now))
+    return all(verdict.status == "verified" for verdict in verdicts)
+
+
+def _told(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
+    notes = []
+    if (before.outcome, before.status) != (now.outcome, now.status):
+        notes.append(Note(f"it ended otherwise: before {_end(before)}, now {_end(now)}"))
+    diff = _diff(before.stdout, now.stdout)
+    if diff:
+        notes.append(Note("its output:\n" + diff))
+    return diagnose(
+        "script-unrepeatable",
+        extraction.script.span.first_line(),
+        f"`{extraction.path}` does something else than it did before, with nothing changed "
+        "that is known to count",
+        help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
+        "or put `volatile` on its output",
+        notes=notes,
+    )
+
+
+def _end(run: ScriptRun) -> str:
+    return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
+
+
+def _diff(before: str, now: str) -> str:
+    import difflib
+
+    lines = [
+        line
+        for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
+        if not line.startswith(("---", "+++", "@@"))
+    ]
+    shown = [shortened(line, _WIDTH) for line in lines[:_LINES]]
+    if len(lines) > _LINES:
+        shown.append(f"… and {len(lines) - _LINES} more lines")
+    return "\n".join(shown)
+
+
+def unstable(recording: Recording, first: Side, second: Side, comparison: Comparison) -> Diagnostic:
+    """Names the lines that differ between two runs.
+
+    `first` is what would be recorded, or is, and matches the first run.
+    """
+    steps = align(first, second, LineMatcher(comparison))
+    line_starts = second.line_starts()
+    lines: list[str] = []
+    for step in steps:
+        text = _difference(step, first, second, line_starts)
+        if text:
+            lines.append(text)
+    notes = [Note(text) for text in lines[:_NAMED]]
+    if len(lines) > _NAMED:
+        more = len(lines) - _NAMED
+        notes.append(Note(f"and {more} more {'line' if more == 1 else 'lines'}"))
+    return diagnose(
+        "output-unstable",
+        recording.caption_span,
+        "two runs of the script printed different lines",
+        help=_TABLE_HELP if isinstance(recording.body, Table) else _HELP,
+        notes=notes,
+    )
+
+
+_REPEATABLE = "make the script print the same each time (a fixed seed, no clock)"
+_HELP = (
+    f"{_REPEATABLE}, put `volatile` on the fence, elide what varies by `ellipsis` and `...`,"
+    " or filter it by `[[verify.filter]]` in content/course.toml"
+)
+_TABLE_HELP = f"{_REPEATABLE}, or record the output in a `text` fence with `volatile`"
+
+
+def _difference(step: Step, first: Side, second: Side, line_starts: list[int]) -> str:
+    match step.kind:
+        case StepKind.DIFFERS:
+            number = second.raw_line(step.ran, line_starts)
+            a, b = first.lines[step.recorded].text, second.lines[step.ran].text
+            return f"line {number}: {_quoted(a)} in one run, {_quoted(b)} in the next"
+        case StepKind.MISSING:
+            return f"{_quoted(first.lines[step.recorded].text)} was printed in the first run only"
+        case StepKind.EXTRA:
+            return f"{_quoted(second.lines[step.ran].text)} was printed in the second run only"
+        case StepKind.SAME | StepKind.ELLIPSIS | StepKind.ELIDED:
+            return ""
+
+
+def _quoted(text: str) -> str:
+    return f"`{shortened(text.strip(), _QUOTED)}`"

@@ -1,0 +1,134 @@
+"""Attributes in braces after inline content: `{term}`, `{symbol="angular velocity" unit="rad/s"}`.
+
+Entry points: `Braces.find`, `read_term`, `read_meaning`, `read_label`.
+
+1. `Braces` says where braces begin and end, which may be a line below; it does not look inside.
+2. What is in them is read against the keys that they may have. A value stands in quotes where it
+   has spaces.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from msgspec import Struct
+
+from coursebuild.core.model import Label, Meaning
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt
+
+Report = Callable[[Diagnostic], None]
+
+_TERM = pattern(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
+_SYMBOL = pattern(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
+_LABEL = pattern(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
+_PAIR = pattern(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
+_ID = pattern(r"\{#(eq:[\w-]+)\}")
+_SPACES = pattern(r"\s+")
+
+_TERM_HELP = 'write `{term}`, or `{term="headword"}` where the glossary is to say it otherwise'
+_SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
+_LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
+
+
+class Braces(Struct, frozen=True):
+    """A stretch of a text, from `{` to behind `}` or to where that is missing."""
+
+    start: int
+    end: int
+    closed: bool
+
+    @classmethod
+    def of_term(cls, text: str, at: int, limit: int) -> Braces | None:
+        """Those at an offset that make a term of what is before them, or were meant to."""
+        return cls._found(_TERM.match(text, at, limit))
+
+    @classmethod
+    def of_symbol(cls, text: str, at: int, limit: int) -> Braces | None:
+        """The same for the meaning of a symbol."""
+        return cls._found(_SYMBOL.match(text, at, limit))
+
+    @classmethod
+    def of_label(cls, text: str, at: int, limit: int) -> Braces | None:
+        """Those of a label, which blanks may precede."""
+        found = _LABEL.match(text, at, limit)
+        return cls(found.start(1), found.end(), found[1][-1] == "}") if found else None
+
+    @classmethod
+    def _found(cls, found: re.Match[str] | None) -> Braces | None:
+        return cls(found.start(), found.end(), bool(found[1])) if found else None
+
+
+def folded(text: str) -> str:
+    """A text in one line, each run of white space a blank."""
+    return _SPACES.sub(" ", text).strip()
+
+
+def _read(
+    content: Excerpt, braces: Braces, keys: tuple[str, ...], rule: str, help: str
+) -> dict[str, str | None] | Diagnostic:
+    """The values by key; `None` for a key alone."""
+    place = content.span(braces.start, braces.end)
+    if not braces.closed:
+        return diagnose(rule, place, "the braces are never closed", help=help)
+    text = content.text
+    found: dict[str, str | None] = {}
+    at, end = braces.start + 1, braces.end - 1
+    while text[at:end].strip():
+        pair = _PAIR.match(text, at, end)
+        if pair is None:
+            rest = content.span(at + len(text[at:end]) - len(text[at:end].lstrip()), end)
+            return diagnose(rule, rest, f"`{folded(text[at:end])}` cannot be read", help=help)
+        key, span = pair[1], content.span(pair.start(1), pair.end(1))
+        if key not in keys:
+            near = did_you_mean(key, keys) if len(keys) > 1 else ""
+            return diagnose(rule, span, f"`{key}` is no key here", help=near or help)
+        if key in found:
+            return diagnose(rule, span, f"`{key}` is given twice", help=help)
+        value = pair[2] if pair[2] is not None else pair[3]
+        found[key] = None if value is None else folded(value)
+        at = pair.end()
+    return found
+
+
+def read_term(content: Excerpt, braces: Braces, report: Report) -> str | None:
+    """The name that is given to a term; empty where it is its own text, `None` for a mistake."""
+    found = _read(content, braces, ("term",), "term-attribute", _TERM_HELP)
+    if isinstance(found, Diagnostic):
+        report(found)
+        return None
+    name = found.get("term")
+    if name == "":
+        place = content.span(braces.start, braces.end)
+        report(diagnose("term-attribute", place, "the name of the term is empty", help=_TERM_HELP))
+        return None
+    return name or ""
+
+
+def read_meaning(content: Excerpt, braces: Braces, report: Report) -> Meaning | None:
+    """What a symbol stands for; `None` for a mistake."""
+    found = _read(content, braces, ("symbol", "unit"), "symbol-attribute", _SYMBOL_HELP)
+    place = content.span(braces.start, braces.end)
+    if isinstance(found, Diagnostic):
+        report(found)
+        return None
+    if not found.get("symbol") or found.get("unit", "none") in (None, ""):
+        missing = "unit is empty" if found.get("symbol") else "meaning of the symbol is missing"
+        report(diagnose("symbol-attribute", place, f"the {missing}", help=_SYMBOL_HELP))
+        return None
+    return Meaning(place, found["symbol"] or "", found.get("unit") or "")
+
+
+def read_label(content: Excerpt, braces: Braces, report: Report) -> Label | None:
+    """The label of a formula; `None` for a mistake."""
+    text, place = content.text[braces.start : braces.end], content.span(braces.start, braces.end)
+    found = _ID.fullmatch(text)
+    if found is None:
+        message = "the label of this formula is never closed"
+        if braces.closed:
+            message = f"`{text}` is no label of a formula"
+        report(diagnose("equation-label", place, message, help=_LABEL_HELP))
+        return None
+    return Label(content.span(braces.start + 2, braces.end - 1), found[1])

@@ -1,0 +1,152 @@
+"""The block parser: markdown-it's rules, those for footnotes and formulas, and ours for tables.
+
+Entry point: `block_parser`. Besides what markdown-it does:
+
+1. The first token of a block gets its place, and the rows that its content was cut from.
+2. Link definitions keep the rows that hold them.
+3. What is nested deeper than `MAX_NESTING` becomes paragraphs: nothing is lost, nothing overflows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from markdown_it.common.utils import MD_TRIM_CHARS
+from markdown_it.parser_block import ParserBlock
+from markdown_it.ruler import Ruler
+from markdown_it.rules_block import StateBlock, paragraph, reference
+from markdown_it.utils import EnvType
+from mdit_py_plugins.footnote.index import footnote_def
+from msgspec import Struct, field
+
+from coursebuild.core.syntax.math import math_block
+from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSlice
+from coursebuild.core.syntax.tables import table
+from coursebuild.core.text.source import Excerpt
+
+MAX_NESTING = 60
+"""Containers inside each other; a list with its item counts as two."""
+
+BlockRule = Callable[[StateBlock, int, int, bool], bool]
+
+
+class Definition(Struct):
+    """A link definition as markdown-it keeps it, with the rows of `base` that hold it."""
+
+    href: str
+    title: str
+    base: Excerpt
+    rows: list[SourceSlice]
+
+
+class Definitions(Struct):
+    """What block parsing learns besides its tokens."""
+
+    links: dict[str, Definition] = field(default_factory=dict)
+    """By normalised label."""
+
+    def environment(self) -> EnvType:
+        """The environment that markdown-it's rules read."""
+        return {
+            "references": {k: {"href": d.href, "title": d.title} for k, d in self.links.items()}
+        }
+
+
+def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """`[^label]: …`, whose opening token gets a place like any other."""
+    before = len(state.tokens)
+    if not footnote_def(state, start, end, silent):
+        return False
+    if not silent:
+        for i in (before, -1):
+            plain = state.tokens[i]
+            placed = PositionedToken(plain.type, plain.tag, plain.nesting, level=plain.level)
+            placed.map, placed.content = plain.map, str(plain.meta.get("label", ""))
+            state.tokens[i] = placed
+    return True
+
+
+def _located_reference(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """A link definition; the rows that hold it are kept with it."""
+    known = state.env.setdefault("references", {})
+    count = len(known)
+    if not reference(state, start, end, silent):
+        return False
+    if not silent and len(known) > count:
+        label = next(reversed(known))
+        rows = []
+        for line in range(start, state.line):
+            at = state.bMarks[line] + state.tShift[line]
+            rows.append(SourceSlice(state.src[at : state.eMarks[line]] + "\n", at))
+        definitions: Definitions = state.env["definitions"]
+        definitions.links[label] = Definition(
+            known[label]["href"], known[label]["title"], state.env["base"], rows
+        )
+    return True
+
+
+def _too_deep(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """A paragraph, where containers nest deeper than anybody writes them."""
+    return not silent and state.level >= MAX_NESTING and paragraph(state, start, end, False)
+
+
+def _placed(rule: BlockRule) -> BlockRule:
+    """A rule whose tokens get their places."""
+
+    def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+        assert isinstance(state, BlockState)
+        before, begin = len(state.tokens), state.bMarks[start] + state.tShift[start]
+        found = rule(state, start, end, silent)
+        if found and len(state.tokens) > before:
+            _place(state, before, begin)
+        return found
+
+    return run
+
+
+def block_parser() -> ParserBlock:
+    """The parser: markdown-it's rules and ours, each with the blocks that it may interrupt."""
+    parser = ParserBlock()
+    rules = {known.name: (known.fn, known.alt) for known in parser.ruler.__rules__}
+    interrupts = ["paragraph", "reference", "blockquote"]
+    rules["table"] = (table, rules["table"][1])
+    rules["reference"] = (_located_reference, [])
+    ours: dict[str, tuple[BlockRule, list[str]]] = {
+        "too deep": (_too_deep, []),
+        "math": (math_block, [*interrupts, "list"]),
+        "footnote": (_footnote_definition, interrupts),
+    }
+    parser.ruler = Ruler()
+    for name, (rule, alt) in (ours | rules).items():
+        parser.ruler.push(name, _placed(rule), {"alt": alt})
+    return parser
+
+
+def _place(state: BlockState, before: int, begin: int) -> None:
+    """Say where the block with its first token at `before` stands, while the state still knows."""
+    opened = state.tokens[before]
+    assert isinstance(opened, PositionedToken)
+    last = state.line - 1
+    first = opened.map[0] if opened.map else last
+    while last > first and state.isEmpty(last):
+        last -= 1
+    opened.start, opened.end = begin, state.eMarks[last]
+    if opened.type in ("fence", "code_block", "html_block", "paragraph_open"):
+        opened.rows, opened.lines = state.rows, state.count
+    elif opened.type == "heading_open":
+        opened.rows = _atx_row(state, begin) if opened.markup[0] == "#" else state.rows
+    elif opened.type == "table_open":
+        for token in state.tokens[before:]:
+            if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
+                row = token.map[0]
+                token.start = state.bMarks[row] + state.tShift[row]
+                token.end = state.eMarks[row]
+
+
+def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
+    """The row that a `#` heading's content is; its rule trims it by itself."""
+    content = state.tokens[-2].content
+    at = state.skipCharsStr(begin, "#")
+    while content and state.src[at] in MD_TRIM_CHARS:
+        at += 1
+    return [SourceSlice(content, at)]

@@ -1,0 +1,183 @@
+"""The tables and fields of course.toml.
+
+Entry point: `CourseFile`. The decoder checks the file against it, and the JSON Schema for editors
+is made from it; ids that must be unique and prerequisites that must exist are checked in
+`coursemap`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from msgspec import Meta, Struct
+
+from coursebuild.core.syntax.fields import NotNegative, Text
+
+Slug: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
+        extra={"expects": "lower-case letters and digits in words joined by single hyphens"},
+    ),
+]
+LessonId: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
+        extra={"expects": "letters and digits in parts joined by dots, as in `4.2` or `A.1`"},
+    ),
+]
+Url: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^https?://[^\s/]\S*$",
+        extra={"expects": "an address that begins with `https://` or `http://`"},
+    ),
+]
+
+
+class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the course is."""
+
+    title: Text
+    id: Annotated[
+        Slug | None,
+        Meta(description="what readers' progress is kept under; without it, the title"),
+    ] = None
+    summary: Annotated[str, Meta(description="one or two sentences, for the home page")] = ""
+    language: Annotated[
+        Annotated[
+            str,
+            Meta(
+                pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$",
+                extra={"expects": "a language tag, as in `en` or `pt-BR`"},
+            ),
+        ],
+        Meta(description="the language of the lessons, as in `en` or `pt-BR`"),
+    ] = "en"
+    base_url: Annotated[Url | None, Meta(description="where the site will stand")] = None
+    repository: Annotated[Url | None, Meta(description="where its sources are")] = None
+    licence: Annotated[str, Meta(description="its name, as in `CC-BY-4.0`")] = ""
+    engine: Annotated[
+        Annotated[
+            str,
+            Meta(
+                pattern=r"^[0-9]+\.[0-9]+\.[0-9]+$",
+                extra={"expects": "a version of three numbers, as in `3.14.0`"},
+            ),
+        ]
+        | None,
+        Meta(description="the version of MuJoCo that the course is written for"),
+    ] = None
+    features: Annotated[
+        tuple[
+            Annotated[
+                str,
+                Meta(
+                    pattern=r"^features/[\w-]+(/[\w-]+)*\.py$",
+                    extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
+                ),
+            ],
+            ...,
+        ],
+        Meta(description="features of the course's own, as files in `features/`"),
+    ] = ()
+
+
+class FilterTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A replacement in both texts before they are compared."""
+
+    pattern: Annotated[str, Meta(min_length=1, description="a regular expression of Python")]
+    replacement: Annotated[str, Meta(description="with groups as in `\\1`")]
+
+
+class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """How recorded outputs are compared where a fence says nothing."""
+
+    compare: Annotated[
+        Literal["exact", "digits", "rtol"] | None,
+        Meta(description="the same text, the same digits, or numbers within rtol and atol"),
+    ] = None
+    rtol: Annotated[NotNegative | None, Meta(description="relative to the recorded number")] = None
+    atol: Annotated[NotNegative | None, Meta(description="absolute")] = None
+    ellipsis: Annotated[bool, Meta(description="`...` in a recorded output matches anything")] = (
+        False
+    )
+    filter: tuple[FilterTable, ...] = ()
+
+
+class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A kind of callout."""
+
+    label: Annotated[Text, Meta(description="shown over the callout")]
+    promise: Annotated[str, Meta(description="what it promises the reader")] = ""
+
+
+class SilenceTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A warning that is not shown."""
+
+    rule: Annotated[Text, Meta(description="the name of a warning")]
+    reason: Annotated[str, Meta(description="why; required")] = ""
+    path: Annotated[Text | None, Meta(description="only in files like this (glob)")] = None
+
+
+class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A lesson, written or planned."""
+
+    id: Annotated[LessonId, Meta(description="its level's id, a dot and its own part")]
+    slug: Annotated[Slug, Meta(description="with the id, the name of its file and page")]
+    title: Text
+    status: Literal["complete", "draft", "planned"]
+    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    objectives: Annotated[
+        tuple[Text, ...], Meta(description="what a learner can do afterwards")
+    ] = ()
+    prerequisites: Annotated[
+        tuple[Text, ...], Meta(description="ids of lessons to read first")
+    ] = ()
+    minutes: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None, Meta(description="to read and work through")
+    ] = None
+
+
+class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A level: a group of lessons."""
+
+    id: Annotated[
+        Annotated[
+            str,
+            Meta(
+                pattern=r"^[A-Za-z0-9]+$", extra={"expects": "letters and digits, as in `4` or `A`"}
+            ),
+        ]
+        | Annotated[int, Meta(ge=0)],
+        Meta(description="letters and digits, as in `4` or `A`"),
+    ]
+    title: Text
+    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    lesson: tuple[LessonTable, ...] = ()
+
+
+class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A page that is no lesson."""
+
+    id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
+    title: Text
+    file: Annotated[Text, Meta(description="its Markdown, relative to the project")]
+    menu: Annotated[
+        bool, Meta(description="whether it stands in the menu, or only in the foot")
+    ] = True
+
+
+class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """The course map: the whole syllabus, and how the course is built."""
+
+    course: CourseTable
+    verify: VerifyTable | None = None
+    callouts: Annotated[
+        dict[str, Text | CalloutTable],
+        Meta(description="more kinds of callouts by name, with a label or a table"),
+    ] = {}
+    silence: tuple[SilenceTable, ...] = ()
+    level: tuple[LevelTable, ...] = ()
+    page: tuple[PageTable, ...] = ()

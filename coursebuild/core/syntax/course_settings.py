@@ -1,0 +1,163 @@
+"""What course.toml says about building: comparing outputs, callouts, silenced warnings.
+
+Entry points: `check_settings`, and one function for each setting that gives its value.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
+
+from msgspec import Struct
+
+from coursebuild.core.model import CalloutKind, Comparison, Filter, Mode, Silence
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.syntax.course_schema import (
+    CalloutTable,
+    FilterTable,
+    SilenceTable,
+    VerifyTable,
+)
+from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.wording import named
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.source import Span
+
+_CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+Structs = Mapping[ObjectNode, Struct]
+
+
+def check_settings(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    """Everything that the types of these tables cannot say."""
+    verify = root.get("verify")
+    if isinstance(verify, ObjectNode):
+        yield from _check_verify(verify, structs)
+        for node in verify.objects("filter"):
+            if isinstance(structs.get(node), FilterTable):
+                yield from _check_filter(node)
+    callouts = root.get("callouts")
+    for member in callouts.members if isinstance(callouts, ObjectNode) else ():
+        if not _CALLOUT.fullmatch(member.key.value):
+            message = f"{named(member.key.value)} cannot be a kind of callout"
+            help = "expected: lower-case letters and digits in words joined by single hyphens"
+            yield diagnose("field-value", member.key.span, message, help=help)
+    for node in root.objects("silence"):
+        fields = structs.get(node)
+        if isinstance(fields, SilenceTable):
+            yield from _check_silence(node, fields)
+
+
+# ------------------------------------------------------------------------------------- comparing
+
+
+def _check_verify(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    fields = structs.get(node)
+    if not isinstance(fields, VerifyTable):
+        return
+    tolerances = [m for name in ("rtol", "atol") if (m := node.member(name)) is not None]
+    if fields.compare == "rtol" and not tolerances:
+        message = '`compare = "rtol"` needs `rtol` or `atol`'
+        yield diagnose("field-missing", node.place("compare"), message)
+    if fields.compare in ("exact", "digits"):
+        for member in tolerances:
+            message = f'`{member.key.value}` counts only with `compare = "rtol"`'
+            yield diagnose("field-value", member.key.span, message)
+
+
+def comparison(root: ObjectNode, fields: VerifyTable | None) -> Comparison:
+    """How outputs are compared where a fence says nothing; tolerances alone mean `rtol`."""
+    node = root.get("verify")
+    if fields is None or not isinstance(node, ObjectNode):
+        return Comparison()
+    rtol, atol = _decimal(node, "rtol"), _decimal(node, "atol")
+    implied = "exact" if rtol is None and atol is None else "rtol"
+    mode = Mode(fields.compare or implied)
+    return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), fields.ellipsis)
+
+
+def _decimal(node: ObjectNode, name: str) -> Decimal | None:
+    """The number as it is written, not its nearest double."""
+    value = node.get(name)
+    if not isinstance(value, NumberNode):
+        return None
+    return Decimal(value.raw) if isinstance(value.value, float) else Decimal(value.value)
+
+
+def _check_filter(node: ObjectNode) -> Iterator[Diagnostic]:
+    pattern, replacement = node.get("pattern"), node.get("replacement")
+    if not isinstance(pattern, StringNode) or not isinstance(replacement, StringNode):
+        return
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compiled = re.compile(pattern.value)
+    except (re.error, ValueError, OverflowError, RecursionError) as error:
+        message = f"the pattern does not compile: {_reason(error)}"
+        yield diagnose("field-value", _place(pattern, error), message)
+        return
+    try:
+        compiled.sub(replacement.value, "")
+    except (re.error, IndexError) as error:
+        message = f"the replacement cannot be used: {_reason(error)}"
+        yield diagnose("field-value", _place(replacement, error), message)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "it nests too deep"
+    text = error.msg if isinstance(error, re.error) else str(error)
+    return text[:1].lower() + text[1:]
+
+
+def _place(node: StringNode, error: Exception) -> Span:
+    """The character that the error names, or the whole string."""
+    at = error.pos if isinstance(error, re.error) else None
+    if at is None or at >= len(node.value):
+        return node.span
+    return node.excerpt.span(at, at + 1)
+
+
+def filters(fields: VerifyTable | None) -> tuple[Filter, ...]:
+    """What is replaced in both texts before they are compared."""
+    tables = fields.filter if fields is not None else ()
+    return tuple(Filter(table.pattern, table.replacement) for table in tables)
+
+
+# -------------------------------------------------------------------------- callouts and silences
+
+
+def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind, ...]:
+    """The kinds that every course has, perhaps with labels of its own, and its further kinds."""
+    kinds = {kind.name: kind for kind in CALLOUTS}
+    for name, table in tables.items():
+        label = table if isinstance(table, str) else table.label
+        promise = "" if isinstance(table, str) else table.promise
+        known = kinds.get(name)
+        kinds[name] = CalloutKind(name, label, promise or (known.promise if known else ""))
+    return tuple(kinds.values())
+
+
+def _check_silence(node: ObjectNode, fields: SilenceTable) -> Iterator[Diagnostic]:
+    rule = RULES.get(fields.rule)
+    if rule is None:
+        warning_names = [name for name, known in RULES.items() if known.severity == "warning"]
+        message = f"there is no rule {named(fields.rule)}"
+        help = did_you_mean(fields.rule, warning_names)
+        yield diagnose("silence-rule", node.place("rule"), message, help=help)
+    elif rule.severity == "error":
+        message = f"`{fields.rule}` is an error; only warnings can be silenced"
+        yield diagnose("silence-rule", node.place("rule"), message)
+    if not fields.reason.strip():
+        help = 'say why: `reason = "…"`'
+        yield diagnose(
+            "silence-rule", node.place("reason"), "the silence gives no reason", help=help
+        )
+
+
+def silences(tables: tuple[SilenceTable, ...]) -> tuple[Silence, ...]:
+    """The warnings that are not shown."""
+    return tuple(Silence(table.rule, table.reason, table.path) for table in tables)

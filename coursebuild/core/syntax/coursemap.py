@@ -1,0 +1,230 @@
+"""The course map, content/course.toml.
+
+Entry point: `parse_course_map(source)` → a `Course` whose lessons and pages have no documents yet.
+
+1. The TOML is read into nodes, and these into the declared tables.
+2. What no type can say is checked on every table whose own fields are right: ids, prerequisites,
+   files, settings.
+3. When nothing is wrong, the tables become the course.
+
+An id of a level is letters and digits (`4`, `A`); that of a lesson is its level's id, a dot, and
+more such parts joined by dots (`4.2`, `A.1`). Ids that differ in upper and lower case only count as
+the same: file names may not tell them apart.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from msgspec import Struct
+
+from coursebuild.core.model import Course, CourseFeature, Lesson, Level, Page, Status
+from coursebuild.core.syntax.course_schema import CourseFile, LessonTable, LevelTable, PageTable
+from coursebuild.core.syntax.course_settings import (
+    callout_kinds,
+    check_settings,
+    comparison,
+    filters,
+    silences,
+)
+from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.prerequisites import check_prerequisites
+from coursebuild.core.syntax.relations import repeated
+from coursebuild.core.syntax.toml_text import parse_toml
+from coursebuild.core.syntax.wording import TOML, short
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.source import Source, Span
+
+Structs = Mapping[ObjectNode, Struct]
+
+
+def parse_course_map(source: Source) -> Parsed[Course | None]:
+    """The course that the map describes, without what its files hold. Never raises."""
+    parsed = parse_toml(source)
+    root = parsed.value
+    if root is None:
+        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+    decoding = decode(root, CourseFile, "the course map", TOML)
+    levels = tuple(_levels(root, decoding.structs))
+    lessons = [lesson for level in levels for lesson in level.lessons]
+    nodes = [node for level in root.objects("level") for node in level.objects("lesson")]
+    found = [
+        *parsed.diagnostics,
+        *decoding.diagnostics,
+        *_check_ids(root, nodes),
+        *_check_files(root, decoding.structs),
+        *check_settings(root, decoding.structs),
+    ]
+    unusable = bool(found)
+    found += _check_places(root, decoding.structs)
+    found += check_prerequisites(lessons, _ids(nodes))
+    if unusable or decoding.value is None:
+        return Parsed(None, sort_diagnostics(found))
+    course = _course(source, root, decoding.value, decoding.structs, levels)
+    return Parsed(course, sort_diagnostics(found))
+
+
+def _course(
+    source: Source,
+    root: ObjectNode,
+    fields: CourseFile,
+    structs: Structs,
+    levels: tuple[Level, ...],
+) -> Course:
+    about = fields.course
+    table = root.get("course")
+    engine = table.get("engine") if isinstance(table, ObjectNode) else None
+    return Course(
+        map=source,
+        title=about.title,
+        summary=about.summary,
+        language=about.language,
+        base_url=about.base_url or "",
+        repository=about.repository or "",
+        licence=about.licence,
+        id=about.id or "",
+        engine=about.engine,
+        engine_span=engine.span if engine is not None else None,
+        comparison=comparison(root, fields.verify),
+        filters=filters(fields.verify),
+        callouts=callout_kinds(fields.callouts),
+        silences=silences(fields.silence),
+        levels=levels,
+        pages=tuple(
+            Page(node.span, page.id, page.title, page.file, None, page.menu)
+            for node, page in zip(root.objects("page"), fields.page, strict=True)
+        ),
+        models=(),
+        features=_features(table, about.features),
+    )
+
+
+def _features(table: Node | None, paths: tuple[str, ...]) -> tuple[CourseFeature, ...]:
+    array = table.get("features") if isinstance(table, ObjectNode) else None
+    items = array.items if isinstance(array, ArrayNode) else ()
+    return tuple(CourseFeature(p, item.span) for p, item in zip(paths, items, strict=True))
+
+
+# --------------------------------------------------------------------------- levels and lessons
+
+
+def _levels(root: ObjectNode, structs: Structs) -> Iterator[Level]:
+    """The levels, with those of their lessons whose fields are right."""
+    for node in root.objects("level"):
+        fields = structs.get(node)
+        name = _id(node.get("id"))
+        lessons = tuple(
+            _lesson(inner, lesson, name)
+            for inner in node.objects("lesson")
+            if isinstance(lesson := structs.get(inner), LessonTable)
+        )
+        title, summary = "", ""
+        if isinstance(fields, LevelTable):
+            title, summary = fields.title, fields.summary
+        yield Level(node.span, name, title, summary, lessons)
+
+
+def _lesson(node: ObjectNode, fields: LessonTable, level: str) -> Lesson:
+    required = node.get("prerequisites")
+    spans = tuple(item.span for item in required.items) if isinstance(required, ArrayNode) else ()
+    return Lesson(
+        span=node.span,
+        id=fields.id,
+        slug=fields.slug,
+        title=fields.title,
+        status=Status(fields.status),
+        summary=fields.summary,
+        objectives=fields.objectives,
+        prerequisites=fields.prerequisites,
+        prerequisite_spans=spans,
+        minutes=fields.minutes,
+        level=level,
+        document=None,
+    )
+
+
+def _id(node: Node | None) -> str:
+    """An id as it was meant, also where its quotes are missing."""
+    match node:
+        case StringNode():
+            return node.value
+        case NumberNode():
+            return node.raw if isinstance(node.value, float) else str(node.value)
+        case _:
+            return ""
+
+
+def _ids(nodes: Iterable[ObjectNode]) -> list[str]:
+    return [name for node in nodes if (name := _id(node.get("id")))]
+
+
+# ---------------------------------------------------------------------------------------- checks
+
+_TAKEN = frozenset({"index", "404"})
+"""Names of pages that every site has."""
+
+
+def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
+    kinds = (("level", root.objects("level")), ("lesson", lessons), ("page", root.objects("page")))
+    for kind, nodes in kinds:
+        known: dict[str, tuple[str, Span]] = {}
+        for place in (given for node in nodes if (given := node.get("id"))):
+            name = _id(place)
+            first, span = known.setdefault(name.casefold(), (name, place.span))
+            if not name or span == place.span:
+                continue
+            message = f"the {kind} id `{short(name)}` is used twice"
+            if name != first:
+                differ = "differ in upper and lower case only"
+                message = f"the {kind} ids `{short(first)}` and `{short(name)}` {differ}"
+            notes = (Note("the first one is here", span),)
+            yield diagnose("id-repeated", place.span, message, notes=notes)
+
+
+def _check_places(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    """Each lesson stands in the level that its id begins with."""
+    for level in root.objects("level"):
+        name = _id(level.get("id"))
+        for node in level.objects("lesson"):
+            fields = structs.get(node)
+            if name and isinstance(fields, LessonTable) and not fields.id.startswith(f"{name}."):
+                message = f"the lesson `{fields.id}` stands in the level `{short(name)}`"
+                help = f"an id in this level begins with `{short(name)}.`"
+                yield diagnose("field-value", node.place("id"), message, help=help)
+
+
+def _check_files(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    named: list[tuple[str, Span]] = []
+    for node in root.objects("page"):
+        fields = structs.get(node)
+        if isinstance(fields, PageTable):
+            place = node.place("file")
+            named.append((fields.file, place))
+            if fields.id in _TAKEN:
+                message = f"a page cannot have the id `{fields.id}`"
+                help = "the site has a file of this name already"
+                yield diagnose("field-value", node.place("id"), message, help=help)
+            problem = _path_problem(fields.file)
+            if problem:
+                message = f"`{short(fields.file)}` {problem}"
+                help = "a path relative to the project, as in `content/pages/about.md`"
+                yield diagnose("field-value", place, message, help=help)
+    yield from repeated(named, "field-value", "two pages have the file `{}`")
+
+
+def _path_problem(path: str) -> str:
+    """What is wrong with the path of a page; empty when nothing is."""
+    if "\\" in path:
+        return "has a backslash: folders are separated by `/`"
+    if path.startswith(("/", "~")) or re.match(r"[A-Za-z]:", path):
+        return "is not relative to the project"
+    parts = path.split("/")
+    if ".." in parts:
+        return "leads out of its folder by `..`"
+    if "" in parts or "." in parts or any(ord(char) < 32 for char in path):
+        return "is not a plain path"
+    if not path.endswith(".md"):
+        return "is no Markdown file: its name ends in `.md`"
+    return ""

@@ -1,0 +1,338 @@
+"""From nodes to declared structs, with every mistake at its place.
+
+Entry point: `decode(node, type, name, words)` → `Decoding`.
+
+1. One walk over the nodes, led by what `msgspec.inspect` says of the type, reports everything that
+   is wrong in one go: unknown and missing fields, wrong types, impossible values. (Repeated fields
+   were reported by the parser that made the nodes.)
+2. A struct is made as soon as all its own fields are right: an unknown field beside them is a
+   mistake, but no reason to leave the rest unchecked.
+3. What was right is kept by node, so that checks of what no type can say run on all of it, even
+   when the whole is wrong.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, Generic, TypeVar
+
+import msgspec.inspect as inspect
+from msgspec import Struct
+
+from coursebuild.core.syntax.fields import NOT_BLANK
+from coursebuild.core.syntax.nodes import (
+    ArrayNode,
+    BoolNode,
+    ErrorNode,
+    Node,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+)
+from coursebuild.core.syntax.wording import (
+    FormatWords,
+    accepts,
+    named,
+    quoted,
+    type_help,
+    wrong_type,
+)
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
+from coursebuild.core.text.source import Span
+
+S = TypeVar("S", bound=Struct)
+
+_FAILED = object()
+"""The value of a node that is wrong."""
+
+
+class Decoding(Struct, Generic[S], frozen=True):
+    """What a tree of nodes holds."""
+
+    value: S | None
+    """The whole; it can be there along with diagnostics (an unknown field takes nothing away)."""
+    diagnostics: tuple[Diagnostic, ...]
+    structs: Mapping[ObjectNode, Struct]
+    """Every object whose own fields are all right."""
+    texts: tuple[tuple[StringNode, str], ...]
+    """Every string that is Markdown, with `blocks` or `inlines`."""
+
+
+def decode(node: Node, type: type[S], name: str, words: FormatWords) -> Decoding[S]:
+    """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
+    decoder = _Decoder(words)
+    value = decoder.value(node, _type_info(type), name, {})
+    whole = value if isinstance(value, type) else None
+    return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
+
+
+@functools.cache
+def _type_info(type: type[Struct]) -> inspect.Type:
+    return inspect.type_info(type)
+
+
+class _Decoder:
+    """Gathers what one walk finds. A method gives the value of a node, or reports and `_FAILED`.
+
+    `name` is what messages call the node, `remarks` is the `extra` of the type's `Meta`.
+    """
+
+    def __init__(self, words: FormatWords) -> None:
+        self.words = words
+        self.diagnostics: list[Diagnostic] = []
+        self.structs: dict[ObjectNode, Struct] = {}
+        self.texts: list[tuple[StringNode, str]] = []
+
+    def report(self, rule: str, span: Span, message: str, help: str = "") -> object:
+        self.diagnostics.append(diagnose(rule, span, message, help=help))
+        return _FAILED
+
+    def wrong_type(self, node: Node, type: inspect.Type, name: str, help: str = "") -> object:
+        if isinstance(node, ErrorNode):  # reported when it was read
+            return _FAILED
+        message = wrong_type(node, name, type, self.words)
+        return self.report("field-type", node.mark, message, help or type_help(node, type))
+
+    def value(self, node: Node, type: inspect.Type, name: str, remarks: dict[str, Any]) -> object:
+        """The value of a node of which a type is declared."""
+        if not accepts(type, node):
+            return self.wrong_type(node, type, name)
+        match type, node:
+            case inspect.Metadata(), _:
+                return self.value(node, type.type, name, {**(type.extra or {}), **remarks})
+            case inspect.StrType(), StringNode():
+                return self.string(node, type, name, remarks)
+            case inspect.LiteralType(), StringNode():
+                return self.literal(node, type, name)
+            case inspect.IntType() | inspect.FloatType(), NumberNode():
+                return self.number(node, type, name)
+            case inspect.VarTupleType(), ArrayNode():
+                return self.array(node, type, name, remarks)
+            case inspect.TupleType(), ArrayNode():
+                return self.tuple(node, type, name, remarks)
+            case inspect.DictType(), ObjectNode():
+                return self.map(node, type, remarks)
+            case inspect.StructType(), ObjectNode():
+                return self.struct(node, type)
+            case inspect.UnionType(), _:
+                structs = [one for one in type.types if isinstance(one, inspect.StructType)]
+                tagged = {str(one.tag): one for one in structs if one.tag is not None}
+                if tagged and isinstance(node, ObjectNode):
+                    return self.tagged(node, tagged)
+                fitting = next(one for one in type.types if accepts(one, node))
+                return self.value(node, fitting, name, remarks)
+            case _:
+                return node.value if isinstance(node, BoolNode) else None
+
+    # ---------------------------------------------------------------------------------- scalars
+
+    def string(
+        self, node: StringNode, type: inspect.StrType, name: str, remarks: dict[str, Any]
+    ) -> object:
+        value = node.value
+        blank = type.pattern == NOT_BLANK
+        if len(value) < (type.min_length or 0) or (blank and not value.strip()):
+            return self.report("field-value", node.mark, f"{named(name)} is empty")
+        if type.pattern and not blank and re.fullmatch(type.pattern, value) is None:
+            message = f"{named(name)} cannot be {quoted(node)}"
+            help = f"expected: {remarks.get('expects', '')}"
+            return self.report("field-value", node.mark, message, help)
+        if "text" in remarks:
+            self.texts.append((node, remarks["text"]))
+        return value
+
+    def literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
+        if node.value in type.values:
+            return node.value
+        message = f"{named(name)} cannot be {quoted(node)}"
+        help = did_you_mean(node.value, map(str, type.values))
+        return self.report("field-value", node.mark, message, help)
+
+    def number(
+        self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
+    ) -> object:
+        value = node.value if isinstance(type, inspect.IntType) else _double(node.value)
+        problem = _not_a_double(node) or _out_of_bounds(value, node, type)
+        if problem:
+            return self.report("field-value", node.mark, f"{named(name)} {problem}")
+        return value
+
+    # ------------------------------------------------------------------------------- containers
+
+    def array(
+        self, node: ArrayNode, type: inspect.VarTupleType, name: str, remarks: dict[str, Any]
+    ) -> object:
+        least, length = type.min_length or 0, len(node.items)
+        if length < least:
+            problem = f"needs at least {least} entries, and has {length}"
+            message = f"{named(name)} {problem if length else 'is empty'}"
+            return self.report("field-value", node.mark, message)
+        return self.items(node, [type.item_type] * length, name, remarks)
+
+    def tuple(
+        self, node: ArrayNode, type: inspect.TupleType, name: str, remarks: dict[str, Any]
+    ) -> object:
+        if len(node.items) != len(type.item_types):
+            problem = f"needs {len(type.item_types)} entries, and has {len(node.items)}"
+            return self.report("field-value", node.mark, f"{named(name)} {problem}")
+        return self.items(node, type.item_types, name, remarks)
+
+    def items(
+        self, node: ArrayNode, types: Iterable[inspect.Type], name: str, remarks: dict[str, Any]
+    ) -> object:
+        values = [
+            self.value(item, type, f"{name}[{i}]", remarks)
+            for i, (item, type) in enumerate(zip(node.items, types, strict=True))
+        ]
+        return _FAILED if _FAILED in values else tuple(values)
+
+    def map(self, node: ObjectNode, type: inspect.DictType, remarks: dict[str, Any]) -> object:
+        values: dict[str, object] = {}
+        for member in node.members:
+            key = member.key.value
+            if key not in values:
+                values[key] = self.value(member.value, type.value_type, key, remarks)
+        return _FAILED if _FAILED in values.values() else values
+
+    # ---------------------------------------------------------------------------------- structs
+
+    def struct(
+        self,
+        node: ObjectNode,
+        type: inspect.StructType,
+        tagged: Mapping[str, inspect.StructType] | None = None,
+    ) -> object:
+        """The struct; `tagged` are the other variants of its union, by their tags."""
+        fields = {field.name: field for field in type.fields}
+        values: dict[str, object] = {}
+        unknown: dict[str, StringNode] = {}
+        for member in node.members:
+            key = member.key.value
+            if key in fields:
+                if key not in values:
+                    values[key] = self.value(member.value, fields[key].type, key, {})
+            elif not tagged or key != type.tag_field:
+                unknown.setdefault(key, member.key)
+        meant: set[str] = set()
+        if type.forbid_unknown_fields and unknown:
+            meant = self.unknown(unknown.values(), fields, values, type, tagged or {})
+        missing = [field for field in type.fields if field.required and field.name not in values]
+        for lacking in missing:
+            if lacking.name not in meant:  # a misspelt field is one mistake
+                about = _description(lacking)
+                help = about and f"`{lacking.name}`: {about}"
+                self.report("field-missing", node.mark, f"`{lacking.name}` is missing", help)
+        if missing or _FAILED in values.values():
+            return _FAILED
+        struct: Struct = type.cls(**values)
+        self.structs[node] = struct
+        return struct
+
+    def unknown(
+        self,
+        keys: Iterable[StringNode],
+        fields: Iterable[str],
+        given: Iterable[str],
+        type: inspect.StructType,
+        tagged: Mapping[str, inspect.StructType],
+    ) -> set[str]:
+        """Report unknown fields; the fields that were surely meant."""
+        meant: set[str] = set()
+        for key in keys:
+            near = nearest(key.value, set(fields) - set(given) - meant)
+            owners = _owners(key.value, tagged)
+            if near is not None:
+                meant.add(near)
+                help = f"did you mean `{near}`?"
+            elif owners:
+                names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
+                help = f"it is a field of {names}"
+            else:
+                help = did_you_mean(key.value, fields)
+            self.report("field-unknown", key.span, f"unknown field {named(key.value)}", help)
+        return meant
+
+    def tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
+        """The struct that the tag of an object names."""
+        tag = str(next(iter(variants.values())).tag_field)
+        given = node.get(tag)
+        if given is None:
+            return self.untagged(node, tag, variants)
+        if not isinstance(given, StringNode):
+            return self.wrong_type(given, inspect.StrType(), tag, did_you_mean("", variants))
+        if given.value in variants:
+            return self.struct(node, variants[given.value], variants)
+        message = f"{named(tag)} cannot be {quoted(given)}"
+        help = did_you_mean(given.value, variants)
+        return self.report("field-value", given.mark, message, help)
+
+    def untagged(
+        self, node: ObjectNode, tag: str, variants: Mapping[str, inspect.StructType]
+    ) -> object:
+        """Without a tag: the implied variant, unless the fields are clearly those of another."""
+        owners = {member.key.value: _owners(member.key.value, variants) for member in node.members}
+        for key in (member.key for member in node.members):
+            if not owners[key.value] and nearest(key.value, [tag], cutoff=0.7):
+                message = f"unknown field {named(key.value)}"
+                return self.report("field-unknown", key.span, message, f"did you mean `{tag}`?")
+        help = did_you_mean("", variants)
+        implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
+        if implied is not None:
+            foreign = [tags for tags in owners.values() if tags and implied not in tags]
+            if not foreign or [implied] in owners.values():
+                return self.struct(node, variants[implied], variants)
+            help = f'its fields are those of `"{tag}": "{foreign[0][0]}"`'
+        return self.report("field-missing", node.mark, f"`{tag}` is missing", help)
+
+
+def _description(field: inspect.Field) -> str:
+    extra = field.type.extra_json_schema if isinstance(field.type, inspect.Metadata) else None
+    return str((extra or {}).get("description", ""))
+
+
+def _owners(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:
+    """The tags of the variants that have a field."""
+    return [tag for tag, one in variants.items() if key in one.cls.__struct_fields__]
+
+
+# ----------------------------------------------------------------------------------------- numbers
+
+_BOUNDS = (
+    ("ge", "at least", operator.ge),
+    ("gt", "greater than", operator.gt),
+    ("le", "at most", operator.le),
+    ("lt", "less than", operator.lt),
+)
+
+
+def _out_of_bounds(
+    value: float, node: NumberNode, type: inspect.IntType | inspect.FloatType
+) -> str:
+    for bound, words, holds in _BOUNDS:
+        limit = getattr(type, bound)
+        if limit is not None and not holds(value, limit):
+            return f"must be {words} {limit:g}, not {node.raw}"
+    return ""
+
+
+def _double(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def _not_a_double(node: NumberNode) -> str:
+    """Why a number cannot be used in a calculation; empty when it can."""
+    value = _double(node.value)
+    if node.raw.strip("+-") in ("inf", "nan"):
+        return f"must be a finite number, not {node.raw}"
+    if math.isinf(value):
+        return "is too large: numbers end at about 1.8e308"
+    if value == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
+        return "is too small: it becomes 0"
+    return ""

@@ -1,0 +1,142 @@
+"""Fences: a code block of the text, and what makes one of ours out of it.
+
+Entry points: `read_fence` (a token into a `Fence`), `near_kind` (a kind that looks misspelt),
+`missing_feature` (a kind that an installed feature would read).
+"""
+
+from __future__ import annotations
+
+import re
+
+from markdown_it.common.utils import unescapeAll
+from msgspec import Struct
+
+from coursebuild.core.features import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.model import CodeBlock
+from coursebuild.core.syntax.info import first_word, kind_of, parse_info
+from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.core.text.source import Excerpt, Source, Span
+
+# Names of languages and file types that highlighters know and that are spelt like kinds of ours.
+_LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
+
+
+class Fence(Struct, frozen=True):
+    """A fenced code block."""
+
+    span: Span
+    """From the opening marks to the end of the closing ones."""
+    head: Span
+    """The opening line, from its marks to the end of the info string."""
+    info: Excerpt
+    """The info string as written, without white space at its ends."""
+    body: Excerpt
+    """The lines inside, each with its line end."""
+    body_span: Span
+    """Those lines in the source, from the start of the first to that of the closing line."""
+    prefix: str
+    """What stands before each of those lines in the source."""
+    closed: bool
+    nested: bool
+    """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
+    inner: Span | None
+    """A line inside that was surely meant to begin another fence, which then closed this one."""
+
+    @property
+    def kind(self) -> str:
+        """The first word of the info string."""
+        return first_word(self.info.text)
+
+    def code(self) -> CodeBlock:
+        """It as a code block of no special kind."""
+        language = unescaped(self.kind)
+        return CodeBlock(self.span, language, unescaped(self.info.text), self.body)
+
+
+def is_ours(kind: str) -> bool:
+    """Whether a block of a kind is more than code."""
+    return kind in CORE_FENCES or kind in fence_names()
+
+
+def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
+    """The fence of a `fence` token of the text `base`."""
+    assert token.map is not None
+    info_at = token.start + len(token.markup)
+    info = trimmed(locate(base, [SourceSlice(token.info, info_at)]))
+    closed = token.lines == token.map[1] - token.map[0] - 2
+    body = locate(base, token.rows)
+    if not token.lines:
+        body = Excerpt(base.source, "", ((0, base.offset(info_at + len(token.info) + 1)),))
+    elif not body.text.endswith("\n"):
+        body = Excerpt(base.source, body.text + "\n", body.pieces)
+    span = base.span(token.start, token.end)
+    head = base.span(token.start, info_at + len(token.info.rstrip()))
+    body_span, prefix = (body.span(), "") if nested else _lines(span, head, closed)
+    inner = _inner(body, token.markup)
+    return Fence(span, head, info, body, body_span, prefix, closed, nested, inner)
+
+
+def _inner(body: Excerpt, marks: str) -> Span | None:
+    """The first line that would begin a fence of these marks, were it not inside one."""
+    if marks not in body.text:
+        return None
+    opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
+    found = opening.search(body.text)
+    return None if found is None else body.span(found.start(1), found.end(1))
+
+
+def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
+    """The whole lines between the fences, and what new ones must begin with."""
+    source = span.source
+    first, last = head.line, span.end_line
+    start = _line_start(source, first + 1)
+    end = _line_start(source, last if closed else last + 1)
+    prefix = source.text[_line_start(source, first) : head.start]
+    if prefix:
+        prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
+    return Span(source, start, max(start, end)), prefix + " " if prefix.endswith(">") else prefix
+
+
+def _line_start(source: Source, line: int) -> int:
+    """Where a line (from 1) begins; the end of the text past the last one."""
+    starts = source.line_starts
+    return starts[line - 1] if line <= len(starts) else len(source.text)
+
+
+def unescaped(info: str) -> str:
+    """An info string with CommonMark's backslash escapes and entities decoded."""
+    return unescapeAll(info)
+
+
+def near_kind(fence: Fence) -> Diagnostic | None:
+    """What is wrong with a code block that looks like one of ours and is none."""
+    kind = kind_of(fence.info)
+    if not kind.text:
+        return None
+    name = kind.text.lower()
+    words = parse_info(fence.info).value.words
+    if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
+        message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
+        help = "a script is a block of kind `python`"
+        return diagnose("script-kind", kind.span(), message, help=help)
+    if name in _LANGUAGES:
+        return None
+    near = (
+        "lab simlab"
+        if name == "simlab"
+        else nearest(name, (*CORE_FENCES, *fence_names()), cutoff=0.75)
+    )
+    if near is None:
+        return None
+    message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
+    return diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
+
+
+def missing_feature(fence: Fence) -> Diagnostic | None:
+    """That a block would be more than code if its feature were installed."""
+    package = missing_package(fence.kind)
+    if not package:
+        return None
+    message = f"nothing that is installed reads a block of kind `{fence.kind}`"
+    return diagnose("feature-missing", fence.head, message, help=f"install {package}")

@@ -1,0 +1,143 @@
+"""Headings: the attributes after them, and the anchors of a document.
+
+Entry points: `read_attributes` (`## Title {#id .class}`), `Anchors` (unique ids), `slug`,
+`heading_mistakes`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from unicodedata import normalize
+
+from msgspec import Struct, field
+
+from coursebuild.core.model import Image, Inline, plain_text, walk_inlines
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt, Span
+
+_CANDIDATE = pattern(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
+_ID = pattern(r"#[\w:.-]*[\w:-]|#\w")
+_CLASS = pattern(r"\.[A-Za-z_][\w-]*")
+_NO_SLUG = pattern(r"[^\w\s-]")
+_SPACES = pattern(r"\s")
+_HELP = (
+    "write `{#id}`, `{.class}` or `{#id .class}`, "
+    "of letters, digits, `-` and `_`, and in an id also `:` and `.`"
+)
+
+
+class Attributes(Struct, frozen=True):
+    """What stands in braces after a heading, and the heading's text before it."""
+
+    title: Excerpt
+    id: str | None = None
+    id_span: Span | None = None
+    classes: tuple[str, ...] = ()
+
+
+def read_attributes(content: Excerpt) -> Parsed[Attributes]:
+    """Split a heading's content into its text and its attributes."""
+    found = _CANDIDATE.search(content.text) if "{" in content.text else None
+    if found is None:
+        return Parsed(Attributes(content))
+    start = found.start()
+    title = content.slice(0, len(content.text[:start].rstrip()))
+    braces = content.span(start, start + len(found[0].rstrip()))
+    if not found[1]:
+        message = "the attributes of this heading are never closed"
+        return Parsed(
+            Attributes(title), (diagnose("heading-attributes", braces, message, help=_HELP),)
+        )
+    inner_start = start + found[0].index("{") + 1
+    inner = content.text[inner_start : start + found[0].rindex("}")]
+    name, name_span, classes = None, None, []
+    for word in re.finditer(r"\S+", inner):
+        span = content.span(inner_start + word.start(), inner_start + word.end())
+        if _ID.fullmatch(word[0]) and name is None:
+            name, name_span = word[0][1:], span
+        elif _CLASS.fullmatch(word[0]):
+            classes.append(word[0][1:])
+        else:
+            second = word[0].startswith("#") and name is not None
+            message = (
+                "a heading has one id" if second else f"`{word[0]}` is neither an id nor a class"
+            )
+            return Parsed(
+                Attributes(title), (diagnose("heading-attributes", span, message, help=_HELP),)
+            )
+    return Parsed(Attributes(title, name, name_span, tuple(classes)))
+
+
+def slug(text: str) -> str:
+    """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
+    return _words(text) or "section"
+
+
+def _words(text: str) -> str:
+    return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-")
+
+
+def term_id(name: str) -> str:
+    """The id of a term, by which links call it; empty for a name without letters and digits."""
+    return _words(normalize("NFC", name))
+
+
+class Anchors(Struct):
+    """The anchors of a document. Explicit ids are known before the first heading is named."""
+
+    report: Callable[[Diagnostic], None]
+    explicit: dict[str, Span | None] = field(default_factory=dict)
+    """Each explicit id; the span of the heading that took it, once one has."""
+    taken: set[str] = field(default_factory=set)
+    """Ids that headings got from their text."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """How far each text's ids are numbered."""
+
+    def reserve(self, name: str) -> None:
+        """Keep an id for the heading that asks for it."""
+        self.explicit.setdefault(name, None)
+
+    def take(self, name: str, span: Span) -> None:
+        """Use an explicit id."""
+        first = self.explicit.get(name)
+        if first is not None or name in self.taken:
+            notes = [Note("first used here", first)] if first is not None else []
+            self.report(
+                diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
+            )
+        else:
+            self.explicit[name] = span
+
+    def make(self, text: str) -> str:
+        """The anchor of a heading without an id."""
+        base = name = slug(text)
+        count = self.counts.get(base, 1)
+        while name in self.explicit or name in self.taken:
+            count += 1
+            name = f"{base}-{count}"
+        self.counts[base] = count
+        self.taken.add(name)
+        return name
+
+
+def heading_mistakes(
+    span: Span, level: int, above: int | None, children: tuple[Inline, ...], *, lesson: bool
+) -> list[Diagnostic]:
+    """What is wrong with a heading; `above` is the level before it, where that counts."""
+    found: list[Diagnostic] = []
+    if not plain_text(children).strip() and not any(
+        isinstance(inline, Image) for inline in walk_inlines(children)
+    ):
+        found.append(diagnose("heading-empty", span, "the heading has no text"))
+    if lesson and level == 1:
+        help = "the title comes from the course map; begin with `## `"
+        message = "a lesson has no heading of level 1"
+        found.append(diagnose("heading-top", span, message, help=help))
+    if above is not None and level > above + 1:
+        message = f"a heading of level {level} follows one of level {above}"
+        if lesson and above == 1:
+            message = f"a heading of level {level} stands before any of level 2"
+        found.append(diagnose("heading-skip", span, message))
+    return found

@@ -1,0 +1,233 @@
+"""Raw HTML: its tags, whether they balance, and HTML with formulas in quiz texts.
+
+Entry points: `tags` (scan), `Balance` (what is open), `html_flow` (a piece of HTML into an
+`HtmlFlow`).
+
+Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw
+text never give a false alarm. An element must be closed in the block, list item or emphasis that it
+was opened in, as the page would be torn otherwise.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from html import unescape
+from typing import NamedTuple
+
+from coursebuild.core.model import HtmlFlow, Inline, Math, RawInline
+from coursebuild.core.syntax.math import find_formula
+from coursebuild.core.syntax.mention import TextPiece, plain, with_mentions
+from coursebuild.core.syntax.targets import check_raw_scheme
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt, Span
+
+VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
+_IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
+"""Elements that may be there without any tag."""
+_OPTIONAL = frozenset("caption dd dt li optgroup option p rp rt td th tr".split())
+"""Elements whose end tag may be left out."""
+_RAW_TEXT = frozenset("script style textarea title".split())
+_LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
+"""Elements in which a dollar is a dollar."""
+
+_TAG = pattern(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
+_LINK = pattern(r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE)
+_PIECE = pattern(r"\\\$|\$|<")
+_ENTITY = pattern(r"&[^\s&;]{1,32};")
+
+
+class Tag(NamedTuple):
+    """A tag, or a comment and the like (then `name` is empty), at `[start, end)` of a text."""
+
+    start: int
+    end: int
+    name: str
+    closes: bool
+    complete: bool
+    """Whether nothing is left open by it: a void element, or `<x/>`."""
+
+
+def tag_at(text: str, at: int) -> Tag | None:
+    """The tag, comment or raw-text element that begins with the `<` at `at`, if one does."""
+    for mark, end in (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("<!", ">")):
+        if text.startswith(mark, at):
+            found = text.find(end, at + len(mark))
+            return Tag(at, len(text) if found < 0 else found + len(end), "", False, True)
+    tag = _TAG.match(text, at)
+    if tag is None:
+        return None
+    name, closes = tag[2].lower(), bool(tag[1])
+    complete = name in VOID or (tag[3].endswith("/") and not closes)
+    if name in _RAW_TEXT and not closes and not complete:
+        end_tag = re.compile(rf"</{name}\s*>", re.IGNORECASE).search(text, tag.end())
+        if end_tag is not None:
+            return Tag(at, end_tag.end(), name, False, True)
+    return Tag(at, tag.end(), name, closes, complete)
+
+
+def tags(text: str) -> Iterator[Tag]:
+    """The tags of a piece of HTML in order."""
+    at = text.find("<")
+    while at >= 0:
+        tag = tag_at(text, at)
+        if tag is not None:
+            yield tag
+        at = text.find("<", at + 1 if tag is None else tag.end)
+
+
+class Balance:
+    """Which elements are open while a document is walked."""
+
+    def __init__(self, report: Callable[[Diagnostic], None]) -> None:
+        self._report = report
+        self._open: list[tuple[str, Span]] = []
+        self._scopes: list[int] = [0]
+        self._seen: set[str] = set()
+        self._excused: Counter[str] = Counter()
+        """End tags whose start tags were already reported."""
+
+    def enter(self) -> None:
+        """Begin a block or inline that elements must not reach out of."""
+        self._scopes.append(len(self._open))
+
+    def leave(self) -> None:
+        """End it."""
+        base = self._scopes.pop()
+        if len(self._open) > base:
+            self._unwind(base)
+
+    def finish(self) -> None:
+        """The text is over."""
+        self._unwind(0)
+
+    def add(self, tag: Tag, text: str, place: Callable[[int, int], Span]) -> None:
+        """Take note of a tag of `text`; `place` says where a part of that text stands."""
+        name, span = tag.name, place(tag.start, tag.end)
+        for link in _LINK.finditer(text, tag.start, tag.end) if name else ():
+            start, end = link.span(link.lastindex or 0)
+            wrong = check_raw_scheme(unescape(text[start:end]), place(start, end))
+            if wrong is not None:
+                self._report(wrong)
+        if not name or tag.complete or name in VOID or name in _IMPLIED:
+            return
+        if name in _OPTIONAL:
+            if not tag.closes:
+                self._seen.add(name)
+            elif name not in self._seen:
+                self._stray(name, span)
+        elif tag.closes:
+            self._close(name, span)
+        else:
+            self._open.append((name, span))
+
+    def _close(self, name: str, span: Span) -> None:
+        base = self._scopes[-1]
+        for i in range(len(self._open) - 1, max(base, len(self._open) - 200) - 1, -1):
+            if self._open[i][0] == name:
+                self._unwind(i + 1)
+                self._open.pop()
+                return
+        if self._excused[name]:
+            self._excused[name] -= 1
+        else:
+            self._stray(name, span)
+
+    def _unwind(self, base: int) -> None:
+        for name, span in self._open[base:]:
+            self._excused[name] += 1
+            message = f"`<{name}>` is never closed"
+            help = f"write `</{name}>` in the same block, list item or emphasis"
+            self._report(diagnose("html-unbalanced", span, message, help=help))
+        del self._open[base:]
+
+    def _stray(self, name: str, span: Span) -> None:
+        message = f"`</{name}>` closes an element that is not open here"
+        self._report(diagnose("html-unbalanced", span, message))
+
+
+def html_flow(excerpt: Excerpt, balance: Balance) -> HtmlFlow:
+    """HTML of a quiz text: tags as they are, formulas and texts between them as inlines."""
+    return HtmlFlow(excerpt.span(), tuple(_Flow(excerpt, balance).read()))
+
+
+class _Flow:
+    """One pass over a piece of HTML."""
+
+    def __init__(self, excerpt: Excerpt, balance: Balance) -> None:
+        self.excerpt, self.text = excerpt, excerpt.text
+        self.balance = balance
+        self.literal: list[str] = []
+        """Open elements in which there are no formulas."""
+        self.links = 0
+        self.run: list[TextPiece] = []
+
+    def read(self) -> Iterator[Inline]:
+        at = 0
+        while found := _PIECE.search(self.text, at):
+            self._add(at, found.start())
+            start = found.start()
+            if found[0] == "<":
+                tag = tag_at(self.text, start)
+                if tag is not None:
+                    yield from self._flush()
+                    yield self._tag(tag)
+                at = start + 1 if tag is None else tag.end
+                if tag is None:
+                    self._add(start, at)
+            elif found[0] != "$" or self.literal:
+                at = found.end()
+                self.run.append(
+                    TextPiece(found[0] if self.literal else "$", start, at, bool(self.literal))
+                )
+            else:
+                formula = find_formula(self.text, start, len(self.text))
+                at = start + 1 if formula is None else formula.after
+                if formula is None:
+                    self._add(start, at)
+                else:
+                    yield from self._flush()
+                    tex = self.excerpt.slice(formula.start, formula.end)
+                    yield Math(self.excerpt.span(start, at), tex, formula.display)
+        self._add(at, len(self.text))
+        yield from self._flush()
+
+    def _add(self, start: int, end: int) -> None:
+        at = start
+        for entity in _ENTITY.finditer(self.text, start, end):
+            decoded = unescape(entity[0])
+            if decoded != entity[0]:
+                self._text(at, entity.start())
+                self.run.append(TextPiece(decoded, entity.start(), entity.end(), False))
+                at = entity.end()
+        self._text(at, end)
+
+    def _text(self, start: int, end: int) -> None:
+        """Text without entities; its line ends are items of their own."""
+        at = start
+        while at < end:
+            line_end = self.text.find("\n", at, end)
+            stop = end if line_end < 0 else line_end
+            if stop > at:
+                self.run.append(TextPiece(self.text[at:stop], at, stop))
+            if line_end >= 0:
+                self.run.append(TextPiece("\n", stop, stop + 1))
+            at = stop + 1
+
+    def _flush(self) -> list[Inline]:
+        run, self.run = self.run, []
+        make = plain if self.literal or self.links else with_mentions
+        return make(run, self.excerpt)
+
+    def _tag(self, tag: Tag) -> RawInline:
+        span = self.excerpt.span(tag.start, tag.end)
+        self.balance.add(tag, self.text, self.excerpt.span)
+        if tag.closes and tag.name in self.literal:
+            del self.literal[self.literal.index(tag.name) :]
+        elif tag.name in _LITERAL and not tag.closes and not tag.complete:
+            self.literal.append(tag.name)
+        if tag.name == "a":
+            self.links = max(0, self.links + (-1 if tag.closes else 1))
+        return RawInline(span, self.text[tag.start : tag.end])

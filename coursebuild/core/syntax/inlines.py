@@ -1,0 +1,369 @@
+"""Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
+
+Entry point: `InlineReader.read`. There is one pass over the flat tokens, with a stack of open
+emphasis, strong, strikethrough, links and terms:
+
+1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
+   and mentions (`mention`).
+2. An opening token puts a frame on the stack, its closing token makes the node from what was
+   gathered since.
+3. Mistakes are reported on the way: attributes, schemes, images without text, footnotes that are
+   not written, open formulas.
+"""
+
+from __future__ import annotations
+
+import re
+
+from markdown_it.helpers import parseLinkDestination
+from markdown_it.token import Token
+from markdown_it.utils import EnvType
+from msgspec import Struct, field
+
+from coursebuild.core.model import (
+    CodeSpan,
+    Emphasis,
+    FootnoteRef,
+    HardBreak,
+    Image,
+    Inline,
+    Link,
+    Math,
+    NumberBinding,
+    RawInline,
+    Strikethrough,
+    Strong,
+    Term,
+    Text,
+    plain_text,
+)
+from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
+from coursebuild.core.syntax.block_parser import Definitions
+from coursebuild.core.syntax.headings import term_id
+from coursebuild.core.syntax.html import Balance, tags
+from coursebuild.core.syntax.markdown import definition_label, inline_tokens
+from coursebuild.core.syntax.mention import TextPiece, may_mention, plain, with_mentions
+from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.syntax.spans import PositionedToken, locate
+from coursebuild.core.syntax.targets import check_scheme, classify
+from coursebuild.core.syntax.unread_math import unread_formula
+from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt, Span
+
+MAX_DEPTH = 60
+"""Emphasis inside emphasis; what is deeper loses its marks."""
+
+_UNREAD = (
+    "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
+    "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
+)
+_BRACES = pattern(r"\{[^}\s]{0,60}\}?")
+_DEFINED = pattern(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+
+
+class _Frame(Struct):
+    """An inline that is open."""
+
+    token: PositionedToken | None
+    nodes: list[Inline] = field(default_factory=list)
+
+
+class InlineReader:
+    """Reads the inline content of one text; `base` is what its block tokens were made from."""
+
+    def __init__(
+        self,
+        base: Excerpt,
+        definitions: Definitions,
+        session: ParsingState,
+        balance: Balance,
+    ) -> None:
+        self.base = base
+        self.definitions = definitions
+        self.environment: EnvType | None = None
+        """What markdown-it knows of the link definitions, once it was asked for."""
+        self.notes = session.notes
+        self.anchors = session.anchors
+        self.balance = balance
+        self.report = session.report
+
+    def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
+        """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
+        return _Pass(self, content, mentions).read()
+
+    def tokens(self, text: str) -> list[PositionedToken]:
+        """The inline tokens of a block's content."""
+        if self.environment is None:
+            self.environment = self.definitions.environment()
+        return inline_tokens(text, self.environment)
+
+
+class _Pass:
+    """One pass over the tokens of one content."""
+
+    def __init__(self, reader: InlineReader, content: Excerpt, mentions: bool) -> None:
+        self.reader = reader
+        self.content = content
+        self.stack = [_Frame(None)]
+        self.run: list[TextPiece] = []
+        self.texts: list[tuple[int, str]] = []
+        self.links = 0 if mentions and may_mention(content.text) else 1
+        """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
+
+    def read(self) -> tuple[Inline, ...]:
+        self.reader.balance.enter()
+        for token in self.reader.tokens(self.content.text):
+            kind = token.type
+            if kind == "text" or kind == "text_special":
+                text = token.content
+                if text:
+                    literal = kind == "text" or text == token.markup
+                    self.run.append(TextPiece(text, token.start, token.end, literal))
+                    if literal:
+                        self.texts.append((token.start, text))
+            elif kind == "softbreak":
+                self.run.append(TextPiece("\n", token.start, token.end, False))
+            elif kind == "math_unclosed":
+                self._unclosed_math(token)
+            elif token.nesting == 1:
+                self._open(token)
+            elif token.nesting == -1:
+                self._close(token)
+            else:
+                self._leaf(token)
+        self._flush()
+        self.reader.balance.leave()
+        if "$" in self.content.text:
+            self._unread_math()
+        return tuple(self.stack[0].nodes)
+
+    # -- texts
+
+    def _flush(self) -> None:
+        run = self.run
+        if not run:
+            return
+        self.run = []
+        nodes = self.stack[-1].nodes
+        if not self.links:
+            nodes += with_mentions(run, self.content)
+        elif len(run) == 1 and run[0].text != "\n":
+            text, start, end, _ = run[0]
+            nodes.append(Text(self.content.span(start, end), text))
+        else:
+            nodes += plain(run, self.content)
+
+    def _unread_math(self) -> None:
+        dollar = unread_formula(self.texts)
+        if dollar is not None:
+            span = self.content.span(dollar, dollar + 1)
+            what = "a dollar sign and TeX stand in the text: no formula was read here"
+            self.reader.report(diagnose("math-unread", span, what, help=_UNREAD))
+
+    def _unclosed_math(self, token: PositionedToken) -> None:
+        span = self.content.span(token.start, token.end)
+        help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
+        self.reader.report(
+            diagnose("math-unclosed", span, "display math is never closed", help=help)
+        )
+        self.run.append(TextPiece(token.content, token.start, token.end))
+
+    # -- containers
+
+    def _open(self, token: PositionedToken) -> None:
+        self._flush()
+        is_link = token.type == "link_open"
+        flat = len(self.stack) > MAX_DEPTH and not is_link and token.type != "term_open"
+        self.stack.append(_Frame(token, self.stack[-1].nodes if flat else []))
+        self.reader.balance.enter()
+        self.links += is_link or token.type == "term_open"
+
+    def _close(self, token: PositionedToken) -> None:
+        self._flush()
+        frame = self.stack.pop()
+        self.reader.balance.leave()
+        into = self.stack[-1].nodes
+        if frame.nodes is into:
+            return
+        opened, children = frame.token, tuple(frame.nodes)
+        assert opened is not None
+        if token.type == "link_close":
+            self.links -= 1
+            link = self._link(opened, token, children)
+            into.extend(children if link is None else (link,))
+        elif token.type == "term_close":
+            self.links -= 1
+            term = self._term(opened, token, children)
+            into.extend(children if term is None else (term,))
+        elif token.type == "strong_close":
+            into.append(Strong(self.content.span(opened.start - 1, token.end + 1), children))
+        else:
+            span = self.content.span(opened.start, token.end)
+            into.append(
+                Emphasis(span, children)
+                if token.type == "em_close"
+                else Strikethrough(span, children)
+            )
+
+    def _term(
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    ) -> Term | None:
+        assert closed.map is not None
+        span = self.content.span(opened.start, closed.end)
+        report = self.reader.report
+        braces = Braces(closed.map[0], closed.map[1], not closed.info)
+        given = read_term(self.content, braces, report)
+        if given is None:
+            return None
+        name = given or folded(plain_text(children))
+        if not term_id(name):
+            report(diagnose("term-attribute", span, "the term has no letters and no digits"))
+            return None
+        return Term(span, children, name, term_id(name), bool(given))
+
+    def _link(
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    ) -> Link | None:
+        url = str(opened.attrs["href"])
+        span = self.content.span(opened.start, closed.end)
+        destination = self._destination(opened, closed)
+        wrong = check_scheme(url, destination)
+        if wrong is not None:
+            self.reader.report(wrong)
+            return None
+        title = str(opened.attrs.get("title", ""))
+        return Link(span, classify(url), destination, title, children)
+
+    def _destination(self, opened: PositionedToken, closed: PositionedToken) -> Span:
+        """Where the destination of a link is written: in it, or in the definition that it names."""
+        text, label_end = self.content.text, closed.start
+        if opened.markup == "autolink":
+            return self.content.span(opened.start + 1, closed.end - 1)
+        return self._written(text, opened.start, label_end, closed.end)
+
+    def _written(self, text: str, start: int, label_end: int, end: int) -> Span:
+        if end > label_end + 1 and text[label_end + 1] == "(":
+            at = label_end + 2
+            while text[at] in " \t\n":
+                at += 1
+            found = parseLinkDestination(text, at, end)
+            if not found.ok:
+                return self.content.span(start, end)
+            angle = text[at] == "<"
+            return self.content.span(at + angle, found.pos - angle)
+        label = text[start + 1 : label_end]
+        if end > label_end + 3:
+            label = text[label_end + 2 : end - 1]
+        definition = self.reader.definitions.links.get(definition_label(label))
+        if definition is None or not definition.rows:
+            return self.content.span(start, end)
+        rows = locate(definition.base, definition.rows)
+        head = _DEFINED.match(rows.text)
+        found = parseLinkDestination(rows.text, head.end() if head else 0, len(rows.text))
+        if head is None or not found.ok:
+            return rows.span()
+        angle = rows.text[head.end()] == "<"
+        return rows.span(head.end() + angle, found.pos - angle)
+
+    # -- leaves
+
+    def _leaf(self, token: PositionedToken) -> None:
+        if self.run:
+            self._flush()
+        span = self.content.span(token.start, token.end)
+        node: Inline | None = None
+        match token.type:
+            case "math":
+                node = self._math(token, span)
+            case "code_inline":
+                node = CodeSpan(span, token.content)
+            case "number_binding" | "number_unbound":
+                node = self._number(token, span)
+            case "html_inline":
+                node = self._html(token, span)
+            case "image":
+                node = self._image(token, span)
+            case "hardbreak":
+                node = HardBreak(span)
+            case "footnote_ref":
+                node = self._footnote(token, span)
+            case _:
+                raise AssertionError(f"no inline for token {token.type}")
+        if node is not None:
+            self.stack[-1].nodes.append(node)
+
+    def _math(self, token: PositionedToken, span: Span) -> Math:
+        assert token.map is not None
+        if not token.content.strip():
+            self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
+        tex, display = self.content.slice(*token.map), token.info == "display"
+        braces, report = token.meta.get("braces"), self.reader.report
+        if braces is None:
+            return Math(span, tex, display)
+        if not display:
+            return Math(span, tex, display, None, read_meaning(self.content, braces, report))
+        label = read_label(self.content, braces, report)
+        if label is not None:
+            self.reader.anchors.take(label.id, label.span)
+        return Math(span, tex, display, label)
+
+    def _number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
+        assert token.map is not None
+        if token.type == "number_unbound":
+            braces = _BRACES.match(self.content.text, token.end)
+            assert braces is not None
+            place = self.content.span(braces.start(), braces.end())
+            message = f"`{braces[0]}` does not say what the number is bound to"
+            help = "write `{out}`, or `{out=examples/x.py}` with the path of a script"
+            self.reader.report(diagnose("binding-attribute", place, message, help=help))
+            return CodeSpan(span, token.content)
+        start, end = token.map
+        if end - start == len(token.content) + 2:
+            start, end = start + 1, end - 1
+        return NumberBinding(span, token.content, self.content.span(start, end), token.info or None)
+
+    def _html(self, token: PositionedToken, span: Span) -> RawInline:
+        def place(start: int, end: int) -> Span:
+            return self.content.span(token.start + start, token.start + end)
+
+        for tag in tags(token.content):
+            self.reader.balance.add(tag, token.content, place)
+            if tag.name == "a" and not tag.complete:
+                self.links = max(0, self.links + (-1 if tag.closes else 1))
+        return RawInline(span, token.content)
+
+    def _image(self, token: PositionedToken, span: Span) -> Image:
+        url, alt = str(token.attrs["src"]), alt_text(token.children or [])
+        label_end = token.start + 2 + len(token.content)
+        place = self._written(self.content.text, token.start + 1, label_end, token.end)
+        wrong = check_scheme(url, place, image=True)
+        if wrong is not None:
+            self.reader.report(wrong)
+            url = ""
+        if not alt.strip():
+            help = "say in the brackets what it shows, for readers who cannot see it"
+            message = "the image has no text alternative"
+            self.reader.report(diagnose("image-alt", span, message, help=help))
+        return Image(span, url, alt, str(token.attrs.get("title", "")), place)
+
+    def _footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
+        reference = self.reader.notes.refer(token.content, span)
+        if reference is None:
+            self.run.append(TextPiece(f"[^{token.content}]", token.start, token.end))
+        return reference
+
+
+def alt_text(tokens: list[Token]) -> str:
+    """The text of an image's description without marks."""
+    parts: list[str] = []
+    for token in tokens:
+        if token.type == "softbreak" or token.type == "hardbreak":
+            parts.append("\n")
+        elif token.children:
+            parts.append(alt_text(token.children))
+        elif token.type == "footnote_ref":
+            parts.append(f"[^{token.content}]")
+        elif token.type != "image":
+            parts.append(token.content)
+    return "".join(parts)

@@ -1,0 +1,197 @@
+"""Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
+
+Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body),
+`no_body` and `nothing_recorded` (what follows is none), `no_caption` and `stray_keys` (on a fence
+that records nothing).
+"""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal
+
+from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, plain_text
+from coursebuild.core.syntax.fence import Fence, is_ours
+from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
+from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Span
+
+_CAPTION = pattern(r"\s*Output\b.*:\s*", re.DOTALL)
+_NEAR_CAPTION = pattern(
+    r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
+    re.IGNORECASE | re.DOTALL,
+)
+_NUMBER = pattern(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_VALUES = ("rtol", "atol")
+_FLAGS = ("exact", "digits", "ellipsis", "volatile")
+_GROUPS = {
+    "exact": "exact",
+    "digits": "digits",
+    "rtol": "rtol",
+    "atol": "rtol",
+    "volatile": "volatile",
+}
+
+
+def is_caption(inlines: tuple[Inline, ...]) -> bool:
+    """Whether a paragraph begins with the word "Output" and ends with a colon."""
+    return _CAPTION.fullmatch(plain_text(inlines)) is not None
+
+
+def near_caption(inlines: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+    """A warning where a `text` block looks recorded, and is compared with nothing."""
+    if _NEAR_CAPTION.fullmatch(plain_text(inlines)) is None:
+        return []
+    message = "this looks like the caption of a recorded output, and nothing is compared"
+    help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
+    return [diagnose("recording-caption", span, message, help=help)]
+
+
+def no_caption(fence: Span) -> Diagnostic:
+    """A warning where a `text` block stands directly below a script."""
+    message = "this looks like the output of the script above it, and nothing is compared"
+    help = "write a paragraph `Output:` between the two"
+    return diagnose("recording-caption", fence.first_line(), message, help=help)
+
+
+def record_fence(
+    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: ParsingState
+) -> Recording | None:
+    """The recording whose body may be this fence."""
+    if not fence.closed or fence.inner is not None:
+        return None
+    if fence.kind != "text":
+        if is_ours(fence.kind):
+            session.diagnostics += nothing_recorded(caption, caption_span)
+        else:
+            what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
+            session.report(no_body(fence.head, what))
+        return None
+    how = parse_comparison(fence)
+    session.diagnostics += how.diagnostics
+    return Recording(
+        caption_span.to(fence.span),
+        caption,
+        caption_span,
+        fence.body,
+        fence.body_span,
+        fence.prefix,
+        how.value,
+        _script(caption_span, session),
+        readable=not how.diagnostics,
+    )
+
+
+def record_table(
+    caption: tuple[Inline, ...], caption_span: Span, table: Table, session: ParsingState
+) -> Recording:
+    """The recording whose body is a table."""
+    span, script = caption_span.to(table.span), _script(caption_span, session)
+    if not any(cell.text.text for row in table.rows for cell in row):
+        message = "the recorded table has no rows, so that nothing is compared"
+        help = "write what the script prints into the rows below the header"
+        session.report(diagnose("recording-body", table.span.first_line(), message, help=help))
+    return Recording(span, caption, caption_span, table, table.span, "", None, script)
+
+
+def nothing_recorded(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+    """The mistake of a caption without a body, where it can be nothing but a caption."""
+    if plain_text(caption).strip() != "Output:":
+        return []
+    message = "no recorded output follows this line"
+    help = "put a fence that begins with ```` ```text ````, or a table, directly below it"
+    return [diagnose("recording-body", span, message, help=help)]
+
+
+def no_body(span: Span, what: str) -> Diagnostic:
+    """The mistake of a caption that something else follows."""
+    message = f"the recorded output is {what}, not of kind `text`"
+    help = (
+        "write the output in a fence that begins with ```` ```text ````, "
+        "or end the paragraph without a colon"
+    )
+    return diagnose("recording-body", span, message, help=help)
+
+
+def _script(caption_span: Span, session: ParsingState) -> str | None:
+    """The script that a recording belongs to."""
+    if session.script is None and not session.script_wrong:
+        message = "no script stands above this recorded output"
+        help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
+        session.report(diagnose("recording-orphan", caption_span, message, help=help))
+    return session.script
+
+
+def parse_comparison(fence: Fence) -> Parsed[Comparison | None]:
+    """How a `text` fence says that it is compared; `None` where it says nothing."""
+    keys, diagnostics = _keys(fence)
+    rtol = _tolerance(keys.get("rtol"), diagnostics)
+    atol = _tolerance(keys.get("atol"), diagnostics)
+    _contradictions(keys, diagnostics)
+    ellipsis = keys.get("ellipsis") is not None
+    if keys.get("volatile"):
+        return Parsed(Comparison(Mode.VOLATILE), tuple(diagnostics))
+    if rtol is not None or atol is not None:
+        zero = Decimal(0)
+        comparison = Comparison(Mode.TOLERANCE, rtol or zero, atol or zero, ellipsis)
+        return Parsed(comparison, tuple(diagnostics))
+    if keys.get("digits"):
+        return Parsed(Comparison(Mode.DIGITS, ellipsis=ellipsis), tuple(diagnostics))
+    if keys.get("exact") or ellipsis:
+        return Parsed(Comparison(Mode.EXACT, ellipsis=ellipsis), tuple(diagnostics))
+    return Parsed(None, tuple(diagnostics))
+
+
+def stray_keys(fence: Fence) -> list[Diagnostic]:
+    """What is wrong with keys on a `text` fence that records no output."""
+    keys, diagnostics = _keys(fence)
+    if keys.words:
+        span = keys.words[0].span.to(keys.words[-1].span)
+        message = "this block is no recorded output, so it is not compared with anything"
+        help = "put a paragraph that begins with `Output` and ends with a colon directly above it"
+        diagnostics.append(diagnose("recording-keys", span, message, help=help))
+    return diagnostics
+
+
+def _keys(fence: Fence) -> tuple[FenceKeys, list[Diagnostic]]:
+    info = parse_info(fence.info)
+    keys = read_keys("text", info.value.words, values=_VALUES, flags=_FLAGS)
+    return keys.value, [*info.diagnostics, *keys.diagnostics]
+
+
+def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
+    if word is None or word.value is None:
+        return None
+    value = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None
+    if value is not None and value >= 0:
+        return value
+    message = (
+        f"`{word.value}` is not a number" if value is None else f"`{word.key}` must not be negative"
+    )
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    return None
+
+
+def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
+    """Report the first key that does not go with one before it."""
+    mode: Word | None = None
+    volatile, ellipsis = keys.get("volatile"), keys.get("ellipsis")
+    for word in keys.words:
+        group = _GROUPS.get(word.key)
+        if group is None:
+            continue
+        if mode is not None and _GROUPS[mode.key] != group:
+            _contradiction(mode, word, diagnostics)
+            return
+        mode = mode or word
+    if volatile is not None and ellipsis is not None:
+        first, second = sorted((volatile, ellipsis), key=lambda word: word.span.start)
+        _contradiction(first, second, diagnostics)
+
+
+def _contradiction(first: Word, second: Word, diagnostics: list[Diagnostic]) -> None:
+    message = f"`{second.key}` contradicts `{first.key}`"
+    notes = [Note(f"`{first.key}` is given here", first.key_span)]
+    diagnostics.append(diagnose("recording-keys", second.key_span, message, notes=notes))

@@ -1,0 +1,225 @@
+"""The file beside a model, models/NAME.toml: its scenarios, and findings of the diet to keep.
+
+Entry point: `parse_declarations(source)`.
+
+1. The TOML is read into nodes, and these into the declared tables.
+2. What no type can say is checked on every table whose own fields are right: that names differ,
+   that a duration is a whole number of samples and a sample one of timesteps, that commands are of
+   one length.
+3. When nothing is wrong, the tables become the declarations. What only the compiled model can tell
+   is checked where that is known.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+from msgspec import Struct
+
+from coursebuild.core.model.scenarios import (
+    Bands,
+    Declarations,
+    DeclaredScenario,
+    Keep,
+    Measured,
+    Visible,
+)
+from coursebuild.core.model.vocabulary import CLOSED_FORMS
+from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
+from coursebuild.core.syntax.relations import repeated
+from coursebuild.core.syntax.scenario_schema import BenchTable, KeepTable, ModelFile, ScenarioTable
+from coursebuild.core.syntax.toml_text import parse_toml
+from coursebuild.core.syntax.wording import TOML, short
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Parsed,
+    diagnose,
+    did_you_mean,
+    sort_diagnostics,
+)
+from coursebuild.core.text.source import Source
+
+Structs = Mapping[ObjectNode, Struct]
+
+MOST_SAMPLES = 100_000
+"""Looks at the state in a scenario."""
+_SLACK = 1e-9
+"""Relative: decimal fractions are not exact."""
+
+
+def parse_declarations(source: Source) -> Parsed[Declarations | None]:
+    """What the file declares; no value where it cannot be used. Never raises."""
+    parsed = parse_toml(source, rule="toml-syntax")
+    root = parsed.value
+    if root is None:
+        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+    decoding = decode(root, ModelFile, "the file", TOML)
+    found = [
+        *parsed.diagnostics,
+        *decoding.diagnostics,
+        *_check_scenarios(root, decoding.structs),
+        *_check_names(root, decoding.structs),
+    ]
+    if found or decoding.value is None:
+        return Parsed(None, sort_diagnostics(found))
+    return Parsed(_declarations(source, root, decoding.value), ())
+
+
+def whole(length: float, part: float) -> bool:
+    """Whether `part` goes into `length` a whole number of times, at least once."""
+    count = round(length / part) if length / part < 1e15 else 0
+    return count >= 1 and abs(count * part - length) <= _SLACK * length
+
+
+# ---------------------------------------------------------------------------------------- values
+
+
+def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
+    bench = fields.bench or BenchTable()
+    nodes = zip(root.objects("scenario"), fields.scenario, strict=True)
+    keeps = zip(root.objects("keep"), fields.keep, strict=True)
+    return Declarations(
+        model=source.path.removeprefix("models/").removesuffix(".toml"),
+        source=source,
+        scenarios=tuple(_scenario(node, table) for node, table in nodes),
+        visible=Visible(bench.visible, bench.visible_angle),
+        keep=tuple(
+            Keep(node.mark, table.finding, table.reason, node.place("finding"))
+            for node, table in keeps
+        ),
+        bands=Bands(bench.band, bench.order_band),
+    )
+
+
+def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
+    reference, _, closed = (table.reference or "").partition(":")
+    return DeclaredScenario(
+        span=node.mark,
+        name=table.name,
+        title=table.title or "",
+        keyframe=table.keyframe,
+        qpos=table.qpos,
+        qvel=table.qvel,
+        duration=table.duration,
+        sample=table.sample,
+        controls=table.controls,
+        hold=table.hold,
+        measure=_measured(table.measure),
+        reference="ode" if reference == "ode" else "self" if reference == "self" else None,
+        closed=closed,
+        conserved=table.conserved,
+        timesteps=table.timesteps,
+        places=tuple((m.key.value, m.value.mark) for m in node.members),
+    )
+
+
+def _measured(written: str | None) -> Measured | None:
+    if written is None:
+        return None
+    kind, _, name = written.partition(":")
+    match kind:
+        case "body" | "site" | "sensor":
+            return Measured(kind, name)
+        case _:
+            raise AssertionError(kind)
+
+
+# ---------------------------------------------------------------------------------------- checks
+
+
+def _check_names(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    scenarios = [n for n in root.objects("scenario") if isinstance(structs.get(n), ScenarioTable)]
+    names = [(_text(structs[n], "name"), n.place("name")) for n in scenarios]
+    yield from repeated(names, "field-value", "two scenarios have the name `{}`")
+    keeps = [n for n in root.objects("keep") if isinstance(structs.get(n), KeepTable)]
+    findings = [(_text(structs[n], "finding"), n.place("finding")) for n in keeps]
+    yield from repeated(findings, "field-value", "the finding `{}` is kept twice")
+
+
+def _text(table: Struct, name: str) -> str:
+    value = getattr(table, name)
+    assert isinstance(value, str)
+    return value
+
+
+def _check_scenarios(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    for node in root.objects("scenario"):
+        table = structs.get(node)
+        if isinstance(table, ScenarioTable):
+            yield from _check_times(node, table)
+            yield from _check_timesteps(node, table)
+            yield from _check_controls(node, table)
+            yield from _check_reference(node, table)
+
+
+def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
+    sample, duration = table.sample, table.duration
+    if sample is None:
+        return
+    for name, length in (("duration", duration), ("hold", table.hold)):
+        if length is not None and not whole(length, sample):
+            message = f"`{name}` ({length:g} s) is no multiple of `sample` ({sample:g} s)"
+            help = "the state is looked at in even steps, and a command changes at such a look"
+            yield diagnose("field-value", node.place(name), message, help=help)
+    if duration is not None and duration / sample > MOST_SAMPLES * (1 + _SLACK):
+        message = f"`sample` makes {duration / sample:.3g} looks at the state"
+        help = f"{MOST_SAMPLES} are the most: look less often"
+        yield diagnose("field-value", node.place("sample"), message, help=help)
+
+
+def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
+    given = node.get("timesteps")
+    items = given.items if isinstance(given, ArrayNode) else ()
+    spans = [item.mark for item in items]
+    if len(spans) != len(table.timesteps):
+        return
+    pairs = list(zip(table.timesteps, spans, strict=True))
+    for (length, name), (step, span) in itertools.product(_lengths(table), pairs):
+        if not whole(length, step):
+            message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
+            help = "every timestep must end at the same times, or errors cannot be compared"
+            yield diagnose("field-value", span, message, help=help)
+    yield from repeated(pairs, "field-value", "the timestep {} s is named twice")
+
+
+def _lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
+    """What a timestep must divide: the sample alone says it of the others."""
+    if table.sample is not None:
+        return ((table.sample, "sample"),)
+    given = ((table.hold, "hold"), (table.duration, "duration"))
+    return [(length, name) for length, name in given if length is not None]
+
+
+def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
+    if table.hold is not None and not table.controls:
+        help = "`controls` are the commands, each held for so long"
+        yield diagnose("field-missing", node.place("hold"), "`controls` is missing", help=help)
+    if len(table.controls) > 1 and table.hold is None:
+        help = "`hold`: seconds for which each command holds"
+        yield diagnose("field-missing", node.mark, "`hold` is missing", help=help)
+    given = node.get("controls")
+    items = given.items if isinstance(given, ArrayNode) else ()
+    for item, row in zip(items, table.controls, strict=False):
+        first = len(table.controls[0])
+        if len(row) != first:
+            message = f"this command has {len(row)} numbers, and the first one has {first}"
+            yield diagnose(
+                "field-value", item.mark, message, help="give one number for every actuator"
+            )
+    hold, duration = table.hold, table.duration
+    if hold is not None and duration is not None and len(table.controls) > 1:
+        used = -(-duration * (1 - _SLACK) // hold)
+        if used < len(table.controls):
+            message = f"only {used:g} of {len(table.controls)} commands come before the end"
+            help = "make `duration` longer, or leave the others out"
+            yield diagnose("field-value", node.place("controls"), message, help=help)
+
+
+def _check_reference(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
+    kind, _, name = (table.reference or "").partition(":")
+    if kind == "closed" and name not in CLOSED_FORMS:
+        message = f"no hard case with a closed form is called `{short(name)}`"
+        help = did_you_mean(name, CLOSED_FORMS)
+        yield diagnose("field-value", node.place("reference"), message, help=help)

@@ -1,0 +1,53 @@
+"""JSON Schemas of what an author writes in JSON and TOML, for editors.
+
+Entry points: `json_schema(name)`; `schema_roots`, what there are some of.
+
+They are made from the declarations that the decoder checks against, so that an editor and a build
+say the same; what only checks know (an answer that is one of the options) is not in them.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from coursebuild.core.features import features
+from coursebuild.core.syntax.course_schema import CourseFile
+from coursebuild.core.syntax.lab_schema import SimLab, Slider
+from coursebuild.core.syntax.scenario_schema import ModelFile
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+_ROOTS: dict[str, tuple[type[Struct], str]] = {
+    "lab": (SimLab, "A lab fence of the kind simlab"),
+    "course": (CourseFile, "The course map, content/course.toml"),
+    "model": (ModelFile, "The file beside a model, models/NAME.toml"),
+}
+
+
+def schema_roots() -> dict[str, tuple[type[Struct], str]]:
+    """What there are schemas of, by name: the declared type, and its title."""
+    return _ROOTS | {name: root for each in features() for name, root in each.schemas.items()}
+
+
+def json_schema(name: str) -> bytes:
+    """The JSON Schema (draft 2020-12), indented, keys in a fixed order, with a final newline."""
+    root, title = schema_roots()[name]
+    made = copy.deepcopy(msgspec.json.schema(root))
+    definitions: dict[str, Any] = made["$defs"]
+    if Slider.__name__ in definitions:  # the tag that an author may leave out
+        definitions[Slider.__name__]["required"].remove("type")
+    if name == "course":
+        definitions["SilenceTable"]["required"].append("reason")
+    if SimLab.__name__ in definitions:
+        definitions[SimLab.__name__]["oneOf"] = [{"required": ["model"]}, {"required": ["xml"]}]
+    schema = {
+        "$schema": DIALECT,
+        "title": title,
+        "$ref": made["$ref"],
+        "$defs": dict(sorted(definitions.items())),
+    }
+    return msgspec.json.format(msgspec.json.encode(schema), indent=2) + b"\n"

@@ -1,0 +1,253 @@
+"""Python blocks: scripts that are extracted and run, and code that is only shown.
+
+Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges` of a
+script; `fragment` of code that need not parse.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import shlex
+import sys
+import warnings
+from typing import NamedTuple
+
+from coursebuild.core.model import PlainCode, Script
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.patterns import pattern
+from coursebuild.core.text.source import Excerpt, Span
+
+DEFAULT_TIMEOUT = 60.0
+"""Seconds."""
+LONGEST_TIMEOUT = 86400.0
+"""Seconds."""
+
+_VALUES = ("timeout", "requires", "args")
+_FLAGS = ("norun", "diverges", "deep")
+_NUMBER = pattern(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_DEVICE = pattern(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
+_UNPORTABLE = pattern(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
+_SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - {
+    "code",
+    "test",
+    "this",
+}
+_ON_LINE = pattern(r"\b(on|at) line ([0-9]+)")
+
+
+def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
+    """A `python` fence: a `Script` where it has a proper `file=`, else `PlainCode`."""
+    info = parse_info(fence.info)
+    keys = read_keys(
+        "python", info.value.words, values=("file", *_VALUES), flags=(*_FLAGS, "fragment")
+    )
+    diagnostics = [*info.diagnostics, *keys.diagnostics]
+    file, fragment = keys.value.get("file"), keys.value.get("fragment")
+    misspelt = any(word.key == "file" for word in info.value.words)
+    if file is None and not diagnostics:
+        running = (keys.value.get(key) for key in (*_VALUES, *_FLAGS))
+        diagnostics += [_needs_file(word) for word in running if word is not None]
+    if fragment is not None and misspelt:
+        message = "a block with `file` is run, so it cannot be a `fragment`"
+        diagnostics.append(diagnose("fence-key-value", fragment.span, message))
+    if fragment is None or misspelt:
+        wrong = syntax_mistake(fence.body)
+        if wrong is not None:
+            help = (
+                ""
+                if misspelt
+                else "write `fragment` after `python` if it is not meant to be complete"
+            )
+            diagnostics.append(diagnose("python-syntax", wrong[0], wrong[1], help=wrong[2] or help))
+    if file is None:
+        return Parsed(PlainCode(fence.span, fence.body, fragment is not None), tuple(diagnostics))
+    script, mistakes = _script(fence, file, keys.value)
+    diagnostics += mistakes
+    return Parsed(script or PlainCode(fence.span, fence.body, False), tuple(diagnostics))
+
+
+def _needs_file(word: Word) -> Diagnostic:
+    message = f"`{word.key}` says how to run a script, and this block has no `file`"
+    return diagnose(
+        "fence-key-value", word.key_span, message, help="add `file=examples/….py`, or leave it out"
+    )
+
+
+def _script(fence: Fence, file: Word, keys: FenceKeys) -> tuple[Script | None, list[Diagnostic]]:
+    diagnostics: list[Diagnostic] = []
+    path, path_span = file.value or "", file.value_span
+    wrong = path_mistake(path)
+    if fence.nested:
+        wrong = "a text of a quiz or lab cannot hold a script"
+    if wrong:
+        help = (
+            ""
+            if fence.nested
+            else "a script is written to `examples/`, for example `examples/l4_2_inertia.py`"
+        )
+        diagnostics.append(diagnose("script-path", path_span, wrong, help=help))
+    timeout = _timeout(keys.get("timeout"), diagnostics)
+    requires = _modules(keys.get("requires"), diagnostics)
+    args = _arguments(keys.get("args"), diagnostics)
+    if wrong:
+        return None, diagnostics
+    code, norun = _with_line_end(fence.body), keys.get("norun") is not None
+    return Script(
+        fence.span,
+        path,
+        path_span,
+        code,
+        fence.prefix,
+        timeout,
+        requires,
+        args,
+        norun,
+        fence.body_span,
+        keys.get("diverges") is not None,
+        keys.get("deep") is not None,
+    ), diagnostics
+
+
+def _with_line_end(body: Excerpt) -> Excerpt:
+    """The text with exactly one final line end."""
+    kept = body.text.rstrip("\n")
+    if len(kept) < len(body.text):
+        return body.slice(0, len(kept) + 1)
+    return Excerpt(body.source, kept + "\n", body.pieces)
+
+
+def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
+    if word is None or word.value is None:
+        return DEFAULT_TIMEOUT
+    seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
+    if 0 < seconds <= LONGEST_TIMEOUT:
+        return seconds
+    message = f"`{word.value}` is not a number of seconds above 0"
+    if seconds > LONGEST_TIMEOUT:
+        message = f"`{word.value}` s is more than a day"
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    return DEFAULT_TIMEOUT
+
+
+def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+    if word is None or word.value_text is None:
+        return ()
+    modules: dict[str, None] = {}
+    text = word.value_text
+    at = 0
+    for part in text.text.split(","):
+        name = part.strip()
+        lead = at + len(part) - len(part.lstrip())
+        at += len(part) + 1
+        if name and all(piece.isidentifier() for piece in name.split(".")):
+            modules[name] = None
+        else:
+            message = (
+                f"`{name}` is not the name of a module" if name else "a name of a module is missing"
+            )
+            span = text.span(lead, lead + len(name)) if name else word.value_span
+            help = "write names with commas between them, for example `requires=torch,mjx`"
+            diagnostics.append(diagnose("fence-key-value", span, message, help=help))
+    return tuple(modules)
+
+
+def _arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+    if word is None or word.value is None:
+        return ()
+    try:
+        return tuple(shlex.split(word.value))
+    except ValueError as error:
+        message = f"the arguments cannot be split: {str(error).lower()}"
+        diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+        return ()
+
+
+def path_mistake(path: str) -> str:
+    """Why a script cannot have this path; empty where it can."""
+    parts = path.split("/")
+    stem = parts[-1].removesuffix(".py")
+    if any(ord(char) < 32 or ord(char) == 127 for char in path):
+        return "the path of a script must not hold control characters"
+    if "\\" in path:
+        return f"`{path}` has a backslash; folders are separated by `/`"
+    if path.startswith("/") or re.match(r"[A-Za-z]:", path):
+        return f"`{path}` is absolute; the path of a script is relative to the project"
+    if ".." in parts:
+        return f"`{path}` leads out of its folder by `..`"
+    if "" in parts or "." in parts:
+        return f"`{path}` has a part that is empty or `.`"
+    if parts[0] != "examples" or len(parts) < 2:
+        return f"`{path}` is not below `examples/`"
+    if not path.endswith(".py") or not stem:
+        return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
+    if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
+        return f"`{path}` has a character that not every file system takes"
+    if any(len(part.encode()) > 255 for part in parts):
+        return "a part of the path is longer than 255 bytes"
+    if reserved := next((part for part in parts if _DEVICE.fullmatch(part)), None):
+        return f"`{reserved}` is a reserved name on some systems"
+    if stem in _SHADOWED:
+        return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
+    return ""
+
+
+def syntax_mistake(code: Excerpt) -> tuple[Span, str, str] | None:
+    """Where and why a piece of Python does not parse, and a hint; `None` when it does."""
+    mistake = python_mistake(code.text)
+    if mistake is None:
+        return None
+    rows = code.lines()
+    line = min(mistake.line, len(rows))
+    row = rows[line - 1]
+    start = min(mistake.column, len(row.text))
+    if "indent" in mistake.message:  # python may point into the white space before the code
+        start = max(start, len(row.text) - len(row.text.lstrip()))
+    end = mistake.end_column if mistake.end_line == line else len(row.text)
+    indentation = len(row.text) - len(row.text.lstrip())
+    start = max(start, min(indentation, len(row.text)))
+    end = min(max(end, start + 1), len(row.text))
+
+    def lesson_line(found: re.Match[str]) -> str:
+        return f"{found[1]} line {code.line_span(int(found[2])).line}"
+
+    message, _, hint = _ON_LINE.sub(lesson_line, mistake.message).partition(". ")
+    return row.span(start, max(start, end)), _lower(message), _lower(hint)
+
+
+def _lower(sentence: str) -> str:
+    """A sentence of Python's as part of ours."""
+    if sentence[1:2].islower():
+        return sentence[:1].lower() + sentence[1:]
+    return sentence
+
+
+class PythonMistake(NamedTuple):
+    """Where and why a text does not compile."""
+
+    line: int
+    """From 1."""
+    column: int
+    """From 0."""
+    end_line: int
+    end_column: int
+    message: str
+
+
+@functools.lru_cache(maxsize=64)
+def python_mistake(code: str) -> PythonMistake | None:
+    """The first thing that Python has against a text."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(code, "<lesson>", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        line, column = error.lineno or 1, max((error.offset or 1) - 1, 0)
+        end_column = max((error.end_offset or 0) - 1, 0)
+        return PythonMistake(line, column, error.end_lineno or line, end_column, error.msg)
+    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
+        message = f"the code cannot be compiled: {error}"
+        return PythonMistake(1, 0, 1, 0, message if str(error) else "the code is nested too deeply")
+    return None

@@ -1,0 +1,368 @@
+"""Block content: markdown-it's block tokens become `Block` nodes with spans.
+
+Entry points: `TextReader` (one text into blocks), `Texts` (the `TextParser` that quizzes and labs
+get).
+
+1. `prepare` makes the tokens and notes the explicit ids and the footnotes in them, which must be
+   known before the first reference.
+2. `blocks` walks the flat tokens once, a method for each kind of block; containers call back for
+   what they hold.
+3. A paragraph looks at what follows it: `Output:` and the block below it are one `Recording`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from coursebuild.core.model import (
+    Block,
+    BlockQuote,
+    Callout,
+    CodeBlock,
+    Heading,
+    HtmlBlock,
+    HtmlFlow,
+    Inline,
+    Label,
+    ListBlock,
+    ListItem,
+    Math,
+    MathBlock,
+    Paragraph,
+    Recording,
+    Script,
+    Table,
+    ThematicBreak,
+    plain_text,
+)
+from coursebuild.core.syntax.attributes import Braces, read_label
+from coursebuild.core.syntax.block_parser import Definitions
+from coursebuild.core.syntax.callout import Head, read_head, resolve
+from coursebuild.core.syntax.dispatch import fence_block
+from coursebuild.core.syntax.fence import read_fence
+from coursebuild.core.syntax.footnotes import Written
+from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
+from coursebuild.core.syntax.html import Balance, html_flow, tags
+from coursebuild.core.syntax.inlines import InlineReader
+from coursebuild.core.syntax.markdown import block_tokens
+from coursebuild.core.syntax.recording import (
+    is_caption,
+    near_caption,
+    no_body,
+    no_caption,
+    nothing_recorded,
+    record_fence,
+    record_table,
+)
+from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, normalized, trimmed
+from coursebuild.core.syntax.tables import read_table
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.source import Excerpt, Span
+
+
+class TextReader:
+    """Reads one text; `nested` for a text of a quiz or lab."""
+
+    def __init__(
+        self, base: Excerpt, session: ParsingState, definitions: Definitions, *, nested: bool
+    ) -> None:
+        self.base, self.session, self.nested = base, session, nested
+        self.balance = Balance(session.report)
+        self.texts = Texts(session)
+        self.tokens = block_tokens(base, definitions)
+        self.at = 0
+        self.inlines = InlineReader(base, definitions, session, self.balance)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        for i, token in enumerate(self.tokens):
+            if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
+                name = read_attributes(self._content(token)).value.id
+                if name is not None:
+                    self.session.anchors.reserve(name)
+            elif token.type == "footnote_reference_open":
+                label, at = token.content, token.start + 2
+                label_span = self.base.span(at, at + len(label))
+                read = self._later(i + 1)
+                self.session.notes.write(Written(label, label_span, self._span(token), read))
+
+    def _later(self, at: int) -> Callable[[], tuple[Block, ...]]:
+        """Reads the footnote whose first token has the index `at`."""
+
+        def read() -> tuple[Block, ...]:
+            self.at = at
+            return self._blocks("footnote_reference_close")
+
+        return read
+
+    def read(self) -> tuple[Block, ...]:
+        """The blocks of the text, its footnotes left for later."""
+        blocks = self._blocks(None)
+        self.balance.finish()
+        return blocks
+
+    # -- walking
+
+    def _blocks(self, stop: str | None) -> tuple[Block, ...]:
+        """The blocks up to a closing token, which is passed."""
+        out: list[Block] = []
+        self.balance.enter()
+        while self.at < len(self.tokens):
+            token = self.tokens[self.at]
+            self.at += 1
+            if token.type == stop:
+                break
+            block = _READERS[token.type](self, token)
+            if block is not None:
+                out.append(block)
+        self.balance.leave()
+        return tuple(out)
+
+    def _span(self, token: PositionedToken) -> Span:
+        return self.base.span(token.start, token.end)
+
+    def _content(self, token: PositionedToken) -> Excerpt:
+        """The content of a block, without white space at its ends."""
+        return trimmed(locate(self.base, token.rows))
+
+    # -- leaves
+
+    def _paragraph(self, token: PositionedToken) -> Block:
+        self.at += 2
+        content = self._content(token)
+        children = self.inlines.read(content)
+        span = content.span()
+        if not self.nested and "Output" in content.text[:16] and is_caption(children):
+            recording = self._recording(children, span)
+            if recording is not None:
+                return recording
+        elif not self.nested and self._before_text():
+            self.session.diagnostics += near_caption(children, span)
+        return Paragraph(span, children, token.hidden)
+
+    def _before_text(self) -> bool:
+        """Whether a `text` fence follows."""
+        token = self.tokens[self.at] if self.at < len(self.tokens) else None
+        return token is not None and token.type == "fence" and token.info.split()[:1] == ["text"]
+
+    def _heading(self, token: PositionedToken) -> Heading:
+        self.at += 2
+        span = self._span(token)
+        attributes = read_attributes(self._content(token))
+        self.session.diagnostics += attributes.diagnostics
+        children = self.inlines.read(attributes.value.title, mentions=False)
+        level = int(token.tag[1:])
+        session, above = self.session, None if self.nested else self.session.level
+        session.diagnostics += heading_mistakes(span, level, above, children, lesson=session.lesson)
+        if not self.nested:
+            session.level = level
+        return Heading(
+            span,
+            level,
+            children,
+            *self._anchor(attributes.value, children),
+            attributes.value.classes,
+        )
+
+    def _anchor(self, attributes: Attributes, children: tuple[Inline, ...]) -> tuple[str, bool]:
+        anchors = self.session.anchors
+        if attributes.id is not None and attributes.id_span is not None:
+            anchors.take(attributes.id, attributes.id_span)
+            return attributes.id, True
+        return anchors.make(plain_text(children)), False
+
+    def _fence(self, token: PositionedToken) -> Block:
+        fence = read_fence(token, self.base, nested=self.nested)
+        block = fence_block(fence, self.session, self.texts)
+        if isinstance(block, Script) and not block.norun and self._before_text():
+            below = self.tokens[self.at]
+            if below.info.split() == ["text"]:  # its keys are told as what they are
+                self.session.report(no_caption(self._span(below)))
+        return block
+
+    def _code(self, token: PositionedToken) -> CodeBlock:
+        code = locate(self.base, token.rows)
+        return CodeBlock(
+            self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
+        )
+
+    def _html(self, token: PositionedToken) -> HtmlBlock | HtmlFlow:
+        """Raw HTML, kept as it is unless it holds formulas."""
+        html = locate(self.base, token.rows)
+        if self.nested or "$" in html.text:
+            flow = html_flow(trimmed(html, " \t\n"), self.balance)
+            formulas = [child for child in flow.children if isinstance(child, Math)]
+            for formula in formulas:
+                if not formula.tex.text.strip():
+                    wrong = diagnose("math-syntax", formula.span, "the formula is empty")
+                    self.session.report(wrong)
+            if self.nested or formulas:
+                return flow
+        else:
+            for tag in tags(html.text):
+                self.balance.add(tag, html.text, html.span)
+        text = html.text if html.text.endswith("\n") else html.text + "\n"
+        return HtmlBlock(self._span(token), text)
+
+    def _rule(self, token: PositionedToken) -> ThematicBreak:
+        return ThematicBreak(self._span(token))
+
+    def _math(self, token: PositionedToken) -> MathBlock:
+        text = locate(self.base, token.rows)
+        start, end = text.text.index("$$") + 2, len(text.text)
+        if token.info != "unclosed":
+            end = text.text.rindex("$$")
+        tex = trimmed(text.slice(start, end), " \t\n")
+        if token.info == "unclosed":
+            help = "close it with `$$` on a line below, with no empty line before it"
+            wrong = diagnose(
+                "math-unclosed",
+                text.span(start - 2, start),
+                "display math is never closed",
+                help=help,
+            )
+            self.session.report(wrong)
+        elif not tex.text:
+            self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
+        return MathBlock(self._span(token), tex, self._label(text, end + 2))
+
+    def _label(self, text: Excerpt, at: int) -> Label | None:
+        """The label of the formula that ends before an offset."""
+        braces = Braces.of_label(text.text, at, len(text.text))
+        label = read_label(text, braces, self.session.report) if braces is not None else None
+        if label is not None:
+            self.session.anchors.take(label.id, label.span)
+        return label
+
+    # -- containers
+
+    def _quote(self, token: PositionedToken) -> BlockQuote | Callout:
+        span, opened = self._span(token), self.tokens[self.at]
+        head = read_head(self._content(opened)) if opened.type == "paragraph_open" else None
+        if head is None:
+            return BlockQuote(span, self._blocks("blockquote_close"))
+        return self._callout(span, head)
+
+    def _callout(self, span: Span, head: Head) -> Callout:
+        kind = resolve(head, self.session.callouts)
+        self.session.diagnostics += kind.diagnostics
+        title = self.inlines.read(head.title)
+        self.at += 3
+        first: tuple[Block, ...] = ()
+        if head.rest.text:
+            first = (Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
+        blocks = (*first, *self._blocks("blockquote_close"))
+        return Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
+
+    def _list(self, token: PositionedToken) -> ListBlock:
+        ordered = token.type == "ordered_list_open"
+        items: list[ListItem] = []
+        while (item := self.tokens[self.at]).type == "list_item_open":
+            self.at += 1
+            items.append(self._item(item))
+        self.at += 1
+        return ListBlock(
+            self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
+        )
+
+    def _item(self, token: PositionedToken) -> ListItem:
+        blocks = self._blocks("list_item_close")
+        marker = self.base.span(token.start, token.start + len(token.info) + 1)
+        span = marker.to(blocks[-1].span) if blocks else marker
+        return ListItem(span, blocks, token.meta.get("checked"))
+
+    def _table(self, token: PositionedToken) -> Table:
+        table, self.at = self._read_table(self.at - 1)
+        return table
+
+    def _read_table(self, at: int) -> tuple[Table, int]:
+        return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
+
+    def _footnote(self, token: PositionedToken) -> None:
+        """Pass over a footnote: it is read later."""
+        depth = 1
+        while depth:
+            kind = self.tokens[self.at].type
+            depth += (kind == "footnote_reference_open") - (kind == "footnote_reference_close")
+            self.at += 1
+
+    # -- recorded output
+
+    def _recording(self, caption: tuple[Inline, ...], span: Span) -> Recording | None:
+        """The recording whose caption was just read, if what follows is its body."""
+        token = self.tokens[self.at] if self.at < len(self.tokens) else None
+        kind = "" if token is None else token.type
+        if token is not None and kind == "table_open":
+            table, self.at = self._read_table(self.at)
+            return record_table(caption, span, table, self.session)
+        if token is not None and kind == "fence":
+            fence = read_fence(token, self.base, nested=False)
+            recording = record_fence(caption, span, fence, self.session)
+            self.at += recording is not None
+            return recording
+        if token is not None and kind == "code_block":
+            self.session.report(no_body(self._span(token).first_line(), "an indented block"))
+        else:
+            self.session.diagnostics += nothing_recorded(caption, span)
+        return None
+
+
+_READERS: dict[str, Callable[[TextReader, PositionedToken], Block | None]] = {
+    "paragraph_open": TextReader._paragraph,
+    "heading_open": TextReader._heading,
+    "fence": TextReader._fence,
+    "code_block": TextReader._code,
+    "html_block": TextReader._html,
+    "hr": TextReader._rule,
+    "math_block": TextReader._math,
+    "blockquote_open": TextReader._quote,
+    "bullet_list_open": TextReader._list,
+    "ordered_list_open": TextReader._list,
+    "table_open": TextReader._table,
+    "footnote_reference_open": TextReader._footnote,
+}
+
+
+def _is_line(text: str) -> bool:
+    """Whether a text is one line, and no mark of a block stands at its beginning."""
+    return text[:1].isalpha() and "\n" not in text
+
+
+class Texts:
+    """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
+
+    def __init__(self, session: ParsingState) -> None:
+        self._session = session
+
+    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
+        """The blocks of a text; HTML becomes an `HtmlFlow`."""
+        base = normalized(excerpt)
+        if not _is_line(base.text):
+            return self._session.apart(lambda: self._text(base))
+        # A line that can only be a paragraph: nothing else is looked for.
+        content = trimmed(locate(base, [SourceSlice(base.text, 0)]))
+        inlines = self._inlines(base, content)
+        paragraph = Paragraph(content.span(), inlines.value)
+        return Parsed((paragraph,), inlines.diagnostics)
+
+    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        """The inlines of a text that is one paragraph at most."""
+        content = trimmed(normalized(excerpt))
+        return self._inlines(content, content)
+
+    def _text(self, base: Excerpt) -> tuple[Block, ...]:
+        return TextReader(base, self._session, self._definitions(), nested=True).read()
+
+    def _inlines(self, base: Excerpt, content: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        return self._session.apart(lambda: self._marked(base, content))
+
+    def _marked(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
+        balance = Balance(self._session.report)
+        inlines = InlineReader(base, self._definitions(), self._session, balance).read(content)
+        balance.finish()
+        return inlines
+
+    def _definitions(self) -> Definitions:
+        """The document's link definitions; those that a text adds are its own."""
+        return Definitions(dict(self._session.definitions.links))

@@ -1,0 +1,190 @@
+"""How messages call types and the author's values.
+
+Entry points: `FormatWords` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
+`quoted`, `short`.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import assert_never
+
+import msgspec.inspect as inspect
+from msgspec import Struct
+
+from coursebuild.core.syntax.nodes import (
+    ArrayNode,
+    BoolNode,
+    DateNode,
+    ErrorNode,
+    Node,
+    NullNode,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+)
+from coursebuild.core.text.patterns import pattern
+
+_NUMBER = pattern(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+
+
+class FormatWords(Struct, frozen=True):
+    """The nouns of a language for what the other calls an object."""
+
+    object: str
+    objects: str
+
+
+JSON = FormatWords("an object", "objects")
+TOML = FormatWords("a table", "tables")
+
+
+_SIMPLE = {
+    "string": ("a string", "strings"),
+    "integer": ("an integer", "integers"),
+    "number": ("a number", "numbers"),
+    "bool": ("`true` or `false`", "`true` or `false`"),
+    "object": ("an object", "objects"),
+}
+
+
+def _single(type: inspect.Type) -> list[inspect.Type]:
+    """The types of a union, without remarks and `null`: that a field can be left out is clear."""
+    while isinstance(type, inspect.Metadata):
+        type = type.type
+    if not isinstance(type, inspect.UnionType):
+        return [type]
+    types = [one for inner in type.types for one in _single(inner)]
+    structs = [one for one in types if isinstance(one, inspect.StructType)]
+    return [
+        one for one in types if not isinstance(one, inspect.NoneType) and one not in structs[1:]
+    ]
+
+
+def _kind(type: inspect.Type) -> str:
+    """What a type is called that is neither a union nor `null`."""
+    match type:
+        case inspect.StrType() | inspect.LiteralType():
+            return "string"
+        case inspect.IntType():
+            return "integer"
+        case inspect.FloatType():
+            return "number"
+        case inspect.BoolType():
+            return "bool"
+        case inspect.DictType() | inspect.StructType():
+            return "object"
+        case inspect.VarTupleType() | inspect.TupleType():
+            return "array"
+        case _:
+            raise TypeError(f"no value of a lesson is of {type}")
+
+
+def _in_words(type: inspect.Type) -> tuple[str, str]:
+    """What a field takes: one of it, and several."""
+    ones, many = [], []
+    for single in _single(type):
+        if isinstance(single, inspect.VarTupleType):
+            items = _in_words(single.item_type)[1]
+            words = (f"an array of {items}", f"arrays of {items}")
+        elif isinstance(single, inspect.TupleType):
+            length = f"of {len(single.item_types)} values"
+            words = (f"an array {length}", f"arrays {length}")
+        else:
+            words = _SIMPLE[_kind(single)]
+        ones.append(words[0])
+        many.append(words[1])
+    return " or ".join(ones), " or ".join(many)
+
+
+_NODES: dict[str, type[Node]] = {
+    "string": StringNode,
+    "integer": NumberNode,
+    "number": NumberNode,
+    "bool": BoolNode,
+    "object": ObjectNode,
+    "array": ArrayNode,
+}
+
+
+def accepts(type: inspect.Type, node: Node) -> bool:
+    """Whether a node is of a type, whatever its value."""
+    if isinstance(type, inspect.Metadata):
+        return accepts(type.type, node)
+    if isinstance(type, inspect.UnionType):
+        return any(accepts(one, node) for one in type.types)
+    if isinstance(type, inspect.NoneType):
+        return isinstance(node, NullNode)
+    kind = _kind(type)
+    if kind == "integer" and isinstance(node, NumberNode) and isinstance(node.value, float):
+        return False
+    return isinstance(node, _NODES[kind])
+
+
+def short(text: str, limit: int = 40) -> str:
+    """A stretch of the author's text that fits into a message."""
+    line = " ".join(text.split())
+    return line if len(line) <= limit else line[: limit - 1] + "…"
+
+
+def named(name: str) -> str:
+    """A field's name in a message; "the quiz" is no field's, and stays as it is."""
+    return name if name.startswith("the ") else f"`{short(name)}`"
+
+
+def quoted(node: Node) -> str:
+    """A value in a message, as the author wrote it."""
+    return f"`{short(node.value if isinstance(node, StringNode) else node.raw)}`"
+
+
+def wrong_type(node: Node, name: str, type: inspect.Type, words: FormatWords) -> str:
+    """The message for a value of a type that its field does not take."""
+    expected = _in_words(type)[0].replace("an object", words.object)
+    expected = expected.replace("objects", words.objects)
+    return f"{named(name)} must be {expected}, not {_found(node, words)}"
+
+
+def _found(node: Node, words: FormatWords) -> str:
+    match node:
+        case ObjectNode():
+            return words.object
+        case ArrayNode():
+            return "an array"
+        case StringNode():
+            return "a string"
+        case NumberNode():
+            return f"the number {short(node.raw)}"
+        case DateNode():
+            return "a date or time"
+        case BoolNode() | NullNode() | ErrorNode():
+            return f"`{short(node.raw)}`"
+        case _:
+            assert_never(node)
+
+
+def type_help(node: Node, type: inspect.Type) -> str:
+    """How to mend a value of the wrong type, where that is clear."""
+    raw = node.raw
+    kinds = {_kind(single) for single in _single(type)}
+    arrays = [one for one in _single(type) if isinstance(one, inspect.VarTupleType)]
+    items = {_kind(single) for array in arrays for single in _single(array.item_type)}
+    if isinstance(node, NullNode):
+        return "leave the field out"
+    if isinstance(node, ObjectNode) and "object" in items and raw.startswith("["):
+        return f"write its header with two brackets: `[{node.mark.text}]`"
+    if len(raw) > 40 or "\n" in raw:
+        return ""
+    if isinstance(node, NumberNode | DateNode | BoolNode):
+        plain = not isinstance(node, BoolNode) or kinds == {"string"}
+        if "string" in kinds and plain:
+            return f'put it between quotes: `"{raw}"`'
+        if "string" in items:
+            return f'put it between brackets and quotes: `["{raw}"]`'
+    if isinstance(node, StringNode):
+        if kinds & {"integer", "number"} and _NUMBER.fullmatch(node.value):
+            return f"write it without quotes: `{node.value}`"
+        if "bool" in kinds and node.value.lower() in ("true", "false"):
+            return f"write it without quotes: `{node.value.lower()}`"
+    if any(accepts(array.item_type, node) for array in arrays):
+        return f"put it between brackets: `[{raw}]`"
+    return ""

@@ -1,0 +1,125 @@
+"""What the author is told: diagnostics, notes, edits, and the `Parsed` values that carry them.
+
+Entry point: `diagnose(rule, span, message, …)`. A rule is a member of the closed catalogue
+`RULES`; its severity comes from there, so that a rule means the same wherever it
+is raised. A message says what is wrong and where, in lower case without a full stop; `help` says
+how to mend it.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+from msgspec import Struct
+
+from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.source import Span
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Severity(enum.Enum):
+    """How bad it is.
+
+    An error keeps the site from being published; a warning can be silenced, with a reason.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+class Note(Struct, frozen=True):
+    """A further remark, and where it points (if anywhere)."""
+
+    message: str
+    span: Span | None = None
+
+
+class Edit(Struct, frozen=True):
+    """Replace what stands in `span` by `text`."""
+
+    span: Span
+    text: str
+
+
+class Diagnostic(Struct, frozen=True):
+    """One mistake or doubt, at one place."""
+
+    rule: str
+    """A name of the catalogue."""
+    span: Span
+    """The smallest stretch of text that is wrong."""
+    message: str
+    label: str = ""
+    """What is written beside the marked text."""
+    help: str = ""
+    """How to mend it."""
+    notes: tuple[Note, ...] = ()
+    edits: tuple[Edit, ...] = ()
+    """What would mend it, where that is certain enough to be offered."""
+
+    @property
+    def severity(self) -> Severity:
+        """The rule's severity."""
+        return Severity(RULES[self.rule].severity)
+
+    @property
+    def order(self) -> tuple[str, int, int, str, str]:
+        """The total order in which diagnostics are shown: file, place, rule, text."""
+        return (self.span.path, self.span.start, self.span.end, self.rule, self.message)
+
+
+def diagnose(
+    rule: str,
+    span: Span,
+    message: str,
+    *,
+    label: str = "",
+    help: str = "",
+    notes: Iterable[Note] = (),
+    edits: Iterable[Edit] = (),
+) -> Diagnostic:
+    """A diagnostic of a rule of the catalogue.
+
+    A rule that is not in it is a programming error (`KeyError`).
+    """
+    if rule not in RULES:
+        raise KeyError(f"no rule {rule!r} in the catalogue")
+    return Diagnostic(rule, span, message, label, help, tuple(notes), tuple(edits))
+
+
+class Parsed(Struct, Generic[T_co], frozen=True):
+    """What a stage made of its input, and what it has to say about it."""
+
+    value: T_co
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+
+def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """The known name that is most like `name`, if any is alike enough; of several the first."""
+    import difflib
+
+    found = difflib.get_close_matches(name, sorted(set(known)), n=1, cutoff=cutoff)
+    return found[0] if found else None
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A help text that proposes the nearest known name, or lists the names when they are few.
+
+    May be empty.
+    """
+    names = sorted(set(known))
+    near = nearest(name, names)
+    if near is not None:
+        return f"did you mean `{near}`?"
+    if names and len(names) <= 12:
+        return "known: " + ", ".join(f"`{n}`" for n in names)
+    return ""
+
+
+def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """In their total order, each once."""
+    unique = {(d.order, d.help): d for d in diagnostics}
+    return tuple(sorted(unique.values(), key=lambda d: d.order))

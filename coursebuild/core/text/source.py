@@ -1,0 +1,224 @@
+"""Text with addresses: where a character of a course file stands.
+
+Entry points: `Source` (a file's path and text), `Span` (a stretch of it), `Excerpt` (text taken out
+of a source, of which every character still knows its place). Everything else keeps offsets; this is
+the only module that counts lines.
+
+1. A `Source` holds the text exactly as decoded from disk: line ends are kept, so offsets serve
+   edits byte for byte.
+2. A `Span` is a half-open range of offsets. Lines and columns are worked out only when a message is
+   made.
+3. An `Excerpt` is what a parser of an inner language reads (a fence's JSON, a quiz's Markdown):
+   prefixes, indentation and escapes are gone from its text, and its pieces say where each part
+   came from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
+from functools import cached_property
+from itertools import accumulate
+
+from msgspec import Struct
+
+from coursebuild.core.text.patterns import pattern
+
+_NEWLINE = pattern(r"\r\n|\r|\n")
+
+
+def text_digest(text: str) -> bytes:
+    """SHA-256 of a text in UTF-8."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).digest()
+
+
+def key_of(*texts: str) -> str:
+    """A name for what is made from these texts: SHA-256, in hexadecimal digits."""
+    return text_digest("\0".join(texts)).hex()
+
+
+class Source(Struct, frozen=True, dict=True):
+    """One text file of a course."""
+
+    path: str
+    """POSIX path relative to the course's root."""
+    text: str
+    """The decoded text, line ends as on disk."""
+
+    def __repr__(self) -> str:
+        return f"Source({self.path!r})"
+
+    @property
+    def digest(self) -> bytes:
+        """SHA-256 of the text."""
+        return text_digest(self.text)
+
+    @cached_property
+    def line_starts(self) -> list[int]:
+        """Offsets at which lines begin; a line ends with LF, CRLF or CR, as in CommonMark."""
+        if "\r" in self.text:
+            return [0, *[m.end() for m in _NEWLINE.finditer(self.text)]]
+        sizes = [len(line) + 1 for line in self.text.split("\n")]
+        return list(accumulate(sizes[:-1], initial=0))
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Line and column of an offset, both from 1; columns count code points."""
+        line = bisect_right(self.line_starts, offset)
+        return line, offset - self.line_starts[line - 1] + 1
+
+    def line_text(self, line: int) -> str:
+        """The text of a line (from 1) without its line end; empty past the last line."""
+        starts = self.line_starts
+        if not 1 <= line <= len(starts):
+            return ""
+        end = starts[line] if line < len(starts) else len(self.text)
+        return self.text[starts[line - 1] : end].rstrip("\r\n")
+
+    def span(self, start: int = 0, end: int | None = None) -> Span:
+        """The span from `start` to `end` (default: the whole text)."""
+        return Span(self, start, len(self.text) if end is None else end)
+
+    def excerpt(self) -> Excerpt:
+        """The whole text with its line ends made LF."""
+        starts = self.line_starts
+        lines = [(self.line_text(i + 1), start) for i, start in enumerate(starts)]
+        return Excerpt.of_lines(self, lines)
+
+
+class Span(Struct, frozen=True):
+    """A half-open range `[start, end)` of offsets into a source."""
+
+    source: Source
+    start: int
+    end: int
+
+    @property
+    def text(self) -> str:
+        """What stands there."""
+        return self.source.text[self.start : self.end]
+
+    @property
+    def path(self) -> str:
+        """The source's path."""
+        return self.source.path
+
+    @property
+    def line(self) -> int:
+        """First line, from 1."""
+        return self.source.position(self.start)[0]
+
+    @property
+    def column(self) -> int:
+        """First column, from 1."""
+        return self.source.position(self.start)[1]
+
+    @property
+    def end_line(self) -> int:
+        """Line of the end."""
+        return self.source.position(self.end)[0]
+
+    @property
+    def end_column(self) -> int:
+        """Column just past the last character."""
+        return self.source.position(self.end)[1]
+
+    def to(self, other: Span) -> Span:
+        """The span from the start of this one to the end of another."""
+        return Span(self.source, self.start, max(self.end, other.end))
+
+    def first_line(self) -> Span:
+        """The part of this span that lies on its first line (for messages about long blocks)."""
+        end = self.start + len(_NEWLINE.split(self.text, maxsplit=1)[0])
+        return Span(self.source, self.start, end)
+
+    def contains(self, other: Span) -> bool:
+        """Whether the other span lies inside this one."""
+        return self.source is other.source and self.start <= other.start and other.end <= self.end
+
+
+def _text_offset(piece: tuple[int, int]) -> int:
+    return piece[0]
+
+
+class Excerpt(Struct, frozen=True):
+    """Text out of a source; its pieces say where each part of the text stands."""
+
+    source: Source
+    text: str
+    pieces: tuple[tuple[int, int], ...]
+    """(offset in the text, offset in the source), growing; the first is at text offset 0."""
+
+    @property
+    def digest(self) -> bytes:
+        """SHA-256 of the text."""
+        return text_digest(self.text)
+
+    @classmethod
+    def of_lines(cls, source: Source, lines: Iterable[tuple[str, int]]) -> Excerpt:
+        """Join lines, each with the source offset of its first character, by LF."""
+        texts: list[str] = []
+        pieces: list[tuple[int, int]] = []
+        at = 0
+        for text, offset in lines:
+            if not pieces or offset - pieces[-1][1] != at - pieces[-1][0]:
+                pieces.append((at, offset))
+            texts.append(text)
+            at += len(text) + 1
+        return cls(source, "\n".join(texts), tuple(pieces) or ((0, 0),))
+
+    @classmethod
+    def of_span(cls, span: Span) -> Excerpt:
+        """A span's own text."""
+        return cls(span.source, span.text, ((0, span.start),))
+
+    def offset(self, at: int) -> int:
+        """Source offset of the character at text offset `at`."""
+        pieces = self.pieces
+        if len(pieces) == 1:
+            text_at, source_at = pieces[0]
+        else:
+            i = bisect_right(pieces, at, key=_text_offset) - 1
+            text_at, source_at = pieces[max(i, 0)]
+        return min(source_at + (at - text_at), len(self.source.text))
+
+    def span(self, start: int = 0, end: int | None = None) -> Span:
+        """The source span that `text[start:end]` came from, with what lies between its pieces."""
+        end = len(self.text) if end is None else end
+        source, pieces = self.source, self.pieces
+        size = len(source.text)
+        if len(pieces) == 1:  # nearly always, and asked for often
+            shift = pieces[0][1] - pieces[0][0]
+            first, last = start + shift, end + shift
+            if first > size or last > size:
+                first, last = min(first, size), min(last, size)
+            return Span(source, first, last if last > first else first)
+        first = self.offset(start)
+        last = self.offset(end - 1) + 1 if end > start else first
+        return Span(self.source, first, max(first, min(last, size)))
+
+    def slice(self, start: int, end: int | None = None) -> Excerpt:
+        """The excerpt `text[start:end]`."""
+        source, text, pieces = self.source, self.text, self.pieces
+        if len(pieces) == 1:
+            at, size = pieces[0][1] + start - pieces[0][0], len(source.text)
+            return Excerpt(source, text[start:end], ((0, at if at < size else size),))
+        end = len(text) if end is None else end
+        first = bisect_right(self.pieces, start, key=_text_offset)
+        last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
+        inner = ((t - start, s) for t, s in self.pieces[first:last])
+        return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)), *inner))
+
+    def lines(self) -> tuple[Excerpt, ...]:
+        """The excerpt's lines, without their line ends."""
+        out: list[Excerpt] = []
+        at = 0
+        for text in self.text.split("\n"):
+            out.append(self.slice(at, at + len(text)))
+            at += len(text) + 1
+        return tuple(out)
+
+    def line_span(self, line: int) -> Span:
+        """The source span of the text's line number `line` (from 1; clamped)."""
+        rows = self.lines()
+        return rows[min(max(line, 1), len(rows)) - 1].span()

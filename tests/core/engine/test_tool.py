@@ -1,0 +1,71 @@
+"""A tool whose code, templates or libraries are others has another name."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.engine import tool
+
+
+def fill(folder: Path) -> Path:
+    (folder / "inner").mkdir(parents=True)
+    for name in ("a.py", "inner/b.html"):
+        (folder / name).write_text("x")
+        os.utime(folder / name, ns=(1, 1))
+    return folder
+
+
+def test_it_does_not_depend_on_the_place(tmp_path: Path) -> None:
+    one, two = fill(tmp_path / "one"), fill(tmp_path / "two")
+    assert tool._digest(str(one)) == tool._digest(str(two))
+    (two / "__pycache__").mkdir()
+    (two / "__pycache__" / "a.pyc").write_text("x")
+    assert tool._digest(str(one)) == tool._digest(str(two))
+
+
+def test_it_depends_on_every_file(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "one")
+    names = {tool._digest(str(folder))}
+    os.utime(folder / "inner" / "b.html", ns=(2, 2))
+    names.add(tool._digest(str(folder)))
+    (folder / "a.py").write_text("xy")
+    os.utime(folder / "a.py", ns=(1, 1))
+    names.add(tool._digest(str(folder)))
+    (folder / "c.py").write_text("")
+    names.add(tool._digest(str(folder)))
+    (folder / "a.py").unlink()
+    names.add(tool._digest(str(folder)))
+    assert len(names) == 5
+
+
+def test_it_depends_on_the_libraries(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = fill(tmp_path / "one")
+    site = tmp_path / "site-packages"
+    (site / "markdown_it_py-4.3.0.dist-info").mkdir(parents=True)
+    (site / "Jinja2-3.1.6.dist-info").mkdir()
+    (site / "other-1.0.dist-info").mkdir()
+    monkeypatch.setattr(sys, "path", [str(tmp_path / "nowhere"), str(site)])
+
+    def name() -> str:
+        tool._libraries.cache_clear()
+        return tool._digest(str(folder))
+
+    try:
+        first = name()
+        (site / "other-1.0.dist-info").rename(site / "other-1.1.dist-info")
+        assert name() == first
+        (site / "Jinja2-3.1.6.dist-info").rename(site / "jinja2-3.1.7.dist-info")
+        second = name()
+        (site / "markdown_it_py-4.3.0.dist-info").rename(site / "markdown_it_py-5.dist-info")
+        assert len({first, second, name()}) == 3
+    finally:
+        tool._libraries.cache_clear()
+
+
+def test_all_libraries_are_found_here() -> None:
+    assert tool._libraries().count("\0") + 1 >= len(tool._LIBRARIES)
+    assert tool.tool_digest() != tool.typesetter_digest()

@@ -1,0 +1,143 @@
+"""One writer at a time, and no lock outlives its holder."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.files.locks import is_abandoned, project_lock
+from support.runners import SOURCE_TREE, wait_until
+
+HOLD = """
+import sys
+from pathlib import Path
+from coursebuild.core.files.locks import project_lock
+with project_lock(Path(sys.argv[1]), lambda said: print(said, flush=True)):
+    print("held", flush=True)
+    sys.stdin.read()
+print("done", flush=True)
+"""
+"""Holds the lock of a course until its input is closed."""
+
+
+def holder(root: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(root)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=SOURCE_TREE,
+    )
+
+
+def line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+def test_free_lock_says_nothing(tmp_path: Path) -> None:
+    with project_lock(tmp_path, pytest.fail):
+        pass
+    with project_lock(tmp_path, pytest.fail):
+        pass
+    assert (tmp_path / ".coursebuild/.gitignore").read_bytes() == b"*\n"
+
+
+@pytest.mark.site
+def test_second_run_says_so_and_waits(tmp_path: Path) -> None:
+    with holder(tmp_path) as first:
+        assert line(first) == "held"
+        with holder(tmp_path) as second:
+            who = f"another coursebuild (process {first.pid})"
+            assert line(second) == f"{who} is at work on this course; waiting for it"
+            assert second.poll() is None
+            first.send_signal(signal.SIGKILL)  # a lock dies with its holder
+            assert line(second) == "held"
+            assert second.communicate()[0] == "done\n"
+
+
+@pytest.mark.site
+def test_lock_file_deleted_while_waiting(tmp_path: Path) -> None:
+    with holder(tmp_path) as first:
+        assert line(first) == "held"
+        with holder(tmp_path) as second:
+            assert "waiting" in line(second)
+            (tmp_path / ".coursebuild/lock").unlink()
+            (tmp_path / ".coursebuild/.gitignore").unlink()
+            (tmp_path / ".coursebuild").rmdir()
+            first.kill()
+            assert line(second) == "held"
+            assert (tmp_path / ".coursebuild/lock").read_text() == f"{second.pid}\n"
+            second.communicate()
+
+
+def test_a_thread_does_not_wait_for_itself(tmp_path: Path) -> None:
+    with project_lock(tmp_path), pytest.raises(RuntimeError), project_lock(tmp_path):
+        pass
+
+
+def test_another_thread_waits(tmp_path: Path) -> None:
+    order: list[str] = []
+
+    def work() -> None:
+        with project_lock(tmp_path, lambda said: order.append("waits")):
+            order.append("second")
+
+    with project_lock(tmp_path):
+        thread = threading.Thread(target=work)
+        thread.start()
+        wait_until(lambda: "waits" in order, "the wait")
+        order.append("first")
+    thread.join()
+    assert order == ["waits", "first", "second"]
+
+
+def test_freed_by_an_exception(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), project_lock(tmp_path):
+        raise KeyboardInterrupt
+    with project_lock(tmp_path, pytest.fail):
+        pass
+
+
+def test_where_nothing_can_be_written_the_work_goes_on(tmp_path: Path) -> None:
+    (tmp_path / ".coursebuild").touch()  # in the way
+    with project_lock(tmp_path, pytest.fail):
+        pass
+
+
+def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(fd: int, how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with project_lock(tmp_path, pytest.fail), project_lock(tmp_path / ".coursebuild", pytest.fail):
+        pass
+    path = tmp_path / "temporary"
+    path.touch()
+    fd = os.open(path, os.O_RDONLY)
+    try:
+        assert not is_abandoned(fd)
+        os.utime(path, (0, 0))
+        assert is_abandoned(fd)
+    finally:
+        os.close(fd)
+
+
+@pytest.mark.site
+def test_children_do_not_inherit_it(tmp_path: Path) -> None:
+    with project_lock(tmp_path):
+        child = subprocess.Popen(
+            [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE
+        )
+    with child:
+        with project_lock(tmp_path, pytest.fail):
+            pass
+        child.communicate()

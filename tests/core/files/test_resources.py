@@ -1,0 +1,102 @@
+"""What comes with the tool, and the versions of what runs the scripts."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.files import resources
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run import versions
+
+
+def test_the_templates_are_there() -> None:
+    assert (resources.templates_dir() / "base.html").is_file()
+
+
+@pytest.mark.parametrize("ask", [resources.assets_dir, resources.templates_dir])
+def test_installed_before_source_tree_before_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ask: object
+) -> None:
+    package = tmp_path / "tree/coursebuild"
+    monkeypatch.setattr(resources, "_PACKAGE", package)
+    monkeypatch.setattr(resources, "_TREE", tmp_path / "tree")
+    assert callable(ask)
+    with pytest.raises(EffectError) as caught:
+        ask()
+    assert "make site" in caught.value.help
+    for name in ("site/dist", "templates", "coursebuild/assets", "coursebuild/templates"):
+        (tmp_path / "tree" / name).mkdir(parents=True)
+        if name == "templates":
+            assert ask().relative_to(tmp_path / "tree").as_posix() in ("site/dist", "templates")
+    assert ask().parent == package
+
+
+def test_everything_is_read_by_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
+    files = {
+        "assets/js/a.js": b"a",
+        "assets/fonts/b.woff2": b"\xff\x00",
+        "templates/page.html": "é\n".encode(),
+        "templates/.page.html.swp": b"\xff",
+    }
+    for path, data in files.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(data)
+    assert resources.bundled_files() == (("fonts/b.woff2", b"\xff\x00"), ("js/a.js", b"a"))
+    assert resources.template_texts() == (("page.html", "é\n"),)
+
+
+def test_the_bundle_is_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
+    for path in ("js/b.js", "js-a/a.js", "stamp.json", "a.css"):
+        (tmp_path / "assets" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "assets" / path).write_bytes(path.encode())
+    bundle = resources.Bundle()
+    assert bundle["js/b.js"] == b"js/b.js"
+    for missing in ("js/c.js", "js", "a.css/b", "none/a.js"):
+        with pytest.raises(KeyError):
+            bundle[missing]
+    # By the names of folders, as paths are sorted.
+    assert tuple(bundle.items()) == resources.bundled_files()
+    assert list(bundle) == ["a.css", "js/b.js", "js-a/a.js"]
+    assert len(bundle) == 3
+
+
+def test_versions() -> None:
+    assert versions.python_version() == ".".join(map(str, sys.version_info[:3]))
+    import mujoco
+
+    assert versions.engine_version() == mujoco.__version__
+
+
+def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(name: str) -> str:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", none)
+    monkeypatch.setattr(sys, "path", ["/nowhere"])
+    with pytest.raises(EffectError, match="MuJoCo is not installed"):
+        versions.engine_version()
+
+
+@pytest.mark.site
+def test_importing_effects_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "from coursebuild.core.run import (examples, mjcf, read, resources, runner, v8,"
+        " versions, write)\n"
+        "versions.engine_version()\n"
+        "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=Path(resources.__file__).parents[3],
+    )
+    assert done.stdout == "[]\n", done.stderr

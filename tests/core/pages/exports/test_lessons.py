@@ -1,0 +1,257 @@
+"""Lessons as Markdown, and as notebooks."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import nbformat
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.pages import SiteOptions
+from coursebuild.core.pages.exports.markdown_copy import markdown_href
+from coursebuild.core.pages.urls import Place
+from support.rendered_course import Make
+
+LESSON = """## Part {#part}
+
+See Lesson 1.1, [there](lesson:1.1#more), [the box](model:box), [the page](page:about) and
+[here](#part). It is `1.5`{out=examples/a.py}.[^n]
+
+```io
+INPUT: a *number*
+PROCESS: none
+OUTPUT: `two`
+```
+
+```python file=examples/a.py args="--n 'a b'"
+print("one")
+print("```")
+```
+
+Output:
+
+```text
+one
+two
+```
+
+> [!derivation]- By hand
+> $$x = 1$$
+>
+> ```python file=examples/in_callout.py
+> print("one")
+> ```
+>
+> Output:
+>
+> ```text
+> one
+> two
+> ```
+
+```mjcf fragment="worldbody" error="bad"
+<body/>
+```
+
+```quiz
+{"id": "q", "title": "Check", "questions": [
+ {"kind": "mcq", "q": "Which?", "options": ["$a$", "b"], "answer": 1, "hints": ["Think."],
+  "feedback": ["no", "yes"], "explain": "So."},
+ {"kind": "numeric", "q": "How many?", "answer": 2, "tol": 0.1, "unit": "kg m^2"},
+ {"kind": "open", "q": "Why?", "reference": "Hence."},
+ {"kind": "output", "q": "What?", "of": "examples/a.py", "line": 2},
+ {"kind": "order", "q": "Sort.", "items": ["a", "b"]}]}
+```
+
+### Never
+
+```python file=examples/never.py norun requires=torch,mjx
+raise SystemExit
+```
+
+[^n]: A note with $y$.
+"""
+OTHER = (
+    '## More {#more}\n\nBack to [it](lesson:0.1#part).\n\n```lab simlab\n{"model": "box"}\n```\n'
+)
+
+
+def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
+    runs = {"examples/never.py": ScriptRun("examples/never.py", Outcome.NORUN, 0, "", "", 0.0)}
+    texts.setdefault("1.1", OTHER)
+    made: dict[str, bytes] = make(text, runs=runs, **texts).site(
+        SiteOptions(subset=lambda job: job.data)
+    )
+    return made
+
+
+@pytest.fixture(scope="module")
+def files(make: Make) -> dict[str, bytes]:
+    return site(make)
+
+
+def cells(data: bytes) -> list[dict[str, Any]]:
+    nbformat.validate(nbformat.reads(data.decode(), as_version=4))
+    found: list[dict[str, Any]] = json.loads(data)["cells"]
+    return found
+
+
+def source(cell: dict[str, Any]) -> str:
+    return "".join(cell["source"])
+
+
+# ------------------------------------------------------------------------------------ Markdown
+
+
+def test_a_lesson_as_markdown(files: dict[str, bytes]) -> None:
+    text = files["lessons/0.1-falling.md"].decode()
+    assert text.startswith(
+        "# 0.1 Falling\n\nA body falls.\n\n"
+        "[Level 0: Start](../levels/0.md) · Complete · 20 minutes\n\n"
+        "After this lesson you can\n\n- Say what falls\n- Measure it\n\n"
+        "## Part\n\nSee [Lesson 1.1](1.1-spinning.md), [there](1.1-spinning.md#more),"
+        " [the box](../models/box.md), [the page](../about.md) and\n[here](#part)."
+        " It is 1.5.[^1]\n\n"
+        "- **Input:** a *number*\n- **Process:** none\n- **Output:** `two`\n\n"
+        "[`examples/a.py`](../examples/a.py):\n\n"
+        '```python\nprint("one")\nprint("```")\n```\n\n'
+        "Run it yourself: `python examples/a.py --n 'a b'`\n\n"
+        "Output:\n\n```text\none\ntwo\n```\n\n*Verified with MuJoCo 3.14.0, Python 3.11.7:"
+    )
+    for piece in (
+        "> **Derivation** By hand\n>\n> $$\n> x = 1\n> $$\n",
+        "MJCF, inside \\<worldbody>:\n\n```xml\n<body/>\n```\n\n*Does not compile",
+        "1. Which?\n\n   - A: $a$\n   - B: b\n\n   **Hint 1:** Think.\n\n   **Answer:** B."
+        "\n\n   So.\n\n"
+        "   - If you chose A: no\n   - If you chose B: yes\n",
+        "2. How many?\n\n   *Give the answer in kg m^2*\n\n   **Answer:** 2 kg m^2 (within 0.1).\n",
+        "3. Why?\n\n   **Answer:** Hence.\n",
+        "   **Answer:**\n\n   ```text\n   two\n   ```\n",
+        "   - b\n   - a\n\n   **Answer:**\n\n   1. a\n   2. b\n",
+        "[^1]: A note with $y$.\n",
+        "- Leads to: [1.1 Spinning \\<fast>](1.1-spinning.md)\n",
+    ):
+        assert piece in text, piece
+
+
+def test_every_page_names_its_markdown(files: dict[str, bytes]) -> None:
+    for path, data in files.items():
+        if path.endswith(".html"):
+            named = re.findall(
+                r'<link rel="alternate" type="text/markdown" href="([^"]*)">', data.decode()
+            )
+            folder = path.rpartition("/")[0]
+            twin = f"{folder}/{named[0]}".lstrip("/") if named else ""
+            assert bool(named) is (path.removesuffix(".html") + ".md" in files), path
+            assert not named or twin in files
+
+
+def test_pages_without_a_document_as_markdown(files: dict[str, bytes]) -> None:
+    home = files["index.md"].decode()
+    assert home.startswith('# Bodies & \\<axes>\n\nA "short" course.\n')
+    assert "(lessons/0.1-falling.md)" in home and "(levels/1.md)" in home
+    model = files["models/box.md"].decode()
+    assert "- Bodies: 1\n" in model and '```xml\n<mujoco model="box">' in model
+    assert "not written yet" in files["lessons/1.2-later.md"].decode()
+
+
+def test_llms_txt_lists_what_is_written(files: dict[str, bytes]) -> None:
+    text = files["llms.txt"].decode()
+    assert text.startswith('# Bodies & \\<axes>\n\n> A "short" course.\n\n')
+    assert (
+        "## Level 0: Start\n\n"
+        "- [0.1 Falling](https://example.org/course/lessons/0.1-falling.md): A body falls.\n"
+        in text
+    )
+    assert "1.2" not in text and "## Optional\n" in text
+
+
+# ----------------------------------------------------------------------------------- notebooks
+
+
+def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
+    made = cells(files["lessons/0.1-falling.ipynb"])
+    scripts = {cell["id"]: cell for cell in made if cell["cell_type"] == "code"}
+    assert list(scripts) == ["setup", "code-a-1", "code-in-callout-1", "code-never-1"]
+    first = scripts["code-a-1"]
+    assert source(first) == ('%%example examples/a.py --n \'a b\'\nprint("one")\nprint("```")')
+    assert first["outputs"] == [
+        {"name": "stdout", "output_type": "stream", "text": ["one\n", "two\n"]}
+    ]
+    assert scripts["code-never-1"]["outputs"] == []
+    assert source(scripts["code-never-1"]).startswith(
+        "%%example --requires=torch,mjx --norun examples/never.py\n"
+    )
+    texts = "\n".join(source(cell) for cell in made if cell["cell_type"] == "markdown")
+    for piece in (
+        "[Lesson 1.1](https://example.org/course/lessons/1.1-spinning.html)",
+        "[here](https://example.org/course/lessons/0.1-falling.html#part)",
+        "It is 1.5.<sup>1</sup>",
+        "(https://example.org/course/examples/in_callout.py) is in a cell below.",
+        "<details>\n   <summary>Answer</summary>\n\n   B.",
+        "## Footnotes\n\n1. A note with $y$.",
+    ):
+        assert piece in texts, piece
+
+
+def test_a_lesson_without_scripts_needs_no_setup(files: dict[str, bytes]) -> None:
+    made = cells(files["lessons/1.1-spinning.ipynb"])
+    assert {cell["cell_type"] for cell in made} == {"markdown"}
+
+
+def test_ids_of_cells_stay_where_others_are_edited(make: Make, files: dict[str, bytes]) -> None:
+    edited = LESSON.replace("### Never", "## New\n\nText.\n\n### Never").replace("a *number*", "b")
+    before = [cell["id"] for cell in cells(files["lessons/0.1-falling.ipynb"])]
+    after = [cell["id"] for cell in cells(site(make, edited)["lessons/0.1-falling.ipynb"])]
+    assert [id for id in after if id != "text-new-1"] == before
+
+
+def test_ids_of_cells_differ_whatever_the_headings(make: Make) -> None:
+    text = "## 重力\n\na\n\n## " + "x" * 200 + "\n\nb\n\n## 重力\n\nc\n\n## !\n\nd\n"
+    ids = [cell["id"] for cell in cells(site(make, text)["lessons/0.1-falling.ipynb"])]
+    assert len(set(ids)) == len(ids) == 5
+
+
+def test_a_course_without_written_lessons_has_no_notebook(make: Make) -> None:
+    made = make("Text.")
+    levels = tuple(
+        replace(level, lessons=tuple(replace(x, document=None) for x in level.lessons))
+        for level in made.course.levels
+    )
+    course = replace(made.course, levels=levels)
+    files = replace(made, course=course).site(SiteOptions(subset=lambda job: job.data))
+    assert not [path for path in files if path.endswith(".ipynb")]
+    assert b"Optional" in files["llms.txt"]
+
+
+def test_numbers_of_formulas_are_written(make: Make) -> None:
+    text = (
+        "## Part {#part}\n\n$$\na = b % so\n$$ {#eq:one}\n\nBy $$c$$ {#eq:two} and [](#eq:two), "
+        "from [](#eq:one).\n"
+    )
+    twin = site(make, text)["lessons/0.1-falling.md"].decode()
+    assert "$$\na = b % so\n\\tag{1}\n$$" in twin
+    assert "[(1)](#eq:one)" in twin
+
+
+@pytest.mark.parametrize(
+    ("href", "expected"),
+    [
+        ("1.2-b.html", "1.2-b.md"),
+        ("../levels/0.html#a%20b", "../levels/0.md#a%20b"),
+        ("%C3%A9.html?q=1", "%C3%A9.md?q=1"),
+        ("../files/a.html", "../files/a.html"),
+        ("../../out.html", "../../out.html"),
+        ("../search/index.html", "../search/index.html"),
+        ("a.htm", "a.htm"),
+        ("#a", "#a"),
+        ("https://e.org/a.html", "https://e.org/a.html"),
+        ("//[.html", "//[.html"),
+    ],
+)
+def test_addresses_lead_to_the_markdown_of_their_page(href: str, expected: str) -> None:
+    assert markdown_href(Place("lessons/1.1-a.html"), href) == expected

@@ -1,0 +1,189 @@
+"""Blocks written as Markdown read as the same blocks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Callout, Document, PlainCode, Target
+from coursebuild.core.pages.exports.markdown import (
+    Same,
+    write_blocks,
+    write_footnotes,
+    write_inlines,
+)
+from coursebuild.core.pages.exports.marks import (
+    _guarded_line,
+    code_span,
+    escaped,
+    fence,
+    guarded,
+    link,
+    picture,
+    quoted,
+)
+from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.plain import PlainContext, plain_html
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+
+ROOT = Path(__file__).parents[4]
+SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
+EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
+DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
+
+
+class Context:
+    """Addresses stay as they are written."""
+
+    def href(self, target: Target) -> str:
+        return PlainContext().href(target)
+
+    def url(self, url: str) -> str:
+        return url
+
+    def reference(self, note: int) -> str:
+        return f"[^{note}]"
+
+    def named(self, target: Target) -> str:
+        return ""
+
+    def number(self, start: int) -> str:
+        return ""
+
+    def own(self, block: OwnBlock) -> str:
+        if isinstance(block, Callout):
+            title = guarded(write_inlines(block.title, self))
+            return quoted("\n\n".join(filter(None, (title, write_blocks(block.blocks, self)))))
+        assert isinstance(block, PlainCode), f"no test has a {type(block).__name__}"
+        return fence("python", block.code.text)
+
+
+def read(markdown: str) -> Document:
+    return parse_document(Source("a.md", markdown), frozenset({"note"}), lesson=False).value
+
+
+def written(markdown: str) -> str:
+    document = read(markdown)
+    blocks = write_blocks(document.blocks, Context())
+    notes = write_footnotes(document.footnotes, Context())
+    return "\n\n".join(filter(None, (blocks, notes))) + "\n"
+
+
+def meaning(markdown: str) -> str:
+    """Its HTML, as far as white space does not count."""
+    return re.sub(r"\s+", " ", plain_html(read(markdown)))
+
+
+def test_the_examples_of_commonmark_mean_the_same() -> None:
+    examples = EXAMPLE.findall(SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t"))
+    assert len(examples) == 652
+    wrong = [
+        f"{number}: {text!r} became {written(text)!r}"
+        for number, (text, _) in enumerate(examples, 1)
+        if (meaning(text) != meaning(written(text))) is not (number in DIFFERENT)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+PIECES = st.sampled_from(
+    "a|b c|*|**|_|`|``|~~|[|]|(|)|<|>|!|\\*|&amp;|&lt;|$x$|# |- |1. |2) |+ |> |\n|\n\n|  |    |---"
+    "|===|[a](b)|[a](<b c> 't')|![a](b)|<b>|</b>|<!-- c -->|é|字|:|<http://a.b>|%|^|\\\n|```\n"
+    "|> [!note] t\n|[^1]|\n\n[^1]: n\n".split("|")
+)
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.lists(PIECES, max_size=10).map("".join))
+def test_any_text_means_the_same(text: str) -> None:
+    assert plainly(text) == plainly(written(text)), written(text)
+
+
+class Elsewhere(Context):
+    """Where links lead elsewhere, and footnotes look otherwise."""
+
+    def href(self, target: Target) -> str:
+        return f"https://elsewhere.example/{super().href(target)}"
+
+    def url(self, url: str) -> str:
+        return f"https://elsewhere.example/{url}"
+
+    def reference(self, note: int) -> str:
+        return f"<sup>{note}</sup>"
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.lists(PIECES, max_size=16).map("".join))
+def test_sharing_blocks_between_contexts_changes_nothing(text: str) -> None:
+    blocks = read(text).blocks
+    same: Same = {}
+    for context in (Context(), Elsewhere(), Context()):
+        assert write_blocks(blocks, context, same) == write_blocks(blocks, context)
+
+
+def plainly(markdown: str) -> str:
+    """Its meaning, but for empty paragraphs and for the word after a fence."""
+    html = re.sub(r' class="language-[^"]*"|<p>\s*</p>', "", meaning(markdown))
+    return re.sub(r"[\s\\]+|<br />", " ", html).strip()
+
+
+@pytest.mark.parametrize(
+    ("markdown", "expected"),
+    [
+        ("# A `b` #\n", "# A `b`\n"),
+        ("C #\n===\n", "# C \\#\n"),
+        ("- a\n- b\n\n* c\n", "- a\n- b\n\n* c\n"),
+        ("3. a\n\n   b\n4. c\n", "3. a\n\n   b\n\n4. c\n"),
+        ("- [x] done\n- [ ] not\n", "- [x] done\n- [ ] not\n"),
+        ("    code\n", "```\ncode\n```\n"),
+        ("````\n```\n````\n", "````\n```\n````\n"),
+        ("a\n***\nb\n", "a\n\n___\n\nb\n"),
+        ("costs \\$5 and `$x`\n", "costs \\$5 and `$x`\n"),
+        ("$$\na\n\\\\ b\n$$\n", "$$\na\n\\\\ b\n$$\n"),
+        ("so $a\n= b$ it\n", "so $a = b$ it\n"),
+        (
+            "| a \\| b | $\\lVert x \\| y$ |\n|:--|--:|\n| `c` | |\n",
+            "| a \\| b | $\\lVert x \\vert{} y$ |\n| :--- | ---: |\n| `c` |  |\n",
+        ),
+        ("a[^x]\n\n[^x]: One.\n\n    Two.\n", "a[^1]\n\n[^1]: One.\n\n    Two.\n"),
+        ("<https://a.example/b>\n", "<https://a.example/b>\n"),
+        ("1986\\. A year\n", "1986\\. A year\n"),
+        ("&lt;b&gt; &amp;amp; \\*\n", "\\<b> \\&amp; \\*\n"),
+    ],
+)
+def test_the_markdown_of_constructs(markdown: str, expected: str) -> None:
+    assert written(markdown) == expected
+
+
+def test_lines_that_would_begin_another_block_are_escaped() -> None:
+    text = "# a\n> b\n- c\n+ d\n1. e\n2) f\n===\n---\n~~~\n```\n* * *\n[^1]: g\n-h\n1986 i\n#j"
+    assert guarded(text) == (
+        "\\# a\n\\> b\n\\- c\n\\+ d\n1\\. e\n2\\) f\n\\===\n\\---\n\\~~~\n\\```\n\\* * *\n[^1]\\: g"
+        "\n-h\n1986 i\n#j"
+    )
+
+
+def test_hostile_titles_stay_text() -> None:
+    hostile = "](javascript:alert(1)) <script>&lt; `x` $y$ | ![a](b)"
+    html = plain_html(read(f"{escaped(hostile)}\n"))
+    assert "<script" not in html and "<a" not in html and "<img" not in html
+    assert link(escaped("a]b"), "x y(1).html") == "[a\\]b](<x%20y(1).html>)"
+    assert picture("a]b\nc", "x>y.png", 'say "q"') == '![a\\]b c](<x%3Ey.png> "say \\"q\\"")'
+
+
+@pytest.mark.parametrize(
+    ("text", "span"), [("a", "`a`"), ("a`b", "``a`b``"), ("`", "`` ` ``"), (" a ", "`  a  `")]
+)
+def test_code_spans_hold_any_code(text: str, span: str) -> None:
+    assert code_span(text) == span
+    assert f"<code>{text}</code>" in plain_html(read(f"{span}\n"))
+
+
+@given(st.characters(categories=["L"]), st.text())
+def test_a_letter_begins_no_block(letter: str, text: str) -> None:
+    line = " ".join(f"{letter}{text}".split("\n"))
+    assert guarded(line) == _guarded_line(line)

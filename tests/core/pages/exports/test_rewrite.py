@@ -1,0 +1,104 @@
+"""The HTML of a lesson in another place: well-formed XML, ids of its own, other links."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+
+from coursebuild.core.pages.exports.epub import xml_id
+from coursebuild.core.pages.exports.rewrite import Rules, rewritten, site_target
+from coursebuild.core.pages.html_tree import parse_html, to_html, to_xml
+from support.hostile_html import PAGES
+
+PAGE = "lessons/1.1-one.html"
+
+
+def picture(path: str) -> str:
+    return f"in-book/{path}" if path.endswith(".png") else ""
+
+
+def link(path: str, anchor: str) -> str:
+    return f"to:{path}#{anchor}" if path.startswith("lessons/") else ""
+
+
+BOOK = Rules(PAGE, link, picture, xml_id)
+WHOLE = Rules(
+    PAGE, link, picture, "1.1--{}".format, lowered=2, closed=frozenset({"answer"}), section="1.1"
+)
+
+
+def xml(html: str) -> str:
+    return to_xml(rewritten(parse_html(html), BOOK))
+
+
+def moved(html: str) -> str:
+    return to_html(rewritten(parse_html(html), WHOLE))
+
+
+@given(PAGES)
+def test_whatever_is_written_becomes_well_formed(html: str) -> None:
+    ElementTree.fromstring(f"<body>{xml(html)}</body>".encode())
+
+
+@given(PAGES)
+def test_nothing_that_runs_is_left(html: str) -> None:
+    made = moved(html).lower()
+    assert "<script" not in made and "onclick" not in made and "<button" not in made
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        ("<h2 id=a>A</h2>", '<h4 id="1.1--a">A</h4>'),
+        ("<h6>A</h6>", "<h6>A</h6>"),
+        ('<a href="#a">b</a>', '<a href="#1.1--a">b</a>'),
+        ('<a href="1.2-two.html#c">b</a>', '<a href="to:lessons/1.2-two.html#c">b</a>'),
+        ('<a href="../files/x.csv">b</a>', "<a>b</a>"),
+        ('<a href="https://e.org/#a">b</a>', '<a href="https://e.org/#a">b</a>'),
+        ("<a href='//['>b</a>", '<a href="//[">b</a>'),
+        ('<p aria-labelledby="a b">', '<p aria-labelledby="1.1--a 1.1--b"></p>'),
+        ('<section aria-label="S">', '<section aria-label="S, 1.1"></section>'),
+        ("<details><p>s</p></details>", '<details open=""><p>s</p></details>'),
+        ('<details class="answer">', '<details class="answer"></details>'),
+        ('<img src="a.png" alt="x" loading="lazy">', '<img src="in-book/lessons/a.png" alt="x">'),
+        ('<img src="a.avif" alt="&lt;x">', "&lt;x"),
+        ('<img src="https://e.org/a.png" alt="far">', "far"),
+        ('<svg><use href="#a"/><g fill="url(#b)"/></svg>',
+         '<svg><use href="#1.1--a"></use><g fill="url(#1.1--b)"></g></svg>'),
+        ('<b data-x="1" onclick="e()" tabindex="0" style="a">b</b>', "<b>b</b>"),
+        ('<a class="anchor" href="#a">#</a><button>b</button>c', "c"),
+    ],
+)  # fmt: skip
+def test_what_becomes_of_html(html: str, expected: str) -> None:
+    assert moved(html) == expected
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        ('<p id="1 é">a<br>&nbsp;&amp;\x07', '<p id="_1_20__e9_">a<br/>\xa0&amp;\ufffd</p>'),
+        ("<b @x=1 y:z=2 ok=3>b</b>", '<b ok="3">b</b>'),
+        ("<math><mi>x</mi></math>",
+         '<math xmlns="http://www.w3.org/1998/Math/MathML"><mi>x</mi></math>'),
+        ("<b<i>text</b<i>", "text"),
+    ],
+)  # fmt: skip
+def test_what_becomes_of_html_as_xml(html: str, expected: str) -> None:
+    assert xml(html) == expected
+
+
+@pytest.mark.parametrize(
+    ("url", "expected"),
+    [
+        ("../a/", ("a/index.html", "")),
+        ("b%20c.html#%C3%A9", ("lessons/b c.html", "é")),
+        ("../../out.html", (None, "")),
+        ("mailto:a@b", (None, "")),
+        ("http://[", (None, "")),
+        ("?q", (None, "")),
+    ],
+)
+def test_where_addresses_lead(url: str, expected: tuple[str | None, str]) -> None:
+    assert site_target(PAGE, url) == expected

@@ -1,0 +1,140 @@
+"""Which way a language runs, and how text and numbers of it are set."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.quantities import (
+    _SPACES,
+    _UNITS,
+    joined,
+    quantities,
+    text_html,
+    unit_length,
+)
+from support.rendered_course import Make
+
+LANGUAGES = {
+    "rtl": "ar ar-EG AR he iw fa fa-IR ur yi ps sd ug dv ckb ks az-Arab uz-Arab-AF en-Hebr pa-PK"
+    " nqo syr ku-IQ",
+    "ltr": "en de pt-BR zh-Hant az pa ku uz ur-Latn ar-Latn ks-Deva sr-Cyrl xx en-x-arab"
+    " de-u-nu-arab tr mt so",
+}
+
+
+@pytest.mark.parametrize("way", LANGUAGES)
+def test_the_direction_of_a_language_is_that_of_its_script(way: str) -> None:
+    assert [code for code in LANGUAGES[way].split() if direction(code) != way] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("a mass of 5 kg falls", "a mass of 5\u00a0kg falls"),
+        ("9.81 m/s² and 3 N·m", "9.81\u00a0m/s² and 3\u00a0N·m"),
+        ("20 % of 3 ms", "20\u00a0% of 3\u00a0ms"),
+        ("3 minutes, 5 metres, 2 of them", "3 minutes, 5 metres, 2 of them"),
+        ("see 4.2 and 4.3", "see 4.2 and 4.3"),
+        ("30 °C, 2 kΩ, 4 µm, 4 μm", "30\u00a0°C, 2\u00a0kΩ, 4\u00a0µm, 4\u00a0μm"),
+        ("in 2 steps a 5 kg\nbox", "in 2 steps a 5\u00a0kg\nbox"),
+        ("3 kg m² of 4 N m s/rad", "3\u00a0kg\u00a0m² of 4\u00a0N\u00a0m\u00a0s/rad"),
+        ("5 kg mass, 2 m in 3 s more", "5\u00a0kg mass, 2\u00a0m in 3\u00a0s more"),
+    ],
+)
+def test_numbers_keep_their_units(text: str, found: str) -> None:
+    assert joined(text) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("التسارع -9.81 m/s² هنا", ["-9.81 m/s²"]),
+        ("من −3 إلى +4.5", ["−3", "+4.5"]),
+        ("القيمة +3.2×10^-4 فقط", ["+3.2×10^-4"]),
+        ("الكتلة 2 kg، ثم 3", ["2 kg"]),
+        ("MuJoCo 3.14 و MuJoCo 3 kg", []),
+        ("2024-11-20", []),
+    ],
+)
+def test_quantities_in_text_from_the_right(text: str, kept: list[str]) -> None:
+    pieces = list(quantities(text))
+    assert [piece for piece, is_kept in pieces if is_kept] == kept
+    assert "".join(piece for piece, _ in pieces) == text
+
+
+@given(st.text(alphabet="0123456789.,-+−×^ kgms²/°%بة\u00a0<&"))
+def test_finding_quantities_loses_no_character(text: str) -> None:
+    assert "".join(piece for piece, _ in quantities(text)) == text
+    assert joined(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
+    assert 0 <= unit_length(text) <= len(text)
+
+    class Read(HTMLParser):
+        text = ""
+
+        def handle_data(self, data: str) -> None:
+            self.text += data
+
+    for way in ("ltr", "rtl"):
+        read = Read()
+        read.feed(str(text_html(text, way)))  # type: ignore[arg-type]
+        read.close()
+        assert read.text == joined(text)
+
+
+MAP = """
+[course]
+title = "A"
+language = "{}"
+
+[[level]]
+id = "0"
+title = "B"
+
+[[level.lesson]]
+id = "0.1"
+slug = "c"
+title = "C"
+status = "complete"
+summary = "-3 m"
+"""
+
+
+def test_pages_say_their_direction_only_where_it_is_not_the_usual(make: Make) -> None:
+    sites = {code: make("Text.", course=MAP.format(code)).site() for code in ("en", "he")}
+    page = {code: site["lessons/0.1-c.html"].decode() for code, site in sites.items()}
+    assert '<html lang="he" dir="rtl" ' in page["he"]
+    assert '<html lang="en" data-' in page["en"]
+    assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page["he"]
+    assert '<p class="lead">-3\u00a0m</p>' in page["en"]
+
+
+def test_formulas_and_bound_numbers_hold_their_units(make: Make) -> None:
+    text = "It is $x$ kg and $y$ kilos."
+    math = '<math class="inline"><mi>x</mi></math>'
+    assert f"{math}\u00a0kg and " in make(text).html()
+    html = make(text, course=MAP.format("fa")).html()
+    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in html
+    assert html.count("<bdi") == 1
+
+
+MORE = (
+    *" \u00a0\u202f1ms/·*^²hnx_%°B\n.ée",
+    *("2.5", "kg", "^-2", "⁻¹", "px", "min", "mi", "°C", "MiB", "rad", "and"),
+)
+WITH_UNIT = re.compile(rf"(?<=[0-9]) {_UNITS}")
+UNIT_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
+
+
+@given(st.lists(st.sampled_from(MORE), max_size=16).map("".join))
+def test_units_are_found_as_by_one_expression_of_them_all(text: str) -> None:
+    """By two expressions that are right and take long to compile."""
+    unbroken = WITH_UNIT.sub(lambda found: found[0].replace(" ", "\u00a0"), text)
+    assert joined(text) == unbroken
+    found = UNIT_FIRST.match(text)
+    assert unit_length(text) == (found.end() if found is not None else 0)

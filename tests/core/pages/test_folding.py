@@ -1,0 +1,119 @@
+"""Which parts of a long script are folded."""
+
+from __future__ import annotations
+
+import itertools
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.pages.folding import HEAD, LONG, Part, fold
+
+
+def function(name: str, lines: int) -> str:
+    return f"def {name}():\n" + "    x = 1\n" * (lines - 1)
+
+
+HEADER = '"""Title.\n\nText\n"""\n\nimport math\nfrom a import b\n\n'
+GUARD = 'if __name__ == "__main__":\n    one()\n'
+
+
+def test_a_short_script_is_shown_whole() -> None:
+    code = HEADER + function("one", LONG - 8)
+    assert fold(code) == (Part(1, LONG, folded=False),)
+
+
+def test_head_and_rest_are_folded_and_the_guard_stays() -> None:
+    code = HEADER + "G: float = 9.81\n\n" + function("one", 40) + "\n\n" + function("two", 20)
+    code += "Z = 3\n\n\n" + GUARD
+    assert fold(code) == (
+        Part(1, 10, True, docstring=True, imports=True, names=("G",)),
+        Part(11, 50, False),
+        Part(51, 75, True, names=("two", "Z")),
+        Part(76, 77, False),
+    )
+
+
+def test_assignments_are_no_constants_where_something_is_done_at_once() -> None:
+    code = HEADER + "a = 1\nprint(a)\n" * 30
+    assert fold(code)[0] == Part(1, 8, True, docstring=True, imports=True)
+
+
+def test_decorators_and_comments_stay_with_what_they_belong_to() -> None:
+    code = function("one", 44) + "\n# About two.\n# More.\n@cache\n" + function("two", 20)
+    parts = fold(code)
+    assert parts == (Part(1, 44, False), Part(45, 68, True, names=("two",)))
+    assert code.split("\n")[parts[1].first] == "# About two."
+
+
+def test_a_remainder_of_a_few_lines_is_not_folded() -> None:
+    assert fold(function("one", 44) + function("two", 6)) == (Part(1, 50, False),)
+
+
+def test_44_lines_of_the_rest_are_shown_and_no_more() -> None:
+    rest = function("three", 20)
+    fits = function("one", 20) + function("two", 24)
+    assert fold(fits + rest) == (Part(1, 44, False), Part(45, 64, True, names=("three",)))
+    longer = function("one", 20) + function("two", 25)
+    assert fold(longer + rest) == (Part(1, 20, False), Part(21, 65, True, names=("two", "three")))
+
+
+def test_a_remainder_is_folded_from_12_lines_on() -> None:
+    assert fold(function("one", 44) + function("two", 11)) == (Part(1, 55, False),)
+    parts = (Part(1, 44, False), Part(45, 56, True, names=("two",)))
+    assert fold(function("one", 44) + function("two", 12)) == parts
+
+
+def test_a_guard_of_up_to_12_lines_stays() -> None:
+    code = function("one", 44) + function("two", 20) + 'if __name__ == "__main__":\n'
+    guarded = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
+    assert fold(code + "    one()\n" * 11) == guarded
+    assert fold(code + "    one()\n" * 12) == (
+        Part(1, 44, False),
+        Part(45, 77, True, names=("two",)),
+    )
+
+
+def test_a_text_further_down_is_no_docstring() -> None:
+    code = function("one", 44) + '"""A remark."""\n' + function("two", 20)
+    assert fold(code)[1] == Part(45, 65, True, docstring=False, names=("two",))
+
+
+def test_one_long_statement_is_shown() -> None:
+    assert fold(function("one", 300)) == (Part(1, 300, False),)
+
+
+def test_a_script_that_does_not_parse_is_shown_whole() -> None:
+    assert fold("(\n" * 50) == (Part(1, 50, False),)
+    assert fold("") == (Part(1, 1, False),)
+
+
+def test_two_statements_on_a_line_are_not_torn_apart() -> None:
+    assert fold("a = 1; b = 2\n" * 60) == (Part(1, 60, False),)
+
+
+STATEMENTS = st.sampled_from(
+    [
+        "import a\n",
+        "x = 1\n",
+        "\n",
+        "# note\n",
+        function("f", 9),
+        function("g", 30),
+        GUARD,
+        '"""d"""\n',
+    ]
+)
+
+
+@given(st.lists(STATEMENTS, max_size=30))
+def test_parts_follow_each_other_and_cover_the_script(pieces: list[str]) -> None:
+    code = "".join(pieces)
+    parts = fold(code)
+    assert parts[0].first == 1
+    assert parts[-1].last == max(code.count("\n"), 1)
+    for one, next_one in itertools.pairwise(parts):
+        assert next_one.first == one.last + 1
+        assert one.folded or next_one.folded
+    assert any(not part.folded for part in parts)
+    assert all(part.last - part.first + 1 >= HEAD for part in parts if part.folded)

@@ -1,0 +1,157 @@
+"""Fonts cut to what a site uses: right glyphs, the MATH table, the same bytes each time."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from fontTools.ttLib import TTFont
+from msgspec.structs import replace
+
+from coursebuild.core.engine.prepared import prepared_source
+from coursebuild.core.pages import Assets, FontJob, subset_font
+from coursebuild.core.pages.fonts import (
+    CODE,
+    MATH,
+    TEXT,
+    VERSION,
+    characters_in,
+    face_rules,
+    finest_font,
+    font_jobs,
+    italic_letter,
+    read_faces,
+    unicode_range,
+)
+
+FORMULAS = "I=∫Vρ(‖𝐫‖2𝟙−⊤)dω∑√{}[]⟨⟩≥·˙ˆ𝝎mkc∂∇h"
+
+
+def jobs(assets: Assets, text: str, mathematics: str = FORMULAS) -> tuple[FontJob, ...]:
+    """As a build has them: what is cut is the smaller font made ahead, where that is enough."""
+    faces = read_faces(assets.file("fonts/fonts.json"))
+    data = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
+    return tuple(map(prepared, font_jobs(data, text, mathematics)))
+
+
+def prepared(job: FontJob) -> FontJob:
+    return replace(job, data=prepared_source(job.data, job.characters, VERSION) or job.data)
+
+
+def only(found: tuple[FontJob, ...], family: str, style: str = "normal") -> list[FontJob]:
+    return [job for job in found if (job.face.family, job.face.style) == (family, style)]
+
+
+def font_of(job: FontJob) -> TTFont:
+    return TTFont(io.BytesIO(subset_font(job)))
+
+
+@pytest.fixture(scope="module")
+def mathematical(assets: Assets) -> TTFont:
+    (job,) = only(jobs(assets, ""), MATH)
+    assert len(subset_font(job)) < 80_000
+    return font_of(job)
+
+
+def test_a_text_font_has_what_the_pages_use_and_its_axes(assets: Assets) -> None:
+    (latin,) = only(jobs(assets, "ordinary text"), TEXT)
+    font = font_of(latin)
+    assert set("The quick brown fox, 1–2 “x” …") <= set(map(chr, font.getBestCmap()))
+    axes = {axis.axisTag: (axis.minValue, axis.maxValue) for axis in font["fvar"].axes}
+    assert axes["wght"] == (400, 700)
+    assert axes["opsz"][0] < 10 < 40 < axes["opsz"][1]
+    assert len(subset_font(latin)) < 75_000
+
+
+def test_other_scripts_come_only_where_they_are_used(assets: Assets) -> None:
+    plain = jobs(assets, "ordinary")
+    mixed = jobs(assets, "Łódź, привет")
+    assert {job.face.subset for job in only(plain, TEXT)} == {"latin"}
+    assert {job.face.subset for job in only(mixed, TEXT)} == {"latin", "latin-ext", "cyrillic"}
+    cyrillic = next(job for job in only(mixed, TEXT) if job.face.subset == "cyrillic")
+    assert cyrillic.characters == "веипрт"
+
+
+def test_no_character_is_in_two_files_of_a_face(assets: Assets) -> None:
+    for style in ("normal", "italic"):
+        given = [c for job in only(jobs(assets, "†łα → x̄"), TEXT, style) for c in job.characters]
+        assert len(given) == len(set(given))
+
+
+def test_the_math_font_keeps_its_table_variants_and_italics(mathematical: TTFont) -> None:
+    font = mathematical
+    cmap = font.getBestCmap()
+    wanted = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝜕", "𝛻"}
+    assert {c for c in wanted if ord(c) not in cmap} == set()
+    table = font["MATH"].table
+    assert table.MathConstants.AxisHeight.Value > 0
+    variants = table.MathVariants
+    stretchy = dict(
+        zip(variants.VertGlyphCoverage.glyphs, variants.VertGlyphConstruction, strict=True)
+    )
+    assembly = stretchy[cmap[ord("(")]].GlyphAssembly
+    assert len(assembly.PartRecords) >= 3
+    assert stretchy[cmap[ord("∫")]].VariantCount >= 2
+    assert {part.glyph for part in assembly.PartRecords} <= set(font.getGlyphOrder())
+
+
+def test_no_radical_is_much_wider_than_the_smallest(mathematical: TTFont) -> None:
+    """A browser leaves room for the widest behind each root."""
+    font = mathematical
+    radical = font.getBestCmap()[ord("√")]
+    variants = font["MATH"].table.MathVariants
+    drawn = variants.VertGlyphConstruction[variants.VertGlyphCoverage.glyphs.index(radical)]
+    names = {each.VariantGlyph for each in drawn.MathGlyphVariantRecord}
+    names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    assert len(names) >= 5
+    for name in names:
+        advance, bearing = font["hmtx"][name]
+        assert advance <= 1.07 * font["hmtx"][radical][0] + 1
+        assert bearing == font["glyf"][name].xMin
+        assert font["glyf"][name].xMax >= 0.7 * advance, "it meets the line"
+
+
+@pytest.mark.site
+def test_even_every_math_letter_stays_far_below_the_whole_font(assets: Assets) -> None:
+    letters = "".join(map(chr, [*range(0x1D400, 0x1D7FF), *range(0x2200, 0x2300)]))
+    (job,) = only(jobs(assets, "", letters), MATH)
+    assert len(subset_font(job)) < 200_000 < len(job.data)
+
+
+def test_a_site_without_formulas_has_no_math_font(assets: Assets) -> None:
+    assert only(jobs(assets, "text", ""), MATH) == []
+    assert len(only(jobs(assets, "text", ""), CODE)) == 1
+
+
+def test_the_same_job_gives_the_same_bytes_and_key(assets: Assets) -> None:
+    one, two = jobs(assets, "text"), jobs(assets, "text")
+    assert [job.key for job in one] == [job.key for job in two]
+    small, again = (only(jobs(assets, "привет"), CODE)[1] for _ in range(2))
+    assert small.face.subset == "cyrillic"
+    assert finest_font(small) == finest_font(again), "`subset_font` would have kept the first"
+    assert {job.key for job in one}.isdisjoint(
+        job.key for job in jobs(assets, "text é ñ", FORMULAS + "ℵ") if job.face.subset == "latin"
+    )
+
+
+@pytest.mark.parametrize(
+    ("css", "text"),
+    [("U+61-63, U+65", "abce"), ("u+0041", "A"), ("U+003?", "0123456789:;<=>?"), ("U+1F600", "😀")],
+)
+def test_characters_of_a_unicode_range(css: str, text: str) -> None:
+    assert characters_in(css) == set(text)
+    assert characters_in(unicode_range("".join(sorted(text)))) == set(text)
+
+
+def test_unicode_range_joins_characters_that_follow_each_other() -> None:
+    assert unicode_range("abce") == "U+61-63, U+65"
+
+
+def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:
+    found = jobs(assets, "text")
+    css = face_rules((job, f"fonts/{job.face.file}") for job in found)
+    assert css.count("@font-face") == len(found) + 3
+    assert 'font-family:"Source Serif 4 Variable fallback";font-style:normal;src:local(' in css
+    assert "size-adjust:111." in css
+    assert 'font-family:"STIX Two Math";font-style:normal;font-weight:400;' in css
+    assert css.count("font-display:swap") == len(found)

@@ -1,0 +1,82 @@
+"""Highlighted code: few classes, whole lines, no character that HTML forbids."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.highlight import highlight_lines
+
+
+def highlight(language: str, code: str) -> str:
+    return "\n".join(highlight_lines(language, code))
+
+
+def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
+    code = 'def spin(rate: float) -> str:\n    return f"{rate:.3f} rad/s"  # <slow>\n'
+    assert highlight("python", code) == (
+        '<span class="k">def</span> <span class="f">spin</span>(rate: float) -&gt; str:\n'
+        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>rate'
+        '<span class="i">:</span><span class="s">.3f</span><span class="i">}</span>'
+        ' <span class="s">rad/s"</span>  <span class="c"># &lt;slow&gt;</span>\n'
+    )
+
+
+def test_an_element_never_reaches_over_a_line_end() -> None:
+    lines = highlight_lines("python", '"""One\n\ntwo"""\nx = 1')
+    assert lines == (
+        Markup('<span class="d">"""One</span>'),
+        Markup(""),
+        Markup('<span class="d">two"""</span>'),
+        Markup('x = <span class="n">1</span>'),
+    )
+
+
+@pytest.mark.parametrize("language", ["", "no such language", "text", "jsön", "../x", "<b>"])
+def test_unknown_languages_are_plain_escaped_text(language: str) -> None:
+    assert highlight(language, "a < b & c\n") == "a &lt; b &amp; c\n"
+
+
+def test_models_are_xml() -> None:
+    assert highlight("mjcf", '<geom size="1"/>') == highlight("xml", '<geom size="1"/>')
+    assert '<span class="t">&lt;geom</span>' in highlight("mjcf", '<geom size="1"/>')
+
+
+def test_forbidden_characters_are_shown_as_symbols() -> None:
+    shown = "\u241b[31mred\u241b[0m\u2400\u240d\u2421\ufffd\ufffd\ufffd\t\n"
+    assert visible("\x1b[31mred\x1b[0m\0\r\x7f\x85\ufffe\U0010ffff\t\n") == shown
+
+
+@given(st.text())
+def test_visible_text_has_nothing_that_html_forbids(text: str) -> None:
+    for character in visible(text):
+        code = ord(character)
+        assert code in (9, 10) or code >= 0x20
+        assert not 0x7F <= code < 0xA0
+        assert code & 0xFFFE != 0xFFFE
+        assert not 0xFDD0 <= code <= 0xFDEF
+
+
+@given(st.sampled_from("python xml json bash text c++ diff console pycon".split()), st.text())
+def test_highlighting_keeps_every_character(language: str, text: str) -> None:
+    lines = [re.sub(r"</?span[^>]*>", "", line) for line in highlight_lines(language, text)]
+    assert unescape("\n".join(lines)) == visible(text)
+    assert all(line.count("<span") == line.count("</span>") for line in lines)
+
+
+def test_no_language_loses_the_end_of_a_text() -> None:
+    """Some lexers see lines that end only, which the last line of a block does not."""
+    text = "$ run it\nerror: x\n    = help: `y` <z>"
+    for language in ("console", "pycon", "pytb", "bash", "sh", "doscon", "ps1con", "irc", "diff"):
+        for code in (text, f"{text}\n", ">>> 1\n1", " x ", "a\n\n", "\r\n x"):
+            assert plain(highlight(language, code)) == code.replace("\r", "\u240d"), language
+
+
+def plain(html: str) -> str:
+    return unescape(re.sub(r"<[^>]*>", "", html))

@@ -1,0 +1,125 @@
+"""Layouts of graphs in layers."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.drawing.layered import Edge, Layout, layered, reduced
+
+Graph = tuple[list[str], list[Edge]]
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> Graph:
+    """Any graph without cycles; its nodes are given in any order."""
+    nodes = [f"n{i}" for i in range(draw(st.integers(1, 14)))]
+    pairs = list(combinations(nodes, 2))
+    edges = draw(st.lists(st.sampled_from(pairs), max_size=30, unique=True)) if pairs else []
+    return draw(st.permutations(nodes)), edges
+
+
+def laid_out(nodes: list[str], edges: list[Edge], width: float = 40.0, gap: float = 8.0) -> Layout:
+    return layered(nodes, edges, width, gap, 10.0)
+
+
+def reach(nodes: list[str], edges: list[Edge] | tuple[Edge, ...]) -> set[Edge]:
+    """All pairs of which the second can be come to from the first."""
+    found = set(edges)
+    while more := {(a, d) for a, b in found for c, d in found if b == c} - found:
+        found |= more
+    return found
+
+
+def crossings(layout: Layout) -> int:
+    layer = {node.id: node.layer for node in layout.nodes}
+    steps = [
+        (layer[edge.start] + level, x, y)
+        for edge in layout.edges
+        for level, (x, y) in enumerate(pairwise(edge.xs))
+    ]
+    return sum(
+        one[0] == two[0] and (one[1] - two[1]) * (one[2] - two[2]) < 0
+        for one, two in combinations(steps, 2)
+    )
+
+
+@settings(max_examples=50)
+@given(graphs())
+def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
+    layout = laid_out(*graph)
+    nodes = {node.id: node for node in layout.nodes}
+    assert list(nodes) == graph[0]
+    assert [(edge.start, edge.end) for edge in layout.edges] == graph[1]
+    for edge in layout.edges:
+        start, end = nodes[edge.start], nodes[edge.end]
+        assert start.layer < end.layer
+        assert len(edge.xs) == end.layer - start.layer + 1
+        assert (edge.xs[0], edge.xs[-1]) == (start.x, end.x)
+
+
+@settings(max_examples=50)
+@given(graphs(), st.floats(0, 30))
+def test_no_node_overlaps_another_or_sticks_out(graph: Graph, gap: float) -> None:
+    layout = laid_out(*graph, gap=gap)
+    for level in range(layout.layers):
+        row = sorted(node.x for node in layout.nodes if node.layer == level)
+        assert row, "an empty layer"
+        assert all(b - a >= 40 + gap - 1e-6 for a, b in pairwise(row))
+    assert min(node.x for node in layout.nodes) >= 20 - 1e-6
+    assert max(node.x for node in layout.nodes) <= layout.width - 20 + 1e-6
+
+
+@settings(max_examples=50)
+@given(graphs())
+def test_the_same_graph_gives_the_same_layout(graph: Graph) -> None:
+    assert laid_out(*graph) == laid_out(*graph)
+
+
+@settings(max_examples=50)
+@given(graphs())
+def test_a_reduced_graph_leads_as_far_with_no_arrow_too_many(graph: Graph) -> None:
+    nodes, edges = graph
+    kept = reduced(nodes, edges)
+    assert set(kept) <= set(edges)
+    assert reach(nodes, kept) == reach(nodes, edges)
+    for edge in kept:
+        assert edge not in reach(nodes, [other for other in kept if other != edge])
+
+
+def test_arrows_of_unknown_nodes_and_repeated_ones_are_left_out() -> None:
+    assert reduced(["a", "b"], [("a", "b"), ("a", "b"), ("a", "x"), ("x", "b")]) == (("a", "b"),)
+
+
+def test_a_chain_longer_than_the_stack_is_laid_out() -> None:
+    """Python calls functions a thousand deep."""
+    nodes = [str(n) for n in range(1100)]
+    edges = list(pairwise(nodes))
+    assert reduced(nodes, [*edges, ("0", "1099")]) == tuple(edges)
+    assert laid_out(nodes, edges).layers == 1100
+
+
+@given(st.permutations("abcdefg"))
+def test_a_tree_has_no_crossings(order: list[str]) -> None:
+    edges = [("a", "b"), ("a", "c"), ("b", "d"), ("b", "e"), ("c", "f"), ("c", "g")]
+    assert crossings(laid_out(order, edges)) == 0
+
+
+def test_a_chain_is_straight_and_a_fork_is_even() -> None:
+    chain = laid_out(["a", "b", "c"], [("a", "b"), ("b", "c")])
+    assert {node.x for node in chain.nodes} == {20.0}
+    fork = laid_out(["a", "b", "c"], [("a", "b"), ("a", "c")])
+    a, b, c = (node.x for node in fork.nodes)
+    assert abs(a - (b + c) / 2) < 1e-6
+
+
+def test_what_comes_from_nothing_stands_next_to_what_it_leads_to() -> None:
+    layout = laid_out(["a", "b", "c", "late"], [("a", "b"), ("b", "c"), ("late", "c")])
+    assert {node.id: node.layer for node in layout.nodes} == {"a": 0, "b": 1, "c": 2, "late": 1}
+
+
+def test_the_layout_of_no_node_and_of_one() -> None:
+    assert laid_out([], []) == Layout((), (), 0.0, 0)
+    assert laid_out(["a"], []).width == 40

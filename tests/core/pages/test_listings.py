@@ -1,0 +1,151 @@
+"""Anchors of lines and outputs, and how they are checked."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+import segno
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages.links import check_links, has, without_lines
+from coursebuild.core.pages.listings import numbered
+from coursebuild.core.pages.qr import qr_svg
+from support.rendered_course import Make
+
+
+def test_anchors_are_named_after_the_file() -> None:
+    assert listing_anchor("examples/a.py") == "a.py"
+    assert line_anchor("examples/sub/a.py", 12) == "sub/a.L12"
+    assert line_anchor("models/box.xml", 1) == "box.L1"
+    assert output_anchor("examples/a.b.py", 1) == "a.b.out"
+    assert output_anchor("examples/a.py", 2) == "a.out-2"
+    assert listing_anchor("examples/a b.py") == "a␣b.py", "an id has no space"
+
+
+@pytest.mark.parametrize(
+    ("anchor", "lines"),
+    [
+        ("a.L1", ("a", 1, 1)),
+        ("sub/a.b.L3-L20", ("sub/a.b", 3, 20)),
+        ("a.L5-L4", None),
+        ("a.L0", None),
+        ("a.L01", None),
+        ("a.L1-2", None),
+        (".L1", None),
+        ("heading", None),
+        ("a.L9999999999", None),
+    ],
+)
+def test_the_lines_that_an_anchor_names(anchor: str, lines: tuple[str, int, int] | None) -> None:
+    assert linked_lines(anchor) == lines
+
+
+def test_lines_are_elements_and_their_numbers_are_no_text() -> None:
+    lines = [Markup("a"), Markup('<span class="k">if</span>'), Markup("")]
+    html = numbered(lines, "examples/<x>.py", 9)
+    assert html == (
+        '<span id="&lt;x&gt;.L9">a</span>\n'
+        '<span id="&lt;x&gt;.L10"><span class="k">if</span></span>\n'
+        '<span id="&lt;x&gt;.L11"></span>'
+    )
+
+
+SCRIPT = "```python file=examples/a.py\nprint(1)\nprint(2)\n```\n"
+OUTPUT = "\nOutput:\n\n```text\n1\n2\n```\n"
+
+
+def test_every_output_has_an_anchor_of_its_own(make: Make) -> None:
+    html = make(
+        f"{SCRIPT}{OUTPUT}{OUTPUT}\n> Words.\n>\n> Output:\n>\n> ```text\n> 1\n> 2\n> ```\n"
+    ).html()
+    assert re.findall(r'<div class="output" id="([^"]*)"', html) == ["a.out", "a.out-2", "a.out-3"]
+    assert re.findall(r' id="(a\.L\d+)"', html) == ["a.L1", "a.L2"]
+    assert html.count(' id="a.py"') == 1
+
+
+def test_lines_of_a_model_can_be_linked_to(make: Make) -> None:
+    page = make("Text.").site()["models/box.html"].decode()
+    assert re.findall(r' id="(box[^"]*)"', page) == ["box.xml", "box.L1", "box.L2", "box.L3"]
+
+
+PAGE = '<p id="h"></p><span id="a.L1"></span><span id="a.L2"></span><a href="{}">x</a>'
+
+
+@pytest.mark.parametrize(
+    ("url", "fine"),
+    [
+        ("#a.L2", True),
+        ("#a.L1-L2", True),
+        ("#a.L3", False),
+        ("#a.L2-L3", False),
+        ("#b.L1", False),
+        ("#h", True),
+    ],
+)
+def test_links_to_lines_are_checked(url: str, fine: bool) -> None:
+    file = OutputFile("index.html", PAGE.format(url).encode())
+    assert (check_links([file]) == ()) is fine
+
+
+@given(st.lists(st.sampled_from("h a.L1 a.L2 a.L9 b.c.L4 a.out x.L".split())))
+def test_of_lines_only_the_last_need_be_known(ids: list[str]) -> None:
+    short = without_lines(ids)
+    assert len([name for name in short if linked_lines(name)]) <= 2
+    assert all(has(short, name) for name in ids)
+    assert not has(short, "a.L10")
+
+
+# ------------------------------------------------------------------------------------ paper
+
+
+@pytest.mark.parametrize(
+    "text", ["x", "https://example.org/c/lessons/4.2-a.html#4.2-lab-1", "é" * 90]
+)
+def test_the_picture_of_a_code_is_the_code(text: str) -> None:
+    svg = qr_svg(text, 'a "label"')
+    assert 'aria-label="a &#34;label&#34;"' in svg
+    code = segno.make_qr(text, error="m")
+    drawn = set()
+    x = y = 0
+    for command, first, second in re.findall(
+        r"([Mmh])(-?\d+)(?: (\d+)(?:\.5)?)?", svg.split(' d="')[1]
+    ):
+        if command == "M":
+            x, y = int(first), int(second)
+        elif command == "m":
+            x += int(first)
+        else:
+            drawn |= {(x + n, y) for n in range(int(first))}
+            x += int(first)
+    assert drawn == {
+        (x, y) for y, row in enumerate(code.matrix) for x, dark in enumerate(row) if dark
+    }
+    size = len(code.matrix) + 8
+    assert f'viewBox="-4 -4 {size} {size}"' in svg
+
+
+def test_an_address_that_no_code_holds_gets_none() -> None:
+    assert qr_svg("x" * 5000, "label") == ""
+
+
+NAMES = st.lists(
+    st.sampled_from(
+        ("a", ".L", "L", "1", "0", "12", "-L", "\n", ".", "é", "\u2028", "9" * 10, "²")
+    ),
+    max_size=7,
+).map("".join)
+
+
+@given(st.lists(NAMES, max_size=6))
+def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
+    known = {name: linked_lines(name) for name in ids}
+    last: dict[str, int] = {}
+    for lines in filter(None, known.values()):
+        last[lines[0]] = max(last.get(lines[0], 0), lines[2])
+    others = {name for name, lines in known.items() if lines is None}
+    assert without_lines(ids) == others | {f"{stem}.L{line}" for stem, line in last.items()}

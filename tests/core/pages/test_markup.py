@@ -1,0 +1,198 @@
+"""Blocks and inlines into HTML: what CommonMark's own examples do not show."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.core.model import Document, NumberBinding, Target, Text
+from coursebuild.core.pages.look import Look, OwnBlock, Words
+from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
+from coursebuild.core.pages.plain import PlainContext, plain_html
+from coursebuild.core.pages.quantities import in_order, joined, quantities
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source, Span
+
+KINDS = frozenset({"note"})
+
+
+def parsed(text: str) -> Document:
+    return parse_document(Source("x.md", text), KINDS, lesson=False).value
+
+
+class Page(PlainContext):
+    """A context that shows what it was asked."""
+
+    def href(self, target: Target) -> str:
+        return f"/{type(target).__name__}?a&b"
+
+    def url(self, url: str) -> str:
+        return f"/files/{url}"
+
+    def math(self, tex: str) -> Markup:
+        return Markup("<math>{}</math>").format(tex)
+
+    def display(self, tex: str, start: int) -> Markup:
+        return Markup("<math display>{}</math>").format(tex)
+
+    def reference(self, target: Target) -> str:
+        return "<ref>"
+
+    def code(self, language: str, text: str) -> Markup:
+        return Markup("<x-code lang='{}'>{}</x-code>\n").format(language, text)
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        return Markup("<x-number>{}</x-number>").format(binding.text)
+
+    def block(self, block: OwnBlock) -> Markup:
+        return Markup("<x-{}>\n").format(type(block).__name__.lower())
+
+
+def html(text: str, look: Look | None = None) -> str:
+    return str(render_blocks(parsed(text).blocks, Page(), look or Look()))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            '## A "b" & *c* {#x .wide}',
+            '<h2 id="x" class="wide">A &quot;b&quot; &amp; <em>c</em> '
+            '<a class="anchor" href="#x" aria-label="Link to this section">#</a></h2>\n',
+        ),
+        (
+            "## Übung",
+            '<h2 id="übung">Übung <a class="anchor" href="#%C3%BCbung" '
+            'aria-label="Link to this section">#</a></h2>\n',
+        ),
+        ("a $x<y$ and $$z$$", "<p>a <math>x&lt;y</math> and <math display>z</math></p>\n"),
+        ("$$\na & b\n$$", "<math display>a &amp; b</math>\n"),
+        ("[a](lesson:1.1 't\"')", '<p><a href="/LessonTarget?a&amp;b" title="t&quot;">a</a></p>\n'),
+        ("Level 3", '<p><a href="/LevelTarget?a&amp;b">Level 3</a></p>\n'),
+        (
+            "![a \"b\"](c.png 'd')",
+            '<p><img src="/files/c.png" alt="a &quot;b&quot;" title="d"></p>\n',
+        ),
+        ("`<1>`{out}", "<p><x-number>&lt;1&gt;</x-number></p>\n"),
+        ("~~a~~", "<p><del>a</del></p>\n"),
+        ("```c\n<\n```", "<x-code lang='c'>&lt;\n</x-code>\n"),
+        ("> [!note] A\n> b", "<x-callout>\n"),
+        ("a  \nb\n\n***", "<p>a<br>\nb</p>\n<hr>\n"),
+        ("<b>&amp;</b>\n", "<p><b>&amp;</b></p>\n"),
+        ("- a\n  - b\n- c", "<ul>\n<li>a\n<ul>\n<li>b</li>\n</ul>\n</li>\n<li>c</li>\n</ul>\n"),
+    ],
+)
+def test_the_html_of_blocks_and_inlines(text: str, expected: str) -> None:
+    assert html(text) == expected
+
+
+def test_a_table_is_framed_and_aligned() -> None:
+    assert html("| a | b | c |\n| - | -: | :-: |\n| *1* | 2 |\n") == (
+        '<div class="table" role="group" aria-label="Table" tabindex="0">\n'
+        '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n'
+        '<th scope="col" class="align-right">b</th>\n'
+        '<th scope="col" class="align-center">c</th>\n</tr>\n</thead>\n<tbody>\n<tr>\n'
+        '<td><em>1</em></td>\n<td class="align-right">2</td>\n<td class="align-center"></td>\n'
+        "</tr>\n</tbody>\n</table>\n</div>\n"
+    )
+
+
+def test_a_table_without_rows_and_frame() -> None:
+    text = html("| a |\n| - |\n", Look(frames=False))
+    assert text == '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n</tr>\n</thead>\n</table>\n'
+
+
+def test_a_task_list_has_labelled_boxes() -> None:
+    assert html("- [ ] a\n- [x] b\n- c\n") == (
+        '<ul class="task-list">\n'
+        '<li><input type="checkbox" disabled aria-label="Not done"> a</li>\n'
+        '<li><input type="checkbox" disabled checked aria-label="Done"> b</li>\n'
+        "<li>c</li>\n</ul>\n"
+    )
+
+
+def test_a_loose_task_list_has_paragraphs_behind_its_boxes() -> None:
+    text = html("- [ ] a\n\n- [x] b\n")
+    assert '<li><input type="checkbox" disabled aria-label="Not done"> \n<p>a</p>\n</li>' in text
+
+
+def test_footnotes_and_their_references_link_to_each_other() -> None:
+    document = parsed("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
+    assert str(render_blocks(document.blocks, Page())) == (
+        '<p>a<sup class="footnote-ref"><a href="#fn:1" id="fnref:1" role="doc-noteref"'
+        ' aria-label="Footnote 1">1</a></sup> b<sup class="footnote-ref"><a href="#fn:2"'
+        ' id="fnref:2" role="doc-noteref" aria-label="Footnote 2">2</a></sup> c'
+        '<sup class="footnote-ref"><a href="#fn:1" id="fnref:1:2" role="doc-noteref"'
+        ' aria-label="Footnote 1">1</a></sup></p>\n'
+    )
+    assert str(render_footnotes(document.footnotes, Page())) == (
+        '<section class="footnotes" role="doc-endnotes" aria-label="Footnotes">\n<ol>\n'
+        '<li id="fn:1">\n<p><em>One</em>. <a href="#fnref:1" class="footnote-back"'
+        ' role="doc-backlink" aria-label="Back to reference 1">↩</a> <a href="#fnref:1:2"'
+        ' class="footnote-back" role="doc-backlink"'
+        ' aria-label="Back to reference 1, place 2">↩<sup>2</sup></a></p>\n</li>\n'
+        '<li id="fn:2">\n<ul>\n<li>item</li>\n</ul>\n<p><a href="#fnref:2" class="footnote-back"'
+        ' role="doc-backlink" aria-label="Back to reference 2">↩</a></p>\n</li>\n'
+        "</ol>\n</section>\n"
+    )
+
+
+def test_no_footnotes_no_section() -> None:
+    assert render_footnotes((), Page()) == ""
+
+
+def test_words_can_be_translated() -> None:
+    document = parsed("## A\n\nb[^x]\n\n[^x]: c\n")
+    words = Words(anchor='Zum "Teil"', footnotes="Fußnoten", footnote="Nr. {number}")
+    text = render_blocks(document.blocks, Page(), Look(words))
+    assert 'aria-label="Zum &quot;Teil&quot;"' in text and 'aria-label="Nr. 1"' in text
+    assert 'aria-label="Fußnoten"' in render_footnotes(document.footnotes, Page(), Look(words))
+
+
+def test_text_is_escaped_wherever_it_stands() -> None:
+    nasty = '"><script>'
+    text = f"\\<script> `{nasty}` [a](b '{nasty}') ![{nasty}](c) $\"><x$\n\n    {nasty}\n"
+    written = html(f"{text}\n## \\<script>\n\n- \\<script>\n\n| \\<script> |\n| - |\n")
+    assert "<script" not in written and written.count("&lt;script") == 8
+    assert '">' not in html('[a](<b"\\>c>)').removeprefix('<p><a href="/UrlTarget?a&amp;b">')
+
+
+def test_inlines_can_be_rendered_without_their_block() -> None:
+    (paragraph,) = parsed("*a* b").blocks
+    inlines = getattr(paragraph, "children", ())
+    assert render_inlines(inlines, Page()) == "<em>a</em> b"
+
+
+def test_plain_html_of_own_blocks() -> None:
+    text = (
+        "> [!note] *T*\n> a\n\n"
+        "```python file=examples/x.py\nprint(1)\n```\n\n"
+        "Output:\n\n```text\n1\n```\n\nOutput:\n\n| 1 |\n|---|\n\n"
+        "```mjcf\n<mujoco/>\n```\n\n`1`{out} [a](page:b#c) [d](model:e) [f](examples/x.py)\n"
+    )
+    assert str(plain_html(parsed(text))) == (
+        "<blockquote>\n<p><em>T</em></p>\n<p>a</p>\n</blockquote>\n"
+        '<pre><code class="language-python">print(1)\n</code></pre>\n'
+        '<p>Output:</p>\n<pre><code class="language-text">1\n</code></pre>\n'
+        '<p>Output:</p>\n<table>\n<thead>\n<tr>\n<th scope="col">1</th>\n</tr>\n'
+        "</thead>\n</table>\n"
+        '<pre><code class="language-mjcf">&lt;mujoco/&gt;\n</code></pre>\n'
+        '<p><code>1</code> <a href="page:b#c">a</a> <a href="model:e">d</a>'
+        ' <a href="examples/x.py">f</a></p>\n'
+    )
+
+
+_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+
+
+@given(st.text(alphabet="aµ 0123.,·kgm²<>&\"'×−%°\n\u00a0", max_size=24) | st.text())
+def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
+    inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
+    known = joined(text).translate(_ESCAPES)
+    assert render_inlines(inlines, Page(), Look(quantities="ltr")) == known
+    pieces = ((Markup(one.translate(_ESCAPES)), kept) for one, kept in quantities(joined(text)))
+    known = "".join(in_order(html) if kept else html for html, kept in pieces)
+    assert render_inlines(inlines, Page(), Look(quantities="rtl")) == known
+    assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

@@ -1,0 +1,216 @@
+"""What was measured, on the pages of models and on that of the hard cases."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.pages import SiteOptions
+from coursebuild.core.pages.figures import bounded, exact, factor, percent, power, sentence, size
+from coursebuild.numerics.reports import Reports
+from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
+from support.rendered_course import Make
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (1.0, "1.00"),
+        (-0.0604, "−0.0604"),
+        (0.001234, "0.00123"),
+        (12345.0, "12345"),
+        (123456.0, "1.23 × 10<sup>5</sup>"),
+        (-4.1e-10, "−4.10 × 10<sup>−10</sup>"),
+        (9.999e-4, "0.00100"),
+        (9.9e-4, "9.90 × 10<sup>−4</sup>"),
+        (float("nan"), "nan"),
+        (None, ""),
+    ],
+)
+def test_a_number_has_three_digits_and_a_power_of_ten_where_it_needs_one(
+    value: float | None, text: str
+) -> None:
+    assert power(value).replace("\u2009", " ") == text
+
+
+def test_errors_percentages_factors_and_sizes_as_text() -> None:
+    assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
+    assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
+    assert bounded(0.002, 1e-3) == "0.00200"
+    assert exact(8.532261589) == "8.532261589"
+    assert exact(-4.117706176e-10) == "−4.117706176\u2009×\u200910<sup>−10</sup>"
+    assert percent(-0.0604) == "−6.040\u2009%"
+    assert percent(2.5e-13) == "+2.5\u2009×\u200910<sup>−11</sup>\u2009%"
+    assert percent(0.0) == "0\u2009%"
+    assert [percent(v) for v in (1e-5, 99.0, 100.0)] == [
+        "+0.001\u2009%",
+        "+9900.000\u2009%",
+        "+10000\u2009%",
+    ]
+    assert [factor(v) for v in (None, 0.123456, 99.9, 1359.4)] == [
+        "",
+        "0.123",
+        "99.9",
+        "1\u2009359",
+    ]
+    assert [size(n) for n in (0, 1396, 9999, 10_000, 81_212, 9_999_000, 10**7, 98_765_432)] == [
+        "0 B",
+        "1\u2009396 B",
+        "9\u2009999 B",
+        "10 kB",
+        "81 kB",
+        "9\u2009999 kB",
+        "10 MB",
+        "99 MB",
+    ]
+    assert [sentence(t) for t in ("", "it is", "Is it?")] == ["", "It is.", "Is it?"]
+
+
+def pages(make: Make, found: Reports) -> dict[str, str]:
+    files = make("## A\n\nText.\n").site(SiteOptions(reports=found, subset=lambda job: job.data))
+    return {path: data.decode() for path, data in files.items() if path.endswith(".html")}
+
+
+@pytest.fixture(scope="module")
+def site(make: Make) -> dict[str, str]:
+    return pages(make, reports())
+
+
+def text(html: str) -> str:
+    """The text of a page in one line."""
+    body = html[html.index("<main") : html.index("</main>")]
+    bare = re.sub(r"<(svg|details).*?</\1>", " ", body, flags=re.DOTALL)
+    bare = re.sub(r"</?span[^>]*whole[^>]*>|(?<=</sup>)</span>", "", bare)
+    bare = re.sub(r"<(?!/?sup)[^>]*>", " ", bare)
+    return " ".join(bare.replace("\u2009", " ").split())
+
+
+def test_the_card_of_a_model(site: dict[str, str]) -> None:
+    told = text(site["models/box.html"])
+    assert "Pairs of geoms that may touch 7 Pairs that touch in the scenarios 2" in told
+    assert "MJCF, with its files 12 kB Compiled (MJB) 99 MB" in told
+    assert "Speed natively 100 × real time Speed in WebAssembly 151 × real time" in told
+
+
+def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> None:
+    page = site["models/box.html"]
+    told = text(page)
+    assert "A pendulum swings RK4 at 20 ms costs 0.39 times as much" in told
+    assert "Largest stable timesteps Integrator Largest stable timestep Remark Euler 40 ms" in told
+    assert "RK4 90 ms stable again beyond" in told
+    assert "implicit all up to 100 ms" in told
+    assert "Reference by another integration (known to 1 × 10<sup>−12</sup>)" in told
+    assert page.count('class="work-precision"') == 4
+    names = re.findall(r'aria-labelledby="(_plot[^"]*)"', page)
+    ids = {name for pair in names for name in pair.split()}
+    assert len(ids) == 8 and all(page.count(f'id="{name}"') == 1 for name in ids)
+    own = re.findall(r'<tr class="own"><th scope="row">(.*?)</th>', page)
+    assert own[0] == "Euler at 2 ms"
+    assert "Euler at 50 ms: diverged; the state is not finite." in told
+    assert "coursebuild bench box --record" in told
+    assert 'href="../files/reports/box.bench.json"' in page
+    assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in told
+
+
+def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) -> None:
+    told = (
+        "implicit all up to 100 ms longer ones were not tried: 20 of these are the whole scenario"
+    )
+    for duration, expected in ((2.0, True), (2.1, False)):
+        one = replace(box().scenarios[0], duration=duration)
+        found = pages(make, Reports({"box": scene(one, model="box")}))["models/box.html"]
+        assert (told in text(found)) is expected
+
+
+def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) -> None:
+    flat = [row(velocity=(1e-11, 1e-11), position=(2e-3, 1e-3), own=True)]
+    found = Reports({"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")})
+    heads = re.findall(r"<th scope=\"col\"[^>]*>(.*?)</th>", pages(make, found)["models/box.html"])
+    assert "Position (m or rad)" in heads
+    assert "Velocity (m/s or rad/s)" not in heads
+
+
+def test_the_diet_of_a_model(site: dict[str, str]) -> None:
+    told = text(site["models/box.html"])
+    assert "One thing in it is not needed by any scenario." in told
+    assert "sensor-unread Nobody reads &lt;this&gt; sensor." in told
+    assert "bit-identical; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
+    assert "Because its value goes nowhere. models/box.xml:3" in told
+    assert "Kept: it is the horizon." in told
+    assert "It is no fault, as examples/a.py names &lt;it&gt;." in told
+    assert "coursebuild diet box --record" in told
+
+
+def test_what_was_not_measured_is_said_to_be_so(make: Make) -> None:
+    found = pages(make, Reports())
+    told = text(found["models/box.html"])
+    assert "Pairs of geoms that may touch not measured" in told
+    assert "The MJCF file 46 B Speed natively not measured" in told
+    assert "Speed in WebAssembly not measured" in told
+    first = "Not measured. This measures it: coursebuild"
+    assert f"Speed against error {first} bench box --record" in told
+    assert f"Scene diet {first} diet box --record" in told
+    assert "numerics/index.html" not in found and "numerics" not in found["index.html"]
+    half = pages(make, Reports({"box": box(None)}, {"box": diet()}))["models/box.html"]
+    assert "Pairs of geoms that may touch not measured" in text(half)
+    assert "Speed natively 100 × real time Speed in WebAssembly not measured" in text(half)
+    assert "Nothing in it is in vain." in text(half)
+
+
+def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
+    page = site["numerics/index.html"]
+    told = text(page)
+    assert "3 A &lt;top&gt;" in told and "5 Damped spring" in told
+    assert told.index("A &lt;top&gt;") < told.index("Damped spring")
+    assert (
+        "It swings. Exact solution (known to 1 × 10<sup>−13</sup>): the oscillator. Second "
+        "reference: Bulirsch–Stoer. The two differ by 3.9 × 10<sup>−13</sup>."
+    ) in told
+    assert "Euler 200 ms 200.1 ms −0.050 % diverged 1.500000000" in told
+    assert "RK4 280 ms grew" in told and "stable again at 300 ms, 310 ms" in told
+    assert "implicit, discrete all up to 1 s" in told
+    assert "Theory: 2/ω." in told
+    assert "Position (m or rad): largest error" in page
+    assert "Period (s) 2π√(m/k) Euler, RK4 6.283 6.2831853 −1.9 × 10<sup>−4</sup>" in told
+    assert "Energy RK4 −4.1 × 10<sup>−10</sup> 0 −4.1 × 10<sup>−10</sup> Euler not finite" in told
+    assert "Euler at 500 ms: diverged; 1e9 rad/s." in told
+    assert 'href="../files/reports/stability.json"' in page
+    assert 'href="../numerics/index.html"' in site["models/box.html"]
+    assert 'href="numerics/index.html"' in site["index.html"]
+
+
+def test_under_every_table_is_the_command_that_makes_it_again(site: dict[str, str]) -> None:
+    page = site["numerics/index.html"]
+    sections = re.split(r'<div class="case" id="', page)[1:]
+    assert [section.partition('"')[0] for section in sections] == ["top", "spring", "other"]
+    for section in sections:
+        name = section.partition('"')[0]
+        after = re.findall(r"</table>\n</div>\n(.*)", section)
+        assert len(after) >= 3
+        line = (
+            f'<p class="receipt-line"><code class="command">coursebuild stability {name}</code></p>'
+        )
+        assert set(after) == {line}
+
+
+def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
+    found = Reports(cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=())))
+    told = text(pages(make, found)["numerics/index.html"])
+    assert "4 A &lt;a&gt; It swings." in told
+    assert "99 A &lt;b&gt; A &lt;b&gt; It swings." in told
+
+
+def test_the_same_reports_give_the_same_bytes_and_others_other_ones(
+    make: Make, site: dict[str, str]
+) -> None:
+    assert pages(make, reports()) == site
+    other = replace(reports(), diets={"box": diet(finding(message="something else"))})
+    changed = pages(make, other)
+    assert {path for path in site if site[path] != changed[path]} >= {"models/box.html"}
+    assert (
+        changed["numerics/index.html"].partition("<main")[2]
+        == (site["numerics/index.html"].partition("<main")[2])
+    )

@@ -1,0 +1,213 @@
+"""The manifest, and the list of files that a browser may keep."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model.results import FileFacts, OutputFile
+from coursebuild.core.pages.offline import PAPER, facts_of, listing, short_name
+from support.rendered_course import Make
+
+ROOT = Path(__file__).parents[3]
+SHELL = frozenset({"index.html", "offline/index.html", "assets/site.0123abcd.css"})
+
+
+@pytest.fixture(scope="module")
+def site(make: Make) -> dict[str, bytes]:
+    found: dict[str, bytes] = make("## One\n\nText.\n").site()
+    return found
+
+
+def listed(*files: FileFacts) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(listing(SHELL, files))
+    return found
+
+
+def digest(name: str) -> str:
+    return hashlib.sha256(name.encode()).hexdigest()
+
+
+def file(path: str, size: int = 100) -> FileFacts:
+    """A file; one whose name has a place for digits gets those of its content."""
+    return FileFacts(path.replace("#", digest(path)[:8]), digest(path), size)
+
+
+@pytest.mark.parametrize(
+    ("path", "group"),
+    [
+        ("index.html", "shell"),
+        ("offline/index.html", "shell"),
+        ("assets/fonts/f.#.woff2", "shell"),
+        ("lessons/1.1-a.html", "text"),
+        ("manifest.webmanifest", "text"),
+        ("assets/offline.#.js", "text"),
+        ("assets/labs/1.1-lab-1.#.png", "text"),
+        ("files/lessons/s.svg", "text"),
+        ("files/lessons/Foto.jpeg", "text"),
+        ("assets/labs/mujoco.#.wasm", "rest"),
+        ("assets/labs/1.1-lab-1.#.json", "rest"),
+        ("files/data.csv", "rest"),
+        ("files/film.mp4", "rest"),
+        ("models/box.xml", "rest"),
+        ("examples/a.py", "rest"),
+    ],
+)
+def test_each_file_is_in_the_group_of_those_who_need_it(path: str, group: str) -> None:
+    found = listed(file(path))
+    groups = {name for name in ("shell", "text", "rest") if found[name]["files"]}
+    assert groups == {group}
+    assert found[group]["bytes"] == 100
+    wanted = "" if "#" in path else digest(path)[:12]
+    assert list(found[group]["files"].values()) == [wanted]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("404.html", "robots.txt", "sitemap.xml", "service-worker.js", "llms.txt"),
+        *("examples.zip", "lessons/1.1-a.zip", "lessons/1.1-a.ipynb", "lessons/1.1-a.md"),
+        *("assets/site.#.css.br", "assets/site.#.css.gz"),
+    ],
+)
+def test_copies_and_files_for_machines_are_in_no_group(path: str) -> None:
+    assert not any(listed(file(path))[name]["files"] for name in ("shell", "text", "rest"))
+
+
+def test_what_is_large_is_for_those_who_ask_for_everything() -> None:
+    large = listed(file("all/index.html", 2_000_000), file("assets/search.#.js", 2_000_000))
+    assert list(large["rest"]["files"]) == ["all/index.html"]
+    assert len(large["text"]["files"]) == 1, "what scripts of every page need is kept with them"
+
+
+def test_a_page_is_large_from_a_mebibyte_on() -> None:
+    found = listed(file("a.html", 1 << 20), file("b.html", (1 << 20) + 1))
+    assert ([*found["text"]["files"]], [*found["rest"]["files"]]) == (["a.html"], ["b.html"])
+
+
+def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
+    found = listed(FileFacts("assets/a.0123abcd.js", digest("a"), 1))
+    assert found["text"]["files"] == {"assets/a.0123abcd.js": digest("a")[:12]}
+
+
+def test_an_edit_changes_its_line_and_no_other(site: dict[str, bytes], make: Make) -> None:
+    def lines(files: dict[str, bytes]) -> set[str]:
+        return set(files["files.json"].decode().splitlines())
+
+    edited = make("## One\n\nTxet.\n").site()
+    gone, new = lines(site) - lines(edited), lines(edited) - lines(site)
+    named = {line.split('"')[1] for line in new if line.startswith('"')}
+    assert "lessons/0.1-falling.html" in named
+    assert not {name for name in named if name.endswith((".css", ".woff2"))}
+    assert len(gone) == len(new)
+
+
+def test_the_list_of_a_site_is_what_is_there(site: dict[str, bytes]) -> None:
+    data = json.loads(site["files.json"])
+    files = {
+        path: d for name in ("shell", "text", "rest") for path, d in data[name]["files"].items()
+    }
+    assert files.keys() <= site.keys()
+    for path, digits in files.items():
+        found = hashlib.sha256(site[path]).hexdigest()
+        assert found.startswith(digits or path.split(".")[-2])
+    shell = data["shell"]["files"]
+    for page in ("index.html", "offline/index.html"):
+        text = site[page].decode()
+        for name in re.findall(r'(?:src|href)="(?:\.\./)?(assets/[^"]+\.(?:css|js|svg))"', text):
+            assert name in shell, name
+    assert data["text"]["bytes"] == sum(len(site[path]) for path in data["text"]["files"])
+
+
+@given(st.lists(st.text(alphabet='ab"\\\n,é\ud800/.', max_size=6), unique=True, max_size=5))
+def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
+    files = [FileFacts(f"assets/{name}.js", "0" * 64, size) for size, name in enumerate(names)]
+    text = listing(SHELL, files).decode("utf-8", "surrogatepass")
+    assert f"{json.dumps(json.loads(text), ensure_ascii=False, indent=0)}\n" == text
+    assert [*json.loads(text)["text"]["files"]] == [one.path for one in files]
+
+
+def test_facts_of_files_are_sorted_by_path() -> None:
+    facts = list(facts_of([OutputFile("b", b"1"), OutputFile("a", b"12")]))
+    assert [(one.path, one.size) for one in facts] == [("a", 2), ("b", 1)]
+
+
+def test_the_manifest_names_what_is_there(site: dict[str, bytes]) -> None:
+    manifest = json.loads(site["manifest.webmanifest"])
+    assert (manifest["start_url"], manifest["scope"], manifest["id"]) == ("./", "./", "./")
+    for icon in manifest["icons"]:
+        data = site[icon["src"]]
+        if icon["type"] == "image/png":
+            width = int.from_bytes(data[16:20], "big")
+            assert data.startswith(b"\x89PNG") and icon["sizes"] == f"{width}x{width}"
+    purposes = [icon.get("purpose", "any") for icon in manifest["icons"]]
+    assert purposes == ["any", "any", "any", "maskable"]
+
+
+def test_every_page_names_the_manifest(site: dict[str, bytes]) -> None:
+    for path, data in site.items():
+        if path.endswith(".html"):
+            root = "/course/" if path == "404.html" else "../" * path.count("/")
+            assert f'<link rel="manifest" href="{root}manifest.webmanifest">' in data.decode()
+
+
+def test_the_colours_of_the_manifest_are_those_of_the_style_sheet() -> None:
+    tokens = (ROOT / "site/css/tokens.css").read_text(encoding="utf-8")
+    light, dark = re.findall(r"--paper: light-dark\((#\w+), (#\w+)\)", tokens)[0]
+    base = (ROOT / "templates/base.html").read_text(encoding="utf-8")
+    assert light == PAPER
+    assert re.findall(r'name="theme-color" content="(#\w+)"', base) == [light, dark]
+
+
+@pytest.mark.parametrize(
+    ("title", "short"),
+    [
+        ("Simulation with MuJoCo", "Simulation"),
+        ("Physics", "Physics"),
+        ("Rigid bodies", "Rigid bodies"),
+        ("Rigid bodies1", "Rigid"),
+        ("A first course", "A first"),
+        ("Bodies, falling", "Bodies,"[:-1]),
+        ("Thermodynamik für Anfänger", "Thermodynamik"),
+        ("物理学入門", "物理学入門"),
+        ("— — —", "— — —"),
+    ],
+)
+def test_a_name_below_an_icon_has_whole_words_and_at_most_12_characters(
+    title: str, short: str
+) -> None:
+    assert short_name(title) == short
+
+
+def test_hostile_titles_stay_text(make: Make) -> None:
+    title = 'A "course" </script> & \\ more'
+    site = make("## One\n", course=MAP.replace("TITLE", title)).site()
+    assert json.loads(site["manifest.webmanifest"])["name"] == title
+
+
+MAP = """
+[course]
+title = 'TITLE'
+
+[[page]]
+id = "about"
+title = "About"
+file = "content/pages/about.md"
+
+[[level]]
+id = "0"
+title = "Start"
+
+[[level.lesson]]
+id = "0.1"
+slug = "falling"
+title = "Falling"
+status = "complete"
+"""

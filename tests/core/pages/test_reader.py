@@ -1,0 +1,114 @@
+"""What pages say of lessons for the reader's progress, and the two pages that are about it."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import pytest
+
+from coursebuild.core.model import Document
+from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.quiz_index import count, quiz_index
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+from coursebuild.features.quiz.keys import text_key
+from support.rendered_course import Make
+
+
+def quiz(id: str, *questions: dict[str, Any]) -> str:
+    data = {"id": id, "title": "Check", "questions": list(questions)}
+    return f"```quiz\n{json.dumps(data)}\n```\n\n"
+
+
+def why(text: str, **more: str) -> dict[str, Any]:
+    return {"kind": "open", "q": text, "reference": "So.", **more}
+
+
+TWO = quiz("0.1-one", why("Why?"), why("How?", id="how")) + quiz("0.1-two", why("What?"))
+WHY, WHAT = text_key("open", "Why?"), text_key("open", "What?")
+NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
+
+
+def test_the_questions_of_a_document() -> None:
+    document = parsed("> [!note]\n> Text.\n\n" + TWO)
+    assert quiz_index(document) == NAMES
+    assert quiz_index(without_prose(document)) == NAMES, "its skeleton is enough"
+    assert quiz_index(parsed("Text.")) == ""
+
+
+def parsed(text: str) -> Document:
+    found = parse_document(Source("a.md", text), frozenset({"note"}), lesson=True).value
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(("text", "number"), [("", 0), ("a:x", 1), (NAMES, 3)])
+def test_the_number_of_questions(text: str, number: int) -> None:
+    assert count(text) == number
+
+
+def pages(make: Make, **texts: str) -> dict[str, str]:
+    site = make(TWO, **texts).site()
+    return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
+
+
+def test_lists_of_lessons_name_their_questions(make: Make) -> None:
+    found = pages(make, about=quiz("about", why("Which?", id="which")))
+    row = f'data-lesson="0.1" data-quizzes="{NAMES}">'
+    for path in ("index.html", "levels/0.html", "progress/index.html"):
+        assert found[path].count(row) == 1, path
+        assert 'data-lesson="1.2">' in found[path] or path == "levels/0.html"
+    assert 'data-quizzes="about:which">' in found["progress/index.html"]
+    assert re.findall(r'<li data-quizzes="(.*?)"(.*?)>', found["review/index.html"]) == [
+        (NAMES, ' data-lesson="0.1"'),
+        ("about:which", ""),
+    ]
+
+
+def test_only_lists_of_lessons_name_questions(make: Make) -> None:
+    """So that an edit of a quiz draws no other page."""
+    found = pages(make)
+    lists = {"index.html", "levels/0.html", "progress/index.html", "review/index.html"}
+    assert {path for path, html in found.items() if "data-quizzes" in html} == lists
+
+
+def test_a_course_without_questions_has_no_review(make: Make) -> None:
+    site = make("Text.").site()
+    assert "progress/index.html" in site
+    assert "review/index.html" not in site
+    foot = site["about.html"].decode().partition('class="site-foot"')[2]
+    assert "progress/index.html" in foot
+    assert "review" not in foot
+
+
+def test_what_is_kept_and_where_is_said_without_a_script(make: Make) -> None:
+    html = pages(make)["progress/index.html"]
+    key = re.search(r'data-course="([^"]*)"', html)
+    assert key is not None
+    assert f"<code>coursebuild.progress.{key[1]}</code>" in html
+    assert "<noscript>" in html
+
+
+def test_each_page_carries_the_words_that_it_shows(make: Make) -> None:
+    found = pages(make)
+    words = {path: set(re.findall(r'data-key="([^"]+)"', html)) for path, html in found.items()}
+
+    def groups(path: str) -> set[str]:
+        parts = (key.split(".") for key in words[path])
+        return {".".join(p[:2]) for p in parts if p[0] in ("progress", "review")}
+
+    lesson = {"progress.lesson", "progress.trouble"}
+    assert groups("about.html") == set()
+    assert groups("index.html") == groups("levels/0.html") == {"progress.map"}
+    assert groups("lessons/0.1-falling.html") == lesson
+    assert groups("progress/index.html") == {"progress.live", "progress.map", "progress.trouble"}
+    assert groups("review/index.html") == {"review.live", "progress.trouble"}
+    assert "quiz.live.check" in words["review/index.html"]
+
+
+def test_only_the_pages_about_the_reader_load_their_script(make: Make) -> None:
+    found = pages(make)
+    loading = {path for path, html in found.items() if "/reader." in html}
+    assert loading == {"progress/index.html", "review/index.html"}

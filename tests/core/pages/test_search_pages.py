@@ -1,0 +1,188 @@
+"""What pages are found by, as sections, and the files that a browser loads of it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from coursebuild.core.model import Document
+from coursebuild.core.pages.lesson import lesson_inputs, stub_inputs
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.offline import offline_inputs
+from coursebuild.core.pages.pages import home_inputs, level_inputs, model_inputs, not_found_inputs
+from coursebuild.core.pages.reader import progress_inputs
+from coursebuild.core.pages.search.page import page_text, searched, terms
+from coursebuild.core.pages.search.page_inputs import search_inputs
+from coursebuild.core.pages.search.sections import drawn_sections
+from coursebuild.core.pages.search.values import PageText, Section, SectionPiece
+from support.rendered_course import Make
+
+LESSON = """Before any *heading*, at $I_{xx}$.[^n]
+
+## Outer {#out}
+
+- One `mj_step` item
+- Two
+
+> [!warning] Mind
+> In a [callout](lesson:1.1).
+
+### Inner <b>bold</b>
+
+$$
+\\tau = \\dot{L}
+$$
+
+| h | k |
+| - | - |
+| a | $b$ |
+
+```python file=examples/a.py norun
+import mujoco
+```
+
+```quiz
+{"id": "q", "title": "Check", "questions": [
+  {"kind": "mcq", "q": "Which <b>one</b>?", "options": ["This", "That"], "answer": 1,
+   "explain": "The secret.", "hints": ["A secret hint."]},
+  {"kind": "order", "q": "Sort", "items": ["zeta", "alpha"]}
+]}
+```
+
+## Empty
+
+<div>raw <i>text</i> &amp; more<script>hidden()</script></div>
+
+[^n]: A *note*.
+"""
+
+
+def text_of(make: Make, text: str) -> PageText:
+    made = make(text)
+    library = Library.of(made.course, made.results, made.assets)
+    lesson = library.lessons["0.1"]
+    document: Document = lesson.document
+    found = page_text(lesson_inputs(library, lesson, document), document, "")
+    assert found is not None
+    return found
+
+
+def said(section: Section) -> list[tuple[str, str]]:
+    return [(piece.kind, piece.text) for piece in section.pieces]
+
+
+def test_a_lesson_by_its_sections(make: Make) -> None:
+    page = text_of(make, LESSON)
+    assert (page.title, page.name) == ("Falling", "0.1")
+    heads = [(s.anchor, s.heading, s.level) for s in page.sections]
+    assert heads == [
+        ("", "", 0),
+        ("out", "Outer", 2),
+        ("inner-bold", "Inner bold", 3),
+        ("empty", "Empty", 2),
+    ]
+    start, outer, inner, empty = page.sections
+    assert said(start) == [
+        ("text", "A body falls."),
+        ("text", "Say what falls"),
+        ("text", "Measure it"),
+        ("text", "Before any heading, at I_xx."),
+    ]
+    assert said(outer) == [
+        ("text", "One mj_step item"),
+        ("text", "Two"),
+        ("text", "Warning: Mind"),
+        ("text", "In a callout."),
+    ]
+    assert said(inner)[:4] == [
+        ("formula", "τ = L"),
+        ("text", "h | k"),
+        ("text", "a | b"),
+        ("code", "import mujoco"),
+    ]
+    assert inner.also == ("dot", "examples/a.py")
+    assert said(empty) == [("text", "raw text & more"), ("text", "A note.")]
+
+
+def test_a_quiz_gives_no_answer_away(make: Make) -> None:
+    texts = [text for section in text_of(make, LESSON).sections for _, text in said(section)]
+    at = texts.index("Check")
+    assert texts[at + 1 : at + 7] == ["Which one?", "This", "That", "Sort", "alpha", "zeta"]
+    assert not any("secret" in text for text in texts)
+
+
+def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
+    made = make("Text.")
+    library = Library.of(made.course, made.results, made.assets)
+    left_out = (home_inputs, not_found_inputs, search_inputs, offline_inputs, progress_inputs)
+    for inputs in left_out:
+        assert page_text(inputs(library), None, "<p>Text</p>") is None, inputs
+    stub = page_text(stub_inputs(library, library.lessons["1.2"]), None, "<p>Other</p>")
+    assert stub == PageText(
+        "Later", "1.2", (Section("", "", 0, (SectionPiece("text", "Comes later."),)),)
+    )
+    level = page_text(level_inputs(library, made.course.levels[0]), None, "<p>Lessons</p>")
+    assert level is not None and "Lessons" not in str(level)
+    model = page_text(model_inputs(library, made.course.models[0]), None, "<h2 id='x'>Facts</h2>")
+    assert model is not None
+    assert model.sections[0].pieces[-1].text.startswith('<mujoco model="box">')
+    assert model.sections[1] == Section("x", "Facts", 2, ())
+
+
+def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
+    piece = SectionPiece("text", "body body body body; inertia")
+    code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
+    page = PageText("Body", "4.2", (Section("a", "Inertia", 2, (piece, code), ("frac",)),))
+    lines = terms(page).decode().split("\n")
+    assert lines == sorted(lines, key=lambda line: line[1:])
+    assert {line[1:]: line[0] for line in lines} == {
+        "4.2": "c",
+        "body": "e",
+        "inertia": "9",
+        "frac": "0",
+        "mj_step": "0",
+        "mjstep": "0",
+        "mj": "0",
+        "step": "0",
+        "x1": "3",
+        "y1": "2",
+        "z1": "2",
+        "w1": "1",
+    }
+
+
+def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make) -> None:
+    made = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
+    library = Library.of(made.course, made.results, made.assets)
+    lesson = library.lessons["0.1"]
+    found = searched(lesson_inputs(library, lesson, lesson.document), lesson.document, "")
+    assert found is not None and found.name == "0.1"
+    text = found.text.decode()
+    assert text.startswith('coursebuildSearch.take("page","",') and text.endswith(")\n")
+    sections = json.loads(text.removeprefix('coursebuildSearch.take("page","",')[:-2])
+    assert sections[-1][1] == '<img src=x onerror="alert(1)">'
+    assert sections[-1][3] == [["t", "</script> & \x07."]]
+
+
+@pytest.mark.parametrize(
+    ("body", "sections"),
+    [
+        ("", ()),
+        (
+            "<main><h1>Title</h1><p>Text</p></main>",
+            (Section("", "", 0, (SectionPiece("text", "Text"),)),),
+        ),
+        (
+            "<h2 id=a>A <b>b</b></h2><nav>no</nav><ul><li>one<li>two</ul><pre>code</pre>"
+            "<h3>B</h3>tail &lt;i>",
+            (
+                Section("a", "A b", 2, (SectionPiece("text", "one"), SectionPiece("text", "two"))),
+                Section("", "B", 3, (SectionPiece("text", "tail <i>"),)),
+            ),
+        ),
+        ("</p></div><p>x<br>y</b></p>", (Section("", "", 0, (SectionPiece("text", "xy"),)),)),
+    ],
+)
+def test_a_drawn_page_by_its_headings(body: str, sections: tuple[Section, ...]) -> None:
+    assert drawn_sections(body) == sections

@@ -1,0 +1,105 @@
+"""What texts and formulas are found by; the browser's half of these rules is tested under Node."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.pages.search import tex, words
+from coursebuild.core.pages.search.index import _hash
+from coursebuild.core.pages.search.tex import plain_formula
+from coursebuild.core.pages.search.words import counted, is_fuzzy, shelf_of, terms_of
+
+AGREED = json.loads(
+    (Path(__file__).parents[3] / "site" / "tests" / "search-words.json").read_text("utf-8")
+)
+
+
+def test_terms_are_those_that_the_browser_makes() -> None:
+    assert [[text, terms_of(text)] for text, _ in AGREED["terms"]] == AGREED["terms"]
+
+
+def test_terms_are_kept_where_the_browser_looks_for_them() -> None:
+    found = [
+        [term, shelf_of(term), is_fuzzy(term), _hash(shelf_of(term))]
+        for term, *_ in AGREED["shelves"]
+    ]
+    assert found == AGREED["shelves"]
+
+
+@given(st.text())
+def test_any_text_has_terms_that_lines_can_hold(text: str) -> None:
+    terms = terms_of(text)
+    assert counted(text) == {term: terms.count(term) for term in terms}
+    for term in terms:
+        assert term and not {" ", "\n", "\0"} & {*term}
+        assert shelf_of(term)
+
+
+WORDS = (
+    *("a", "s", "'s", "’s", "é", "λ", "\n", ".", "_", "1", "1e-5", "2.5E+3x", "E", "e+", " ", "×"),
+    *("…", "–", "ﬁ", "ſ", "\x1c", "½", "a\u0301", "\u0301", "İ", "中文", "x.y", "__a__", "1.2.3"),
+)
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=20).map("".join))
+def test_ascii_text_has_the_terms_of_any_text(text: str) -> None:
+    terms = terms_of(text)
+    assert counted(text) == {term: terms.count(term) for term in terms}
+    if text.isascii():
+        assert words._ASCII_TOKEN.findall(text) == words._TOKEN.findall(text)
+
+
+@pytest.mark.parametrize(
+    ("formula", "text", "names"),
+    [
+        (r"I_{xx}", "I_xx", ()),
+        (r"\boldsymbol{\tau} = I\dot{\omega} + \omega\times(I\omega)", "τ = I ω + ω × (I ω)", ...),
+        (r"\frac{1}{2} m v^2", "1/2 m v^2", ("frac",)),
+        (r"\frac12", "1/2", ("frac",)),
+        (r"\dfrac{a + b}{\sqrt{c d}}", "(a + b)/(√(c d))", ("dfrac", "sqrt")),
+        (r"\frac{\partial L}{\partial \dot q_i}", "(∂L)/(∂q_i)", ("frac", "partial", "dot")),
+        (r"x(t + \Delta t)", "x(t + Δt)", ()),
+        (r"\begin{pmatrix} a & b \\ c & d \end{pmatrix}", "a b c d", ()),
+        (r"v = 3\,\text{m s}^{-1}", "v = 3 m s^(-1)", ()),
+        (r"\sum_{i=1}^{n} m_i", "∑_(i=1)^n m_i", ("sum",)),
+        (r"\sin\theta \approx \theta % small", "sin θ ≈ θ", ("sin", "approx")),
+        (r"\mathbf{R}^{\mathsf T}", "R^T", ()),
+        (r"\phantom{x} y \label{eq:a}", "y", ()),
+        (r"\unknown{z}", "z", ("unknown",)),
+        (r"\omega'", "ω ′", ()),
+        ("a < b & c", "a < b c", ()),
+        ("", "", ()),
+        ("}{}}", "", ()),
+        ("x^", "x^", ()),
+        (r"\frac{a", "a/", ("frac",)),
+        ("{" * 3000 + "x" + "}" * 3000, "x", ()),
+    ],
+)
+def test_a_formula_as_text(formula: str, text: str, names: tuple[str, ...]) -> None:
+    found, said = plain_formula(formula)
+    assert found == text
+    assert names is ... or said == names
+
+
+BLANKS = st.text(alphabet="_^([|⟨)]⟩,;Δδ∂∇ a1é", max_size=12)
+
+
+@given(BLANKS.map(lambda text: " ".join(text.split())))
+def test_blanks_beside_indices_brackets_and_operators_are_left_out(text: str) -> None:
+    slow = re.sub(r"(?<=[_^]) | (?=[_^])", "", text)
+    assert tex._TIGHT.sub("", text) == slow
+    assert tex._INNER.sub("", text) == re.sub(r"(?<=[(\[|⟨]) | (?=[)\]⟩,;])", "", text)
+    assert tex._OPERATOR.sub("", text) == re.sub(r"(?<=[Δδ∂∇]) (?=[^\W\d])", "", text)
+
+
+@given(st.text(alphabet=r"\{}_^&~'% abαomegfrct1-+=()", max_size=60))
+def test_any_formula_can_be_read(formula: str) -> None:
+    text, names = plain_formula(formula)
+    assert "{" not in text or r"\{" in formula
+    assert all(name.isalpha() for name in names)

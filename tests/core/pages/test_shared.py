@@ -1,0 +1,89 @@
+"""What the shared files must know of a page, and pages settled."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+from hypothesis import given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from coursebuild.core.pages import formulas
+from coursebuild.core.pages.draft import Draft
+from coursebuild.core.pages.fonts import BASE
+from coursebuild.core.pages.shared import page_facts, settled
+
+PIECES = [
+    *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),
+    *("</math>", '<span style="color:red">', "</span>", "<!--", "-->", "<p>", "</p>", "&amp;"),
+    *(
+        "&am",
+        "p;",
+        "&notit;",
+        "&#955;",
+        "&#x3bb",
+        "&amp",
+        "(",
+        "“",
+        "”,",
+        ".",
+        "é",
+        "∂",
+        "a b",
+        "\u00a0m",
+        "\n",
+    ),
+]
+html = st.lists(st.sampled_from(PIECES), max_size=20).map("".join)
+
+
+def draft(body: str) -> Draft:
+    return Draft("x.html", "page", "Títle", "", Markup(body))
+
+
+def glued(body: str) -> str:
+    """The same as `formulas.glue`, by its definition, where operators are tight already."""
+    formula = r"((?:<math>(?:(?!</math>).)*</math>)+)"
+    after = r"""((?:\xa0[^\s<&]{1,16})?[,.;:!?)\]’”"'…%]*)"""
+    touching = re.compile(rf"""([(\[“‘"']*){formula}{after}""", re.DOTALL)
+    return touching.sub(held, body)
+
+
+def held(match: re.Match[str]) -> str:
+    before, formula, after = match.groups()
+    cut = [m.end() for m in re.finditer(r"</math>(?=<math>)", formula)]
+    if not before and not after:
+        return match[0]
+    if not cut:
+        return f'<span class="held">{match[0]}</span>'
+    start, middle, end = formula[: cut[0]], formula[cut[0] : cut[-1]], formula[cut[-1] :]
+    start = f'<span class="held">{before}{start}</span>' if before else start
+    end = f'<span class="held">{end}{after}</span>' if after else end
+    return start + middle + end
+
+
+@given(html)
+def test_formulas_are_held_to_what_touches_them_and_nothing_is_escaped(body: str) -> None:
+    body = body.replace("style=", "title=")
+    page, declarations = settled(draft(body))
+    assert (str(page.body), declarations) == (glued(formulas._tight(body)), frozenset())
+
+
+@given(html)
+def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
+    facts = page_facts(draft(body), frozenset({"color:red"}))
+    formula = re.compile(r"<math\b.*?</math>", re.DOTALL)
+    # A reference ends where a tag begins.
+    text = unescape(re.sub(r"<[^>]*>", "\0", formula.sub("\0", body)))
+    inside = "".join(unescape(re.sub(r"<[^>]*>", "\0", m)) for m in formula.findall(body))
+    assert facts.text == {c for c in f"Títle{text}" if not c.isascii() and c not in BASE}
+    assert facts.mathematics - {" "} == {c for c in inside if not c.isascii()}
+    assert (" " in facts.mathematics) == (formula.search(body) is not None)
+    assert facts.declarations == {"color:red"}
+
+
+def test_a_long_page_is_looked_through_once() -> None:
+    """With something left to look at after the last character that counts, at each place."""
+    page = draft("λ" + "a > b & c " * 40_000)
+    assert page_facts(page, frozenset()).text == {"í", "λ"}

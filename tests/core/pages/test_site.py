@@ -1,0 +1,359 @@
+"""The whole site: its files, the same bytes each time, no broken link, nothing hostile in it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from html import unescape
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages import SiteOptions, check_links
+from support.rendered_course import Make
+
+LESSON = """## First part
+
+See lesson 1.1, level 1, lesson 1.2, [the page](page:about), [the box](model:box),
+[the script](examples/a.py), [a file](data.csv) and ![a sketch](../img/s.svg).[^n]
+
+$$x = 1$$
+
+```python file=examples/a.py
+from mjcourse import model_path
+import numpy as np
+print(model_path("box"))
+```
+
+Output:
+
+```text
+one
+```
+
+### Detail {#detail}
+
+Back to [the part](#first-part).
+
+## Second part
+
+```lab simlab
+{"model": "box", "dock": true, "title": "Docked"}
+```
+
+After.
+
+[^n]: A note.
+"""
+
+FILES = (
+    OutputFile("content/lessons/data.csv", b"1,2\n"),
+    OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),
+    OutputFile("content/img/s.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>"),
+)
+
+
+def options() -> SiteOptions:
+    return SiteOptions(files=FILES, subset=lambda job: job.data)
+
+
+@pytest.fixture(scope="module")
+def site(make: Make) -> dict[str, bytes]:
+    found: dict[str, bytes] = make(LESSON).site(options())
+    return found
+
+
+def pages(site: dict[str, bytes]) -> dict[str, str]:
+    return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
+
+
+def test_the_files_of_a_site(site: dict[str, bytes]) -> None:
+    assert [path for path in site if not path.startswith("assets/")] == [
+        "404.html",
+        "about.html",
+        "about.md",
+        "examples.zip",
+        "examples/a.py",
+        "files.json",
+        "files/img/s.svg",
+        "files/lessons/data.csv",
+        "index.html",
+        "index.md",
+        "lessons/0.1-falling.html",
+        "lessons/0.1-falling.ipynb",
+        "lessons/0.1-falling.md",
+        "lessons/0.1-falling.zip",
+        "lessons/1.1-spinning.html",
+        "lessons/1.1-spinning.ipynb",
+        "lessons/1.1-spinning.md",
+        "lessons/1.2-later.html",
+        "lessons/1.2-later.md",
+        "levels/0.html",
+        "levels/0.md",
+        "levels/1.html",
+        "levels/1.md",
+        "llms.txt",
+        "manifest.webmanifest",
+        "models/box.html",
+        "models/box.md",
+        "models/box.xml",
+        "models/meshes/hand.obj",
+        "offline/index.html",
+        "progress/index.html",
+        "robots.txt",
+        "search/index.html",
+        "search/index.js",
+        "search/index.js.br",
+        "search/index.js.gz",
+        "service-worker.js",
+        "sitemap.xml",
+    ]
+    shared = sorted(re.sub(r"\.[0-9a-f]{8}\.", ".", path) for path in site if "fonts" not in path)
+    shared = [path for path in shared if not path.startswith("assets/search/")]
+    assert [path for path in shared if path.startswith("assets/")] == [
+        "assets/icon-192.png",
+        "assets/icon-512.png",
+        "assets/icon-maskable.png",
+        "assets/icon-touch.png",
+        "assets/icon.svg",
+        "assets/licences.txt",
+        "assets/map.js",
+        "assets/offline.js",
+        "assets/quiz.js",
+        "assets/reader.js",
+        "assets/search.js",
+        "assets/site.css",
+        "assets/site.js",
+        "assets/theme.js",
+    ]
+
+
+def test_names_of_shared_files_are_their_content(site: dict[str, bytes]) -> None:
+    for path, data in site.items():
+        # What the search loads is named by what it is made from, before it is made.
+        if path.startswith("assets/") and not path.startswith("assets/search/"):
+            assert path.split(".")[-2] == hashlib.sha256(data).hexdigest()[:8]
+
+
+def test_the_same_values_give_the_same_bytes(make: Make, site: dict[str, bytes]) -> None:
+    assert make(LESSON).site(options()) == site
+
+
+def test_no_link_is_broken(site: dict[str, bytes]) -> None:
+    files = [OutputFile(path, data) for path, data in site.items()]
+    assert check_links(files, "https://example.org/course/") == ()
+    without = [file for file in files if file.path != "lessons/1.1-spinning.html"]
+    assert {broken.page for broken in check_links(without, "https://example.org/course/")} >= {
+        "index.html",
+        "lessons/0.1-falling.html",
+        "levels/1.html",
+    }
+
+
+def addresses(page: str) -> list[str]:
+    body = re.sub(r"<(meta|link rel=\"canonical\")[^>]*>", "", page)
+    return [unescape(url) for url in re.findall(r'(?:href|src)="([^"]*)"', body)]
+
+
+def test_every_address_is_relative_but_on_the_page_for_missing_ones(site: dict[str, bytes]) -> None:
+    for path, page in pages(site).items():
+        for url in addresses(page):
+            if url.startswith(("#", "https://example.org/repo")):
+                continue
+            if path == "404.html":
+                assert url.startswith("/course/"), (path, url)
+            else:
+                depth = path.count("/")
+                assert not url.startswith(("/", "http")), (path, url)
+                assert url.startswith("../") == (url.count("../") > 0)
+                assert url.count("../") <= depth, (path, url)
+
+
+def test_without_a_base_address_nothing_needs_one(make: Make) -> None:
+    made = make(LESSON)
+    bare = replace(made, course=replace(made.course, base_url=""))
+    site = bare.site(options())
+    assert "sitemap.xml" not in site
+    assert site["robots.txt"] == b"User-agent: *\nAllow: /\n"
+    for page in pages(site).values():
+        assert "canonical" not in page
+        assert "og:url" not in page
+    assert 'href="/"' in pages(site)["404.html"]
+    assert check_links([OutputFile(path, data) for path, data in site.items()]) == ()
+
+
+def test_what_search_engines_read(site: dict[str, bytes]) -> None:
+    page = pages(site)["lessons/0.1-falling.html"]
+    assert "<title>Falling · Bodies &amp; &lt;axes&gt;</title>" in page
+    assert '<meta name="description" content="A body falls.">' in page
+    address = "https://example.org/course/lessons/0.1-falling.html"
+    assert f'<link rel="canonical" href="{address}">' in page
+    assert f'<meta property="og:url" content="{address}">' in page
+    data = json.loads(page.split('<script type="application/ld+json">')[1].split("</script>")[0])
+    assert data["@type"] == "LearningResource"
+    assert data["timeRequired"] == "PT20M"
+    assert data["isPartOf"]["name"] == "Bodies & <axes>"
+    home = pages(site)["index.html"]
+    course = json.loads(home.split('<script type="application/ld+json">')[1].split("</script>")[0])
+    assert (course["@type"], len(course["hasPart"])) == ("Course", 2)
+    robots = site["robots.txt"].decode()
+    assert "Sitemap: https://example.org/course/sitemap.xml" in robots
+    urls = [
+        e.text for e in ElementTree.fromstring(site["sitemap.xml"]).iter() if e.tag.endswith("loc")
+    ]
+    assert "https://example.org/course/" in urls
+    assert address in urls
+    assert not any("404" in str(url) or "1.2-later" in str(url) for url in urls)
+    assert 'content="noindex"' in pages(site)["lessons/1.2-later.html"]
+
+
+def test_pages_keep_to_a_strict_policy(site: dict[str, bytes]) -> None:
+    for path, page in pages(site).items():
+        policy = page.split('http-equiv="Content-Security-Policy" content="')[1].split('"')[0]
+        assert "unsafe-inline" not in policy
+        assert "'unsafe-eval'" not in policy
+        assert not re.search(r"<[^>]*\sstyle=", page), path
+        assert not re.search(r"<[^>]*\son[a-z]+=", page), path
+        assert "<style" not in page
+        for attributes, content in re.findall(r"<script([^>]*)>(.*?)</script>", page, re.DOTALL):
+            if content:
+                assert attributes == ' type="application/ld+json"'
+                digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+                assert f"'sha256-{digest}'" in unescape(policy)
+
+
+HOSTILE = "\"><script>alert(1)</script><b title='x'>&amp;\x07"
+
+
+class Elements(HTMLParser):
+    """Counts the elements of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append(tag)
+
+
+def test_nothing_hostile_gets_through(make: Make) -> None:
+    made = make(LESSON)
+    course = made.course
+    levels = tuple(
+        replace(
+            level,
+            title=HOSTILE,
+            summary=HOSTILE,
+            lessons=tuple(
+                replace(x, title=HOSTILE, summary=HOSTILE, objectives=(HOSTILE,))
+                for x in level.lessons
+            ),
+        )
+        for level in course.levels
+    )
+    hostile = replace(
+        course,
+        title=HOSTILE,
+        summary=HOSTILE,
+        licence=HOSTILE,
+        levels=levels,
+        pages=tuple(replace(page, title=HOSTILE) for page in course.pages),
+    )
+    results = replace(made.results, engine=HOSTILE, python=HOSTILE)
+    clean = pages(made.site(options()))
+    for path, page in pages(replace(made, course=hostile, results=results).site(options())).items():
+        assert "\x07" not in page
+        assert Elements(page).found.count("script") == Elements(clean[path]).found.count("script")
+        assert Elements(page).found.count("b") == Elements(clean[path]).found.count("b") == 0
+        for block in re.findall(r'<script type="application/ld\+json">(.*?)</script>', page):
+            assert json.loads(block)["name"] in (HOSTILE, HOSTILE.replace("\x07", "␇"))
+
+
+def test_every_page_has_one_heading_one_main_and_unique_ids(site: dict[str, bytes]) -> None:
+    for path, page in pages(site).items():
+        assert page.count("<h1") == 1, path
+        assert len(re.findall('<main [^>]*id="_main"', page)) == 1
+        assert '<a class="skip" href="#_main">' in page
+        assert page.startswith('<!DOCTYPE html>\n<html lang="en" data-course="')
+        ids = re.findall(r'\sid="([^"]*)"', page)
+        assert len(ids) == len(set(ids)), path
+
+
+def test_the_lesson_page(site: dict[str, bytes]) -> None:
+    page = pages(site)["lessons/0.1-falling.html"]
+    for part in (
+        '<h1><span class="number">0.1</span> Falling</h1>',
+        '<li class="status status-complete" title="Written, and every output in it verified.">'
+        "Complete</li>",
+        "<li>20 minutes</li>",
+        "<li>Say what falls</li>\n<li>Measure it</li>",
+        '<li><a href="#first-part">First part</a>\n<ol>\n<li><a href="#detail">Detail</a></li>\n'
+        "</ol>",
+        '<a class="pager-next" rel="next" href="1.1-spinning.html">',
+        'href="https://example.org/repo/edit/main/content/lessons/0.1-falling.md"',
+        '<a href="0.1-falling.zip" download>',
+        '<a href="../files/lessons/data.csv">a file</a>',
+        '<img src="../files/img/s.svg" alt="a sketch">',
+        '<li id="fn:1">',
+    ):
+        assert part in page, part
+    assert "pager-previous" not in page
+
+
+def test_a_docked_lab_stands_beside_its_paragraphs_in_reading_order(site: dict[str, bytes]) -> None:
+    page = pages(site)["lessons/0.1-falling.html"]
+    dock = page.split('<div class="dock">')[1]
+    before, rest = dock.split('<div class="dock-lab">')
+    lab, after = rest.split('<div class="dock-after">')
+    assert '<h2 id="second-part">' in before
+    assert "Docked" in lab
+    assert after.startswith("\n<p>After.</p>\n</div>")
+
+
+def test_a_planned_lesson_says_so_and_what_can_be_read(site: dict[str, bytes]) -> None:
+    page = pages(site)["lessons/1.2-later.html"]
+    assert "This lesson is planned and not written yet." in page
+    assert "<li>1 minute</li>" in page
+    assert '<a href="0.1-falling.html">0.1 Falling</a>' in page
+    assert '<a href="1.1-spinning.html">1.1 Spinning &lt;fast&gt;</a>' in page
+
+
+def test_the_map_shows_status_minutes_and_needs(site: dict[str, bytes]) -> None:
+    home = pages(site)["index.html"]
+    assert "2 levels, 3 lessons, 2 written so far" in home
+    assert '<a class="button" href="lessons/0.1-falling.html">Start with 0.1 Falling</a>' in home
+    row = home.split('<li class="row row-planned" data-lesson="1.2">')[1].split("</li>")[0]
+    assert '<a href="lessons/1.2-later.html">Later</a>' in row
+    assert '<span class="status status-planned">Planned</span>' in row
+    assert '<span class="minutes">1 min</span>' in row
+    assert '<a href="lessons/1.1-spinning.html" title="Spinning &lt;fast&gt;">1.1</a>' in row
+
+
+def test_the_model_page(site: dict[str, bytes]) -> None:
+    page = pages(site)["models/box.html"]
+    assert "<div><dt>Total mass</dt><dd>1.5 kg</dd></div>" in page
+    assert "<div><dt>Keyframes</dt><dd>start, unnamed</dd></div>" in page
+    assert "Sites" not in page
+    assert '<a href="../lessons/0.1-falling.html">Lesson 0.1: Falling</a>' in page
+    assert "(lab, script, link)" in page
+    assert '<a href="box.xml" download>Download</a>' in page
+    assert '<span class="t">&lt;worldbody/&gt;</span>' in page
+
+
+def test_styles_in_elements_become_classes_of_the_sheet(make: Make) -> None:
+    made = make('Text.\n\n<p style="color: red">x</p>\n')
+    site = made.site(options())
+    page = pages(site)["lessons/0.1-falling.html"]
+    (name,) = re.findall(r'<p class="(s[0-9a-f]{7})">x</p>', page)
+    (sheet,) = (data.decode() for path, data in site.items() if path.endswith(".css"))
+    assert sheet.endswith(f".{name}{{color: red}}\n")
+
+
+def test_a_draft_lesson_is_shown_as_one(site: dict[str, bytes]) -> None:
+    assert '<li class="status status-draft"' in pages(site)["lessons/1.1-spinning.html"]

@@ -1,0 +1,61 @@
+"""The interface's words: complete, and all of them used."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.pages import Assets
+from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.strings import parse_strings
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_texts_have_values_plural_forms_and_a_language_to_fall_back_on() -> None:
+    english = parse_strings(
+        '[a]\nb = "B {x}"\nc = "C"\n[a.n]\none = "{n} thing"\nother = "{n} things"\n'
+    )
+    german = parse_strings('[a]\nb = "B: {x}"\n', english)
+    assert (german("a.b", x="<i>"), german("a.c")) == ("B: <i>", "C")
+    assert (english("a.n", n=1), english("a.n", n=0)) == ("1 thing", "0 things")
+    with pytest.raises(KeyError, match=r"a\.z"):
+        english("a.z")
+
+
+def test_a_language_without_a_file_is_english(assets: Assets) -> None:
+    unknown, english = (strings_for(assets.templates, name) for name in ("xx", "en"))
+    assert unknown.entries == english.entries
+
+
+def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None:
+    templates = (
+        *assets.templates,
+        ("strings/pt.toml", '[site]\nmap = "Mapa"\nmenu = "Menu"\n'),
+        ("strings/pt-BR.toml", '[site]\nmenu = "Cardápio"\n'),
+    )
+    words = strings_for(templates, "pt-BR")
+    assert (words("site.map"), words("site.menu")) == ("Mapa", "Cardápio")
+    assert words("code.copy") == "Copy"
+
+
+def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Assets) -> None:
+    """Keys that are put together at run time are named here by their beginning."""
+    made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
+    made += ("lab.live.", "measured.reference_", "numerics.case_")
+    text = "".join(text for path, text in assets.templates if path.endswith(".html"))
+    modules = (ROOT / "coursebuild" / "core" / "pages").rglob("*.py")
+    text += "".join(path.read_text() for path in sorted(modules))
+    scripts = "".join(p.read_text() for p in sorted((ROOT / "site" / "js").rglob("*.js")))
+    words = strings_for(assets.templates, "en")
+    known = {re.sub(r"\.(one|other)$", "", key) for key in words.keys}
+    quoted = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
+    asked = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
+    assert asked - known == {key for key in asked if key.endswith(".")}
+    quoted |= set(re.findall(r"""["'`]([a-z]+\.[a-z_.]+)["'`]""", scripts))
+    unused = {key for key in known - quoted if not key.startswith(made)}
+    # Keys of tables are put together from the table's name and words that are looked up in it.
+    said = set(re.findall(r"[a-z]+", text + scripts))
+    assert {key for key in unused if not set(re.split(r"[._]", key)) <= said} == set()

@@ -1,0 +1,123 @@
+"""The symbols of formulas, as the eye reads them, from what the typesetter makes of TeX."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model.results import Formula
+from coursebuild.core.pages.lookup.symbols import only_symbol, sort_key, symbols
+from coursebuild.core.run.v8 import MathEngine
+
+Typeset = Callable[[str], str]
+
+
+@pytest.fixture(scope="module")
+def typeset() -> Iterator[Typeset]:
+    engine = MathEngine()
+
+    def make(tex: str) -> str:
+        found = engine.typeset([Formula(tex, False)])[0]
+        assert isinstance(found, str), found
+        return found
+
+    yield make
+    engine.close()
+
+
+def read(mathml: str) -> list[str]:
+    """Symbols as text: what stands in each, indices after `_`, the rest after `^`."""
+    return [shown(symbol) for symbol in symbols(mathml)]
+
+
+def shown(symbol: str) -> str:
+    base = r"(<mover>.*?</mover>|<mi[ >].*?</mi>)"
+    text = re.sub(rf"<msub(?:sup)?>{base}", r"\1_", symbol)
+    text = re.sub(rf"<msup>{base}", r"\1^", text)
+    return re.sub(r"<[^>]*>", "", text)
+
+
+@pytest.mark.parametrize(
+    ("tex", "expected"),
+    [
+        (r"\omega", ["ω"]),
+        (r"I_{zz}", ["I_zz"]),
+        (r"\dot q", ["q˙"]),
+        (r"\ddot\omega_1", ["ω¨_1"]),
+        (r"\mathbf{R}\,\boldsymbol\omega", ["𝐑", "𝝎"]),
+        (r"R \ne \mathbf R \ne \mathcal R", ["R", "𝐑", "ℛ"]),
+        (r"\hat{\mathbf n}^\top \vec v", ["𝐧ˆ", "v→"]),
+        (r"x_1^2 + x_1^3 + x_2", ["x_1", "x_2"]),
+        (r"A^{-1} B^T C^\top D^\mathsf{T}", ["A", "B", "C", "D"]),
+        (r"x^* + x' + x'' + x^+ + x^{\text{ref}}", ["x^∗", "x^′", "x^′′", "x^+", "x^ref"]),
+        (r"v_\text{max} + v_{\mathrm{cm}} + x_{\max}", ["v_max", "v_cm", "x_max"]),
+        (r"q_{k+1} - q_k", ["q", "q_k"]),
+        (r"e^{\sigma t}", ["e", "σ", "t"]),
+        (r"\int_0^T f(x)\,\mathrm dx", ["T", "f", "x"]),
+        (r"\sum_{i=1}^n m_i", ["i", "n", "m_i"]),
+        (r"\sin\theta + \operatorname{Re} z", ["θ", "z"]),
+        (r"9.81\ \mathrm{m\,s^{-2}}", []),
+        (r"\frac{\partial f}{\partial x} + \nabla g", ["f", "x", "g"]),
+        (r"\mathbb R^3", []),
+        (r"\lim_{h\to 0} \frac1h", ["h"]),
+        (r"\sqrt{\ell}\,\hbar", ["ℓ", "ℏ"]),
+        (r"\begin{pmatrix} a & b \\ c & d\end{pmatrix}", ["a", "b", "c", "d"]),
+        (r"a / b \text{ if } c", ["a", "b", "c"]),
+        (r"\underbrace{F}_{\text{force}}", ["F"]),
+        (r"1 + 2", []),
+    ],
+)
+def test_the_symbols_of_a_formula(typeset: Typeset, tex: str, expected: list[str]) -> None:
+    assert read(typeset(tex)) == expected
+
+
+def test_the_same_symbol_in_other_surroundings_is_the_same(typeset: Typeset) -> None:
+    alone = symbols(typeset(r"\dot q_1"))
+    assert len(alone) == 1
+    for tex in (r"-\dot q_1", r"\dot{q}_{1}^2", r"\tfrac12 m\dot q_1", r"e^{\dot q_1}"):
+        assert alone[0] in symbols(typeset(tex)), tex
+
+
+@pytest.mark.parametrize(
+    ("tex", "single"),
+    [
+        (r"\omega", True),
+        (r"\mathbf c_k", True),
+        (r"\mathrm{Re}", True),
+        (r"\mathit{St}", True),
+        (r"x^*", True),
+        (r"I_{zz}", True),
+        (r"\Delta", True),
+        (r"mg", False),
+        (r"v^2", False),
+        (r"A^\top", False),
+        (r"I = 1", False),
+        (r"1", False),
+        (r"\frac ab", False),
+        (r"", False),
+    ],
+)
+def test_what_is_a_single_symbol(typeset: Typeset, tex: str, single: bool) -> None:
+    assert (only_symbol(typeset(tex) if tex else "<math></math>") is not None) is single
+
+
+def test_a_declared_symbol_is_the_one_that_formulas_have(typeset: Typeset) -> None:
+    for tex in (r"\omega", r"\mathbf c_k", r"x^*", r"\tilde I_{xy}", r"\Omega", r"\ell"):
+        assert symbols(typeset(f"1 + {tex}")) == (only_symbol(typeset(tex)),)
+
+
+def test_latin_comes_first_then_greek_each_letter_with_its_kin(typeset: Typeset) -> None:
+    tex = [r"\omega", r"\mathbf b", "B", "b", r"\alpha", r"b_1", "a", r"\dot a", r"\ell", "m"]
+    made = sorted((symbols(typeset(one))[0] for one in tex), key=sort_key)
+    assert [shown(one) for one in made] == ["a", "a˙", "B", "b", "b_1", "𝐛", "ℓ", "m", "α", "ω"]
+
+
+@given(st.text())
+def test_any_text_can_be_looked_through_for_symbols(text: str) -> None:
+    assert symbols(text) == () or text.startswith("<")
+    symbols(f"<math><mi>{text}</mi></math>")
+    sort_key(text)

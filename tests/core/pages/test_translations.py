@@ -1,0 +1,98 @@
+"""Translations of the interface: complete, with the same values, and forms for their numbers."""
+
+from __future__ import annotations
+
+import string
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.plurals import CATEGORIES, category
+from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, parse_strings
+
+FOLDER = Path(__file__).parents[3] / "templates" / "strings"
+LANGUAGES = sorted(p.stem for p in FOLDER.glob("*.toml") if p.stem != DEFAULT_LANGUAGE)
+FORMS = {
+    "ar": "zero one two few many other",
+    "de": "one other",
+    "en": "one other",
+    "es": "one many other",
+    "fr": "one many other",
+}
+"""The forms that numbers of things take in a language."""
+PROMISES = {f"promise.{kind.name}" for kind in CALLOUTS}
+"""What only translations have: in English the vocabulary itself says it."""
+
+
+def entries(language: str) -> dict[str, str]:
+    return dict(parse_strings((FOLDER / f"{language}.toml").read_text("utf-8")).entries)
+
+
+def with_forms(table: dict[str, str]) -> dict[str, dict[str, str]]:
+    """Texts by key, each with its forms; of one without them the only one is nameless."""
+    found: dict[str, dict[str, str]] = {}
+    for key, text in table.items():
+        stem, _, form = key.rpartition(".")
+        if form in CATEGORIES and f"{stem}.other" in table:
+            found.setdefault(stem, {})[form] = text
+        else:
+            found[key] = {"": text}
+    return found
+
+
+def places(text: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name}
+
+
+def test_every_translation_has_its_plural_forms_listed_here() -> None:
+    assert {*LANGUAGES, "en"} == {*FORMS}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_translation_is_complete(language: str) -> None:
+    ours, theirs = with_forms(entries(DEFAULT_LANGUAGE)), with_forms(entries(language))
+    assert sorted(ours.keys() - theirs.keys()) == [], "missing"
+    assert sorted(theirs.keys() - ours.keys() - PROMISES) == [], "too many"
+    assert {key for key in theirs if key.startswith("promise.")} == PROMISES
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_text_has_the_same_values_in_every_language(language: str) -> None:
+    """A form for a single number may say it in words."""
+    ours, theirs = with_forms(entries(DEFAULT_LANGUAGE)), with_forms(entries(language))
+    for key in ours.keys() & theirs.keys():
+        wanted = set().union(*map(places, ours[key].values()))
+        assert set().union(*map(places, theirs[key].values())) == wanted, key
+        for form, text in theirs[key].items():
+            said = {"n"} if form in ("zero", "one", "two") else set()
+            assert wanted - places(text) <= said, f"{key}.{form}"
+
+
+@pytest.mark.parametrize("language", [*LANGUAGES, "en"])
+def test_a_text_has_the_forms_of_its_language(language: str) -> None:
+    for key, forms in with_forms(entries(language)).items():
+        assert [*forms] in ([""], sorted(FORMS[language].split())), key
+
+
+@pytest.mark.parametrize("language", [*LANGUAGES, "en"])
+def test_the_plural_forms_of_a_language_are_those_that_numbers_take(language: str) -> None:
+    taken = {category(language, n) for n in (*range(200), 10**6)}
+    assert taken == {*FORMS[language].split()}
+
+
+@pytest.mark.parametrize("language", [*LANGUAGES, "en"])
+def test_no_text_is_empty_or_in_want_of_a_space(language: str) -> None:
+    for key, text in entries(language).items():
+        assert text.strip(), key
+        assert text == text.strip() or key == "zip.readme", key
+        assert "  " not in text or key == "zip.readme", key
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_file_says_nothing_twice_and_is_plain(language: str) -> None:
+    text = (FOLDER / f"{language}.toml").read_text("utf-8")
+    assert tomllib.loads(text)
+    forbidden = set("\u200b\u2066\u2067\u2068\u2069\u202a\u202b\u202c\u202d\u202e\ufeff")
+    assert not forbidden & set(text), "direction is a matter of the pages"

@@ -1,0 +1,153 @@
+"""Archives of scripts: complete, exact versions, the same bytes, and what is in them runs."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model import MjcfModel
+from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
+from coursebuild.core.pages import Package, SiteOptions, Surroundings, imported_modules
+from coursebuild.core.pages.zips import imports
+from coursebuild.core.text.source import Source
+from support.rendered_course import Make
+
+ONE = """```python file=examples/one.py
+import json, sys
+import numpy as np
+import helper
+from mjcourse import model_path
+print(model_path("arm"))
+```
+"""
+TWO = """```python file=examples/helper.py
+import yaml.nodes
+VALUE = 1
+```
+
+```python file=examples/three.py
+import torch
+```
+"""
+
+AROUND = Surroundings(
+    packages=(Package("numpy", "numpy", "2.4.6"), Package("yaml", "PyYAML", "6.0.3")),
+    library=(OutputFile("mjcourse/__init__.py", b"import mujoco\n"),),
+    model_files=(OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),),
+)
+
+
+@pytest.fixture
+def made(make: Make) -> Any:
+    found = make(ONE, **{"1.1": TWO})
+    facts = ModelFacts(1, 1, 0, 0, 0, 0, 0.002, "Euler", 1.0, (), (), (),
+                       ("models/part.xml", "models/meshes/hand.obj"))  # fmt: skip
+    models = tuple(
+        MjcfModel(name, Source(f"models/{name}.xml", f"<mujoco model='{name}'/>\n"))
+        for name in ("arm", "part", "box")
+    )
+    results = replace(found.results, models=(("arm", CompileResult("", None, facts)),))
+    return replace(found, course=replace(found.course, models=models), results=results)
+
+
+def archives(made: Any) -> dict[str, zipfile.ZipFile]:
+    site = made.site(SiteOptions(around=AROUND, subset=lambda job: job.data))
+    return {
+        path: zipfile.ZipFile(io.BytesIO(data))
+        for path, data in site.items()
+        if path.endswith(".zip")
+    }
+
+
+def test_the_course_archive_has_scripts_models_library_and_requirements(made: Any) -> None:
+    archive = archives(made)["examples.zip"]
+    assert archive.namelist() == [
+        "bodies-axes/README.md",
+        "bodies-axes/examples/helper.py",
+        "bodies-axes/examples/mjcourse/__init__.py",
+        "bodies-axes/examples/one.py",
+        "bodies-axes/examples/three.py",
+        "bodies-axes/models/arm.xml",
+        "bodies-axes/models/meshes/hand.obj",
+        "bodies-axes/models/part.xml",
+        "bodies-axes/requirements.txt",
+    ]
+    assert archive.read("bodies-axes/requirements.txt").decode() == (
+        "PyYAML==6.0.3\nmujoco==3.14.0\nnumpy==2.4.6\ntorch\n"
+    )
+    readme = archive.read("bodies-axes/README.md").decode()
+    assert readme.startswith("# Bodies & <axes>: scripts\n")
+    assert "python examples/one.py\n" in readme
+
+
+def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
+    found = archives(made)
+    names = found["lessons/0.1-falling.zip"].namelist()
+    assert "0.1-falling/examples/helper.py" in names
+    assert "0.1-falling/examples/three.py" not in names
+    other = found["lessons/1.1-spinning.zip"]
+    assert [name for name in other.namelist() if "models" in name or "mjcourse" in name] == []
+    assert other.read("1.1-spinning/requirements.txt") == b"PyYAML==6.0.3\ntorch\n"
+
+
+def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
+    options = SiteOptions(around=AROUND, subset=lambda job: job.data)
+    one, two = made.site(options), made.site(options)
+    assert one["examples.zip"] == two["examples.zip"]
+    for archive in archives(made).values():
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert {entry.external_attr >> 16 for entry in archive.infolist()} == {0o100644}
+        assert archive.testzip() is None
+
+
+@pytest.mark.site
+@pytest.mark.parametrize(
+    "load",
+    ['model_path("box")', '(lambda name: model_path(name))("box")'],
+    ids=["named", "handed on"],
+)
+def test_an_unpacked_script_finds_its_library_and_its_models(
+    make: Make, tmp_path: Path, load: str
+) -> None:
+    root = Path(__file__).parents[3]
+    library = tuple(
+        OutputFile(path.relative_to(root).as_posix(), path.read_bytes())
+        for path in sorted((root / "mjcourse").rglob("*.py"))
+    )
+    text = f"""```python file=examples/a.py
+from mjcourse import model_path, spatial
+print({load}.read_text().strip().splitlines()[0], spatial.__name__)
+```
+"""
+    site = make(text).site(
+        SiteOptions(around=Surroundings(library=library), subset=lambda job: job.data)
+    )
+    zipfile.ZipFile(io.BytesIO(site["examples.zip"])).extractall(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", RUNNER],
+        cwd=tmp_path / "bodies-axes",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ('<mujoco model="box"> mjcourse.spatial\n', "")
+
+
+RUNNER = """
+import runpy, sys
+sys.path[:0] = ["examples"]
+runpy.run_path("examples/a.py", run_name="__main__")
+"""
+
+
+def test_what_scripts_import_from_others(made: Any) -> None:
+    assert imported_modules(made.course, AROUND.library) == ("mujoco", "numpy", "torch", "yaml")
+    assert imports("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
+    assert imports("import (\n") == frozenset()

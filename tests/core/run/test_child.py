@@ -1,0 +1,173 @@
+"""A child that answers lines: it crashes, hangs, dies, says too much, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.child import JsonChild
+from support.runners import SOURCE_TREE, alive, gone, wait_until
+
+pytestmark = pytest.mark.site
+
+SERVE = """\
+import json, os, signal, sys
+print("ready", flush=True)
+for line in sys.stdin:
+    request = json.loads(line)
+    if isinstance(request, dict) and "do" in request:
+        exec(request["do"])
+    print(json.dumps({"got": request, "pid": os.getpid(), "cwd": os.getcwd()}), flush=True)
+"""
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files."""
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def make(
+    tmp_path: Path, text: str = SERVE, seconds: float = 120.0, patience: float = 10.0
+) -> JsonChild:
+    script = tmp_path / "worker.py"
+    script.write_text(text)
+    return JsonChild(str(script), seconds, patience=patience)
+
+
+def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
+    with make(tmp_path) as one:
+        assert list(temporary.iterdir()) == [], "nothing before it is asked"
+        asked = [None, [1.5, "ü\n\u2028"], {"a": True}, "x" * 3_000_000]
+        replies = [one.ask(question) for question in asked]
+        assert [reply["got"] for reply in replies] == asked
+        pids = {reply["pid"] for reply in replies}
+        assert len(pids) == 1
+        assert Path(replies[0]["cwd"]).parent == temporary
+    assert list(temporary.iterdir()) == []
+    assert not alive(pids.pop())
+
+
+def test_a_child_that_was_never_asked(tmp_path: Path, temporary: Path) -> None:
+    with make(tmp_path):
+        pass
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("act", "told"),
+    [
+        ("os.kill(os.getpid(), signal.SIGSEGV)", "crashed (SIGSEGV)"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", "crashed (SIGKILL)"),
+        ("os.abort()", "crashed (SIGABRT)"),
+        ("os._exit(3)", "ended with status 3"),
+        ("raise SystemExit(0)", "ended with status 0"),
+        ("raise ValueError", "ended with status 1"),
+        ("signal.setitimer(signal.ITIMER_PROF, 0.01)\nwhile True: pass", "took longer than 120 s"),
+        ("os.close(1); signal.pause()", "took longer than 120 s"),
+        ("os.write(1, b'half a line'); os._exit(4)", "ended with status 4"),
+    ],
+)
+def test_a_child_that_dies_is_started_again(
+    tmp_path: Path, temporary: Path, act: str, told: str
+) -> None:
+    with make(tmp_path) as one:
+        before = one.ask(1)["pid"]
+        assert one.ask({"do": act}) is None
+        assert one.death() == told
+        assert not alive(before)
+        reply = one.ask(2)
+        assert reply["got"] == 2 and reply["pid"] != before
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize("act", ["os.kill(os.getpid(), signal.SIGSTOP)", "signal.pause()"])
+def test_a_child_that_hangs(tmp_path: Path, act: str) -> None:
+    with make(tmp_path, seconds=0.02) as one:
+        assert one.ask({"do": act}) is None
+        assert one.death() == "took longer than 0.02 s"
+        answers = (one.ask(1) for _ in range(100))  # a slow machine may take a little too long
+        assert next(answer for answer in answers if answer is not None)["got"] == 1
+
+
+def test_what_it_prints_beside_its_answers_fills_no_pipe(tmp_path: Path) -> None:
+    with make(tmp_path) as one:
+        act = "sys.stderr.write('x' * 1_000_000); sys.stderr.flush()"
+        assert one.ask({"do": act})["got"] == {"do": act}
+
+
+def test_one_that_does_not_start(tmp_path: Path, temporary: Path) -> None:
+    text = "import sys\nprint('first', file=sys.stderr)\nraise ImportError('no library x')\n"
+    with make(tmp_path, text) as one:
+        with pytest.raises(EffectError) as caught:
+            one.ask(1)
+        assert caught.value.message == "MuJoCo cannot be loaded: ImportError: no library x"
+        with pytest.raises(EffectError):
+            one.ask(1)
+    with (
+        make(tmp_path, "import os\nos.abort()\n") as one,
+        pytest.raises(EffectError, match="the import crashed"),
+    ):
+        one.ask(1)
+    assert list(temporary.iterdir()) == []
+
+
+def test_one_that_says_something_else_first(tmp_path: Path) -> None:
+    with make(tmp_path, "print('hello', flush=True)\ninput()\n") as one, pytest.raises(EffectError):
+        one.ask(1)
+
+
+def test_an_exception_leaves_nothing(tmp_path: Path, temporary: Path) -> None:
+    with pytest.raises(ZeroDivisionError), make(tmp_path) as one:
+        pid = one.ask(1)["pid"]
+        raise ZeroDivisionError
+    assert not alive(pid)
+    assert list(temporary.iterdir()) == []
+
+
+def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> None:
+    mark = tmp_path / "asked"
+
+    def interrupt() -> None:
+        wait_until(mark.exists, "the question")
+        one.interrupt()
+
+    with make(tmp_path) as one:
+        one.ask(1)
+        threading.Thread(target=interrupt, daemon=True).start()
+        assert one.ask({"do": f"open({str(mark)!r}, 'w').close(); signal.pause()"}) is None
+        assert one.death() == "crashed (SIGKILL)", "nobody waited until its time was over"
+        with pytest.raises(EffectError, match="interrupted"):
+            one.ask(2)
+    assert list(temporary.iterdir()) == []
+
+
+def test_it_ends_with_its_parent(tmp_path: Path) -> None:
+    """However that ends: the input closes."""
+    make(tmp_path)
+    code = (
+        "from coursebuild.core.run.child import JsonChild\n"
+        f"one = JsonChild({str(tmp_path / 'worker.py')!r}, 120.0)\n"
+        "print(one.ask(1)['pid'], flush=True)\n"
+        "import signal; signal.pause()\n"
+    )
+    env = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=SOURCE_TREE, env=env
+    ) as parent:
+        assert parent.stdout is not None
+        pid = int(parent.stdout.readline())
+        assert alive(pid)
+        os.kill(parent.pid, signal.SIGKILL)
+    assert gone(pid)

@@ -1,0 +1,37 @@
+"""Which versions and distributions `check --against` takes."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.core.files.errors import UsageError
+from coursebuild.core.run.environments import needed, other_version
+from coursebuild.core.run.versions import engine_version
+
+
+@pytest.mark.parametrize(
+    "text", ["", "abc", "3..1", "v3.1", "3.1 ", "==3.1", "3.1; x", "-e", "٣.١"]
+)
+def test_what_is_no_version(text: str) -> None:
+    with pytest.raises(UsageError) as told:
+        other_version(text)
+    assert str(told.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
+
+
+def test_the_version_of_here_is_no_other() -> None:
+    with pytest.raises(UsageError) as told:
+        other_version(engine_version())
+    said = f"--against: MuJoCo {engine_version()} is the version installed here"
+    assert str(told.value) == said
+    assert other_version("3.99") == "3.99"
+
+
+def test_the_version_of_here_written_in_another_way_is_no_other() -> None:
+    for text in (f"{engine_version()}.0", f"{engine_version()}.0.0".removesuffix(".0")):
+        with pytest.raises(UsageError, match="is the version installed here"):
+            other_version(text)
+
+
+def test_which_distributions_modules_come_from() -> None:
+    states = ["Some.Tool 1.2", "native 3.0rc1, other_part 4", "files 0123abcd", "", "mujoco 3.1"]
+    assert needed(states) == {"some-tool": "1.2", "native": "3.0rc1", "other-part": "4"}

@@ -1,0 +1,301 @@
+"""The browser's engine in this process: what hangs, eats memory or breaks it is told, and goes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run import lab_engine, lab_files
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.lab_files import engine_digest
+from coursebuild.core.run.v8 import StoppedError
+from coursebuild.core.run.versions import engine_version
+from support.lab_values import BALL, Bench, make_lab, request
+from support.runners import computed, wait_until
+
+pytestmark = pytest.mark.engine
+
+LOOP = "for (;;) ;"
+SLIDER = {"label": "a", "min": 0, "max": 1, "value": 0}
+ENDLESS = "(() => { for (;;) ; })()"
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(tmp_path)
+    with bench.browser, bench.native:
+        yield bench
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """Both engines, for tests whose last trial is a good one."""
+    bench = Bench(tmp_path_factory.mktemp("shared"))
+    with bench.browser, bench.native:
+        yield bench
+
+
+def told(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
+    return [(tuple(f["entry"]), f["kind"], f["message"]) for f in reply["failures"]]
+
+
+def test_the_same_trial_gives_the_same_reply(shared: Bench) -> None:
+    first = shared.trial(make_lab())
+    assert (first["version"], told(first)) == (engine_version(), [])
+    again = shared.trial(make_lab())
+    assert {**first, "stepsPerSecond": 0} == {**again, "stepsPerSecond": 0}
+
+
+@pytest.mark.parametrize(
+    ("fields", "entry"),
+    [
+        ({"setup": LOOP}, ("setup",)),
+        ({"controller": f"if (sim.time > 0.05) {LOOP}"}, ("controller",)),
+        ({"readouts": [{"label": "r", "expr": ENDLESS}]}, ("readouts", 0, "expr")),
+        (
+            {"plots": [{"ylabel": "y", "traces": [{"label": "t", "expr": ENDLESS}]}]},
+            ("plots", 0, "traces", 0, "expr"),
+        ),
+        (
+            {
+                "controls": [
+                    {"type": "button", "label": "a", "run": "ctx.a = 1"},
+                    {"type": "button", "label": "b", "run": LOOP},
+                ]
+            },
+            ("controls", 1, "run"),
+        ),
+        (
+            {"controls": [{**SLIDER, "apply": f"if (value === 1) {LOOP}"}]},
+            ("controls", 0),
+        ),
+        ({"expect": [{"t": 0.1, "expr": ENDLESS, "min": 0}]}, ("expect", 0, "expr")),
+    ],
+)
+def test_an_endless_loop_is_told_at_its_entry_and_the_next_lab_is_tried(
+    shared: Bench, fields: dict[str, Any], entry: tuple[Any, ...]
+) -> None:
+    reply = shared.trial(make_lab(**fields), seconds=3.0)
+    assert told(reply) == [(entry, "timeout", "ran for more than 3 s")]
+    assert (reply["main"], reply["version"]) == (None, engine_version())
+    assert told(shared.trial(make_lab())) == []
+
+
+def test_a_lab_that_simulates_too_much_is_told_from_an_endless_loop(shared: Bench) -> None:
+    lab = make_lab(controller="ctx.n = 0", verify={"seconds": 100_000})
+    assert told(shared.trial(lab, seconds=1.0)) == [((), "timeout", "did not finish in time")]
+    assert told(shared.trial(make_lab())) == []
+
+
+def test_memory_that_runs_out_takes_no_other_lab_along(
+    tmp_path: Path,
+) -> None:
+    eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
+    bench = Bench(tmp_path, LabEngine(memory=160 << 20))
+    with bench.browser, bench.native:
+        reply = bench.trial(make_lab(setup=eat))
+        assert told(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
+        assert told(bench.trial(make_lab())) == []
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "ctx.all = []; for (;;) ctx.all.push(new mj.DoubleBuffer(5000000))",
+        "ctx.all = []; for (;;) ctx.all.push(new ArrayBuffer(100000000))",
+        "(function f() { return f() + 1 })()",
+        "ctx.s = 'x'; for (;;) ctx.s += ctx.s",
+        "throw null",
+        "throw {toString() { throw 1 }}",
+        "Promise.reject(1); null.x",
+        "mj.MjModel.from_xml_string('<mujoco')",
+        "model.delete()",
+    ],
+)
+def test_what_lab_code_may_do_to_the_engine(shared: Bench, code: str) -> None:
+    reply = shared.trial(make_lab(setup=code), seconds=300.0)
+    assert reply["main"] is None
+    assert {kind for _, kind, _ in told_kinds(reply)} <= {"throws", "engine"}
+    assert told(shared.trial(make_lab())) == []
+
+
+def told_kinds(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
+    assert reply["failures"]
+    return [(f["entry"], f["kind"], f.get("message", "")) for f in reply["failures"]]
+
+
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        ("JSON.stringify = null", "`JSON.stringify`"),
+        ("Array.prototype.first = () => 0; null.x", "`Array.prototype.first`"),
+        ("Float64Array.prototype.__proto__.set = () => {}", None),
+        ("globalThis.count = 1", "`count`"),
+        ("[][Symbol.iterator]().__proto__.next = null", "`the iterators of arrays.next`"),
+        ("Object.freeze(Math)", None),
+        ("Reflect.ownKeys = Map.prototype.get = Map.prototype.has = null", None),
+        ("mj.mj_step = () => {}", "`mj.mj_step`"),
+        ("globalThis.trial = null", "`trial`"),
+    ],
+)
+def test_code_that_changes_what_all_share(shared: Bench, code: str, names: str | None) -> None:
+    first = shared.trial(make_lab(setup=code))
+    ((entry, kind, message),) = told(first)
+    assert (entry, kind) == (("setup",), "shared")
+    assert names is None or message == names
+    ordinary = make_lab(
+        setup="data.qvel.set([1], 0)",
+        readouts=[{"label": "r", "expr": "`${typeof count} ${data.qvel[0]}`"}],
+    )
+    reply = shared.trial(ordinary)
+    assert told(reply) == []
+    assert reply["main"]["pictures"][0]["readouts"] == ["undefined 1"]
+
+
+def test_a_lab_that_keeps_to_itself_keeps_the_engine(shared: Bench) -> None:
+    lab = make_lab(
+        setup="ctx.list = [3, 1].sort(); ctx.big = new mj.DoubleBuffer(1 << 22); ctx.big.delete()",
+        readouts=[{"label": "r", "expr": "`${/a(b)/.test('ab')} ${new Map([[1, 2]]).get(1)}`"}],
+        overlays=["frames", "contacts"],
+    )
+    assert told(shared.trial(lab)) == []
+    assert told(shared.trial(lab)) == []
+
+
+def test_a_lab_sets_no_timers(shared: Bench) -> None:
+    for code in ("setTimeout(() => {}, 10)", "ctx.later = setTimeout(() => {})"):
+        ((entry, kind, message),) = told(shared.trial(make_lab(setup=code)))
+        assert (entry, kind) == (("setup",), "throws")
+        assert message == "Error: a lab sets no timers: they would ring in the next one"
+    assert told(shared.trial(make_lab(setup="ctx.can = typeof setTimeout"))) == []
+
+
+def test_a_model_that_the_engine_does_not_take(shared: Bench) -> None:
+    reply = shared.browser.trial(request(make_lab()), b"no model at all" * 100, 120.0)
+    assert [kind for _, kind, _ in told(reply)] == ["engine"]
+    assert told(shared.trial(make_lab())) == []
+
+
+def test_it_can_be_closed_and_used_again(bench: Bench) -> None:
+    assert told(bench.trial(make_lab())) == []
+    bench.browser.close()
+    bench.browser.close()
+    assert told(bench.trial(make_lab())) == []
+
+
+def test_stopped_from_another_thread(bench: Bench) -> None:
+    timer = threading.Timer(0.5, bench.browser.stop)
+    mjb = bench.native.save("models/x.xml", BALL)
+    bench.browser.mistakes([])
+    timer.start()
+    with pytest.raises(StoppedError):
+        bench.browser.trial(request(make_lab(setup=LOOP)), mjb, 600.0)
+    with pytest.raises(StoppedError):
+        bench.browser.trial(request(make_lab()), mjb, 60.0)
+    bench.browser.close()
+
+
+def test_stopped_before_it_began(bench: Bench) -> None:
+    bench.browser.stop()
+    with pytest.raises(StoppedError):
+        bench.browser.mistakes([])
+
+
+def test_an_interrupt_ends_a_trial_and_the_process() -> None:
+    code = (
+        "import sys; sys.path.insert(0, 'tests')\n"
+        "from pathlib import Path\n"
+        "from support.lab_values import *\n"
+        "bench = Bench(Path('.'))\n"
+        "with bench.native, bench.browser:\n"
+        "    bench.browser.mistakes([])\n"
+        "    mjb = bench.native.save('models/x.xml', BALL)\n"
+        "    asked = request(make_lab(setup='for (;;) ;'))\n"
+        "    try:\n"
+        "        print('ready', flush=True)\n"
+        "        bench.browser.trial(asked, mjb, 600.0)\n"
+        "    except KeyboardInterrupt: print('interrupted')\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-W", "always", "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=Path(lab_engine.__file__).parents[3],
+    )
+    with process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        before = computed(process.pid)
+        wait_until(lambda: computed(process.pid) > before + 30, "the trial's loop")
+        os.kill(process.pid, signal.SIGINT)
+        said, errors = process.communicate()
+    assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
+
+
+def test_nothing_of_one_trial_is_left_for_the_next(shared: Bench) -> None:
+    shared.trial(make_lab(setup="ctx.left = 1; model.opt.timestep = 0.01; data.qpos[0] = 9"))
+    lab = make_lab(
+        readouts=[{"label": "r", "expr": "`${ctx.left} ${model.opt.timestep} ${data.qpos[0]}`"}]
+    )
+    reply = shared.trial(lab)
+    assert reply["main"]["pictures"][0]["readouts"] == ["undefined 0.002 0"]
+
+
+def test_memory_does_not_grow_from_trial_to_trial(bench: Bench) -> None:
+    """Both WebAssembly's own and the process's."""
+
+    def resident() -> int:
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+    lab = make_lab(verify={"seconds": 0.02})
+    for _ in range(10):
+        bench.trial(lab)
+    before = resident()
+    for _ in range(60):
+        bench.trial(lab)
+    assert resident() - before < 60 << 20
+
+
+def test_an_engine_that_is_damaged(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = tmp_path / "assets"
+    for name in ("mujoco/mujoco.wasm", "js/lab-trial.js"):
+        (folder / name).parent.mkdir(parents=True)
+        (folder / name).write_bytes((lab_files.assets_dir() / name).read_bytes())
+    wasm = folder / "mujoco/mujoco.wasm"
+    wasm.write_bytes(wasm.read_bytes()[:100_000])
+    with monkeypatch.context() as damaged:
+        damaged.setattr(lab_files, "assets_dir", lambda: folder)
+        with pytest.raises(EffectError, match=r"the browser.s engine does not start: .*Compile"):
+            bench.trial(make_lab())
+    assert told(bench.trial(make_lab())) == []
+
+
+def test_the_digest_is_of_what_a_trial_runs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    names = "mujoco/mujoco.wasm", "js/lab-trial.js"
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_bytes(b"1")
+    monkeypatch.setattr(lab_files, "assets_dir", lambda: tmp_path)
+    found = set()
+    for name in (None, *names):
+        if name is not None:
+            (tmp_path / name).write_bytes(b"2")
+        engine_digest.cache_clear()
+        found.add(engine_digest())
+    engine_digest.cache_clear()
+    assert len(found) == 3

@@ -1,0 +1,138 @@
+"""Versions of what is installed: distributions, loose modules, editable ones, and none."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coursebuild.core.engine.digests import Digests
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.run.packages import ABSENT, Installed, distributions
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    """A folder of installed packages, made long ago."""
+    folder = tmp_path / "site-packages"
+    folder.mkdir()
+    install(folder, "Some-Tool", "1.2", ["tool/__init__.py", "tool/part.py", "single.py"])
+    install(folder, "native", "3.0rc1", ["_fast.cpython-311-x86_64-linux-gnu.so", "space/a/x.py"])
+    install(folder, "other", "4", ["space/b/x.py"])
+    return folder
+
+
+def install(folder: Path, name: str, version: str, files: list[str]) -> None:
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    (info / "RECORD").write_text("".join(f"{file},,\n" for file in [*files, f"{info.name}/RECORD"]))
+    for file in files:
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text(f"# {name} {version}\n")
+
+
+@pytest.fixture
+def later(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = time.time_ns
+    monkeypatch.setattr(time, "time_ns", lambda: real() + 3_600_000_000_000)
+
+
+def ask(tmp_path: Path, site: Path) -> Installed:
+    store = Memo(tmp_path)
+    return Installed(store, Digests(store), [str(site)])
+
+
+def test_versions(tmp_path: Path, site: Path) -> None:
+    found = ask(tmp_path, site)
+    assert found.version("tool") == found.version("single") == "Some-Tool 1.2"
+    assert found.version("_fast") == "native 3.0rc1"
+    assert found.version("space") == "native 3.0rc1, other 4"
+    assert found.version("nothing") == ABSENT
+    assert found.version("no.such..name") == ABSENT
+
+
+def test_a_module_that_no_distribution_names_is_known_by_its_files(
+    tmp_path: Path, site: Path
+) -> None:
+    (site / "loose.py").write_text("a = 1\n")
+    (site / "folder").mkdir()
+    (site / "folder/__init__.py").write_text("")
+    (site / "folder/data.bin").write_bytes(b"1")
+    one = ask(tmp_path, site)
+    before = one.version("loose"), one.version("folder")
+    assert all(version.startswith("files ") for version in before)
+    (site / "folder/__pycache__").mkdir()
+    (site / "folder/__pycache__/x.pyc").write_bytes(b"1")
+    assert ask(tmp_path, site).version("folder") == before[1]
+    (site / "loose.py").write_text("a = 2\n")
+    (site / "folder/data.bin").write_bytes(b"2")
+    two = ask(tmp_path, site)
+    assert two.version("loose") != before[0]
+    assert two.version("folder") != before[1]
+
+
+def test_the_library_of_lessons_is_known_by_its_files(tmp_path: Path, site: Path) -> None:
+    """Its version says nothing while somebody works on it."""
+    assert ask(tmp_path, site).version("mjcourse").startswith("files ")
+
+
+@pytest.mark.usefixtures("later")
+def test_the_map_is_kept_until_something_is_installed(
+    tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scans: list[int] = []
+    real = importlib.metadata.distributions
+
+    def scan(**where: Any) -> Iterable[importlib.metadata.Distribution]:
+        scans.append(1)
+        return real(**where)
+
+    monkeypatch.setattr(importlib.metadata, "distributions", scan)
+    for _ in range(3):
+        assert ask(tmp_path, site).version("tool") == "Some-Tool 1.2"
+    assert len(scans) == 1
+    (site / "Some_Tool-1.2.dist-info/METADATA").write_text(
+        "Metadata-Version: 2.1\nName: Some-Tool\nVersion: 1.3\n"
+    )
+    (site / "Some_Tool-1.2.dist-info").rename(site / "Some_Tool-1.3.dist-info")
+    assert ask(tmp_path, site).version("tool") == "Some-Tool 1.3"
+    assert len(scans) == 2
+
+
+def test_right_after_an_installation_nothing_is_kept(
+    tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = time.time_ns()
+    monkeypatch.setattr(time, "time_ns", lambda: now)
+    ask(tmp_path, site).version("tool")
+    install(site, "fresh", "1", ["fresh.py"])
+    assert ask(tmp_path, site).version("fresh") == "fresh 1"
+    assert not (tmp_path / ".coursebuild/installed").exists()
+
+
+def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
+    user = tmp_path / "user/site-packages"
+    user.mkdir(parents=True)
+    install(user, "Some-Tool", "9", ["tool/__init__.py"])
+    store = Memo(tmp_path)
+    found = Installed(store, Digests(store), [str(user), str(site), str(tmp_path / "none")])
+    assert found.version("tool") == "Some-Tool 9"
+
+
+@pytest.mark.site
+def test_the_real_environment(tmp_path: Path) -> None:
+    store = Memo(tmp_path)
+    found = Installed(store, Digests(store))
+    assert found.version("numpy").startswith("numpy ")
+    assert found.version("mujoco").startswith("mujoco ")
+    assert found.version("os") == ABSENT, "Python's own modules are of no distribution"
+    assert os.sep not in found.version("mjcourse")
+    numpy = importlib.metadata.version("numpy")
+    asked = ("os", "numpy", "nowhere", "mjcourse")
+    assert distributions(store, asked) == (("numpy", "numpy", numpy),)

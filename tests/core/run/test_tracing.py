@@ -1,0 +1,286 @@
+"""What a script looks at is known, in a forked process and in one of its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.model.results import Outcome, Trace
+from coursebuild.core.run.runner import ScriptServer
+from support.runners import Run, both_ways, hangs, job
+
+pytestmark = pytest.mark.site
+
+Traced = Callable[..., Trace]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    root = tmp_path.resolve() / "a course"
+    for folder in ("examples", "data", "lib"):
+        (root / folder).mkdir(parents=True)
+    (root / "data/a.txt").write_text("a")
+    (root / "lib/helper.py").write_text("import other\nvalue = other.value\n")
+    (root / "lib/other.py").write_text("value = 3\n")
+    return root
+
+
+@pytest.fixture
+def traced(run: Run) -> Traced:
+    def trace_one(code: str, outcome: Outcome = Outcome.OK) -> Trace:
+        result = run(code)
+        assert result.outcome is outcome, result.stderr
+        assert result.trace is not None
+        return result.trace
+
+    return trace_one
+
+
+def own(trace: Trace) -> list[str]:
+    """Without what would have hidden one of Python's modules or an installed package's."""
+    hidden = {*sys.stdlib_module_names, *sys.builtin_module_names, *trace.modules}
+
+    def name(path: str) -> str:
+        return path.removesuffix("/__init__.py").removesuffix(".py").rpartition("/")[2]
+
+    return [path for path in trace.files if not path.endswith(".py") or name(path) not in hidden]
+
+
+class TestFiles:
+    @pytest.mark.parametrize(
+        ("code", "files"),
+        [
+            ("", []),
+            ("open('data/a.txt').read()", ["data/a.txt"]),
+            ("open(b'data/a.txt').read()", ["data/a.txt"]),
+            ("import os\nopen(os.path.abspath('data/a.txt'))", ["data/a.txt"]),
+            ("open('examples/.././data//a.txt')", ["data/a.txt"]),
+            ("import os\nos.chdir('data')\nopen('a.txt')\nopen('../x')", ["data/a.txt", "x"]),
+            ("import os\nos.chdir('data')\nopen('a.txt')\nos.chdir('..')\nopen('a.txt')", None),
+            ("from pathlib import Path\nPath('data/a.txt').read_bytes()", ["data/a.txt"]),
+            ("import os\nos.close(os.open('data/a.txt', os.O_RDONLY))", ["data/a.txt"]),
+            ("import io\nio.open_code(__file__.replace('x.py', 'y.py'))", ["examples/y.py"]),
+            ("import numpy as np\nnp.loadtxt('data/a.txt', dtype=str)", ["data/a.txt"]),
+            ("import linecache\nlinecache.getline('data/a.txt', 1)", ["data/a.txt"]),
+            ("open(__file__)", []),
+            ("open('data/ü\\udcff')", ["data/ü\udcff"]),
+            ("open('/dev/null'); open('/proc/self/stat')", []),
+            ("import os\nf = os.environ['TMPDIR'] + '/f'\nopen(f, 'w').close()\nopen(f)", []),
+            ("import tempfile\ntempfile.TemporaryFile().write(b'x')", []),
+        ],
+    )
+    def test_read(self, traced: Traced, code: str, files: list[str] | None) -> None:
+        safe = "import builtins\nreal = open\ndef tried(*a, **k):\n    try: return real(*a, **k)\n"
+        safe += "    except OSError: pass\nopen = tried\nimport io\nio.open_code = (lambda f: "
+        safe += "lambda p: tried(p))(io.open_code)\n" if "open_code" in code else "io.open_code)\n"
+        trace = traced(safe + code)
+        assert own(trace) == (["a.txt", "data/a.txt"] if files is None else files)
+        assert (trace.folders, trace.outside, trace.opaque) == ((), (), "")
+
+    def test_what_was_not_there(self, traced: Traced) -> None:
+        trace = traced("open('data/none.txt')", Outcome.FAILED)
+        assert own(trace) == ["data/none.txt"]
+
+    def test_outside(self, traced: Traced, tmp_path: Path) -> None:
+        (tmp_path / "out.txt").touch()
+        trace = traced(f"open({str(tmp_path / 'out.txt')!r})\nimport json, numpy")
+        assert trace.outside == (str(tmp_path / "out.txt"),)
+        assert (own(trace), trace.modules, trace.opaque) == ([], ("numpy",), "") or set(
+            trace.modules
+        ) >= {"numpy"}
+
+    def test_a_link_into_the_project(self, traced: Traced, root: Path, tmp_path: Path) -> None:
+        (tmp_path / "link").symlink_to(root)
+        trace = traced(f"open({str(tmp_path / 'link/data/a.txt')!r})")
+        assert (own(trace), trace.outside) == (["data/a.txt"], ())
+
+    @both_ways
+    def test_folders(self, traced: Traced) -> None:
+        trace = traced(
+            "import os, glob, pathlib\nos.listdir('data')\nos.listdir()\nglob.glob('lib/*')\n"
+            "list(pathlib.Path('examples').iterdir())\nlist(os.scandir('data'))\n"
+            "try: os.listdir('none')\nexcept OSError: pass\n"
+        )
+        assert trace.folders == (".", "data", "examples", "lib", "none")
+        assert trace.opaque == ""
+
+    @both_ways
+    @pytest.mark.parametrize("end", ["os._exit(0)", "os.abort()", "os.kill(os.getpid(), 9)"])
+    def test_it_is_known_however_the_script_ends(self, run: Run, end: str) -> None:
+        result = run(f"import os\nopen('data/a.txt')\n{end}\n")
+        assert result.trace is not None and own(result.trace) == ["data/a.txt"]
+
+    def test_time_limit(self, run: Run) -> None:
+        result = hangs(run, "open('data/a.txt')\nprint('opened', flush=True)\nwhile True: pass")
+        assert result.trace is not None and own(result.trace) == ["data/a.txt"]
+
+    def test_processes_that_it_forks(self, traced: Traced) -> None:
+        code = "import os\nfor i in range(4):\n    if os.fork() == 0:\n"
+        code += "        open(f'data/{i}', 'a+') if 0 else os.path.exists('x')\n"
+        code += "        try: open(f'data/{i}')\n        except OSError: pass\n"
+        code += "        if os.fork(): os.wait()\n        else:\n"
+        code += (
+            "            try: open(f'data/{i}-inner')\n            except OSError: os._exit(0)\n"
+        )
+        code += "        os._exit(0)\nfor i in range(4): os.wait()\n"
+        expected = sorted(f"data/{i}{end}" for i in range(4) for end in ("", "-inner"))
+        assert own(traced(code)) == expected
+
+    def test_thousands_are_known_and_what_is_too_much_is_said(self, traced: Traced) -> None:
+        code = "for i in range({}):\n    try: open(f'data/{{i}}-with-a-long-name')\n"
+        code += "    except OSError: pass\n"
+        trace = traced(code.format(5_000))
+        assert (len(own(trace)), trace.opaque) == (5_000, "")
+        assert traced(code.format(40_000)).opaque == "it opens too many files to keep track of"
+
+
+class TestImports:
+    @both_ways
+    def test_a_sibling(self, traced: Traced, root: Path) -> None:
+        (root / "examples/sibling.py").write_text("value = 1")
+        (root / "examples/pack").mkdir()
+        (root / "examples/pack/__init__.py").touch()
+        (root / "examples/pack/inner.py").touch()
+        trace = traced("import sibling\nfrom pack import inner")
+        assert own(trace) == [
+            "examples/pack.py" if False else "examples/pack/__init__.py",
+            "examples/pack/inner.py",
+            "examples/pack/inner/__init__.py",
+            "examples/sibling.py",
+            "examples/sibling/__init__.py",
+        ]
+        assert (trace.folders, trace.modules) == ((), ())
+
+    def test_a_cached_module_counts_as_its_source(self, traced: Traced, root: Path) -> None:
+        (root / "examples/sibling.py").write_text("value = 1")
+        code = "import py_compile\npy_compile.compile(__file__.replace('x.py', 'sibling.py'))"
+        assert "it writes files of the project" in traced(code).opaque
+        assert list(root.glob("examples/__pycache__/*.pyc"))
+        trace = traced("import sibling")
+        assert own(trace) == ["examples/sibling.py", "examples/sibling/__init__.py"]
+
+    def test_a_path_that_it_adds(self, traced: Traced) -> None:
+        trace = traced("import sys\nsys.path.insert(0, 'lib')\nimport helper")
+        assert {"lib/helper.py", "lib/other.py", "lib/other/__init__.py"} <= set(trace.files)
+        assert trace.modules == ()
+
+    def test_what_could_hide_a_module(self, traced: Traced) -> None:
+        trace = traced("import json\nimport numpy.linalg\nimport sys")
+        for name in ("json", "numpy", "functools", "inspect"):
+            assert f"examples/{name}.py" in trace.files
+            assert f"examples/{name}/__init__.py" in trace.files
+        assert "examples/sys.py" not in trace.files
+        assert "numpy" in trace.modules and "json" not in trace.modules
+
+    def test_what_is_not_installed(self, traced: Traced) -> None:
+        trace = traced("try: import no_such_module\nexcept ImportError: pass")
+        assert trace.modules == ("no_such_module",)
+        assert own(trace) == []
+
+    def test_a_shadowed_module_is_the_project_s(self, traced: Traced, root: Path) -> None:
+        (root / "examples/random.py").write_text("value = 'mine'")
+        trace = traced("import random\nassert random.value == 'mine'")
+        assert "examples/random.py" in trace.files
+
+    def test_forked_and_spawned_agree(
+        self, root: Path, forking: ScriptServer, spawning: ScriptServer
+    ) -> None:
+        (root / "examples/x.py").write_text(
+            "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
+            "numpy.random.rand()\n"
+        )
+        traces = [server.run(root, [job()], parallel=1)[0].trace for server in (forking, spawning)]
+        assert traces[0] == traces[1]
+
+
+class TestOpaque:
+    @pytest.mark.parametrize(
+        ("code", "why"),
+        [
+            ("open('data/new', 'w')", "it writes files of the project"),
+            ("open('data/a.txt', 'a')", "it writes files of the project"),
+            ("open('data/a.txt', 'r+')", "it writes files of the project"),
+            ("import os\nos.mkdir('data/new')", "it writes files of the project"),
+            ("import os\nos.rename('data/a.txt', 'data/b')", "it writes files of the project"),
+            ("import os\nos.remove('data/a.txt')", "it writes files of the project"),
+            ("from pathlib import Path\nPath('n').touch()", "it writes files of the project"),
+            ("import os\nos.symlink('a', 'data/l')", "it writes files of the project"),
+            ("import numpy as np\nnp.save('n.npy', [1])", "it writes files of the project"),
+            ("import shutil\nshutil.copy('data/a.txt', 'n')", "it writes files of the project"),
+            ("import subprocess\nsubprocess.run(['true'])", "it starts other programs"),
+            ("import os\nos.system('true')", "it starts other programs"),
+            ("import os\nos.popen('true').read()", "it starts other programs"),
+            ("import os\nos.execv('/bin/true', ['true'])", "it starts other programs"),
+            ("import os\nif not os.fork(): os.execv('/bin/true', ['true'])\nos.wait()", None),
+            ("import os\nos.wait4(os.posix_spawn('/bin/true', ['true'], {}), 0)", None),
+            ("import socket\nsocket.create_connection(('127.0.0.1', 1))", "it uses the network"),
+            ("import socket\nsocket.socket().bind(('127.0.0.1', 0))", "it uses the network"),
+            ("import socket\nsocket.getaddrinfo('localhost', 1)", "it uses the network"),
+            ("import sqlite3\nsqlite3.connect('data/db')", "it opens a database"),
+            ("import ctypes\nctypes.CDLL('./data/lib.so')", "it loads native code of the project"),
+            ("import os\nos.listdir('/usr')", "it lists folders outside the project"),
+        ],
+    )
+    def test_reasons(self, run: Run, code: str, why: str | None) -> None:
+        result = run(code)
+        assert result.trace is not None
+        assert result.trace.opaque == (why or "it starts other programs")
+
+    def test_writing_outside(self, traced: Traced, tmp_path: Path) -> None:
+        trace = traced(f"open({str(tmp_path / 'o')!r}, 'w')")
+        assert trace.opaque == "it writes files outside its temporary folder"
+        assert trace.outside == ()
+
+    @pytest.mark.parametrize(
+        "code",
+        [
+            "import numpy, mujoco, logging, ctypes\nctypes.CDLL(None)",
+            "import asyncio\nasyncio.run(asyncio.sleep(0))",
+            "import sqlite3\nsqlite3.connect(':memory:')",
+            "import os\nif not os.fork(): os._exit(0)\nos.wait()",
+            "import tempfile\nwith tempfile.TemporaryDirectory() as d: open(d + '/x', 'w')",
+            "import multiprocessing as m\nif __name__ == '__main__':\n"
+            "    with m.get_context('fork').Pool(2) as p: p.map(abs, [1])",
+            "import concurrent.futures as c\nwith c.ThreadPoolExecutor() as p: p.submit(abs, 1)",
+        ],
+    )
+    def test_none(self, traced: Traced, code: str) -> None:
+        assert traced(code).opaque == ""
+
+    def test_programs_that_multiprocessing_starts(self, traced: Traced) -> None:
+        code = "import multiprocessing as m\nif __name__ == '__main__':\n"
+        code += "    p = m.get_context('spawn').Process(target=abs, args=(1,))\n"
+        code += "    p.start()\n    p.join()\n"
+        assert traced(code).opaque == "it starts other programs"
+
+    def test_what_it_wrote_itself_is_no_dependency(self, traced: Traced) -> None:
+        trace = traced("open('data/new', 'w').close()\nopen('data/new')\nopen('data/a.txt')")
+        assert own(trace) == ["data/a.txt"]
+
+
+@pytest.mark.slow
+class TestCost:
+    def test_opening_and_computing_cost_what_they_cost(self, run: Run) -> None:
+        """Seconds of the process, relative: a hundred thousand openings, a million of calls."""
+        code = (
+            "import time, sys, os\nname = os.environ['TMPDIR'] + '/x'\nopen(name, 'w').close()\n"
+            "def opens():\n    for i in range(20_000): open('data/a.txt').close()\n"
+            "def calls():\n    for i in range(300_000): len(str(i))\n"
+            "for f in (opens, calls):\n    t = time.process_time(); f()\n"
+            "    print(time.process_time() - t)\n"
+        )
+        opening, calling = (float(line) for line in run(code).stdout.split())
+        start = time.process_time()
+        for _ in range(20_000):
+            open(os.devnull).close()  # noqa: PTH123
+        bare_opening = time.process_time() - start
+        start = time.process_time()
+        for i in range(300_000):
+            len(str(i))
+        assert opening < 5 * bare_opening + 0.2
+        assert calling < 3 * (time.process_time() - start) + 0.1

@@ -1,0 +1,482 @@
+"""Formulas to MathML, friendly ones and hostile ones."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.run import v8
+from coursebuild.core.run.v8 import (
+    Isolate,
+    LimitError,
+    MathEngine,
+    ScriptError,
+    StoppedError,
+    readable,
+)
+from support.runners import computed, wait_until
+
+pytestmark = pytest.mark.engine
+
+ROOT = Path(v8.__file__).parents[3]
+
+GLOBAL = {"class", "style", "mathbackground", "mathcolor"}
+ALLOWED = {
+    # What the HTML checker takes, and browsers draw.
+    "math": {"display"},
+    "semantics": set(),
+    "annotation": {"encoding"},
+    "mrow": set(),
+    "mi": {"mathvariant"},
+    "mn": {"mathvariant"},
+    "mo": {
+        "accent",
+        "fence",
+        "form",
+        "largeop",
+        "lspace",
+        "mathsize",
+        "maxsize",
+        "minsize",
+        "movablelimits",
+        "rspace",
+        "separator",
+        "stretchy",
+        "symmetric",
+    },
+    "mtext": {"mathvariant"},
+    "mspace": {"depth", "height", "linebreak", "width"},
+    "mfrac": {"linethickness"},
+    "msqrt": set(),
+    "mroot": set(),
+    "msub": set(),
+    "msup": set(),
+    "msubsup": set(),
+    "munder": {"accentunder"},
+    "mover": {"accent"},
+    "munderover": {"accent"},
+    "mmultiscripts": set(),
+    "mprescripts": set(),
+    "none": set(),
+    "mstyle": {"displaystyle", "mathsize", "scriptlevel"},
+    "mpadded": {"depth", "height", "lspace", "voffset", "width"},
+    "mphantom": set(),
+    "menclose": {"notation"},
+    "mtable": {"displaystyle", "columnalign", "rowspacing"},
+    "mtr": set(),
+    "mtd": set(),
+    "span": set(),  # in mtext, for the number of an equation
+}
+FORMULAS = r"""
+\frac{1}{2} \dfrac12 \tfrac12 \cfrac{1}{1+\cfrac{1}{2}} \binom{n}{k} {n \choose k}
+x^2_3 x' x'' x'''_i {}^{14}C \prescript{a}{b}{c} \sideset{_a^b}{_c^d}\sum
+\begin{pmatrix}a&b\\c&d\end{pmatrix} \begin{vmatrix}a\end{vmatrix}
+\begin{bmatrix*}[r]a\end{bmatrix*}
+\begin{aligned}a&=b\\c&=d\end{aligned} \begin{cases}a&x>0\\b&\text{otherwise}\end{cases}
+\begin{array}{c|c}a&b\\\hline c&d\end{array} \begin{smallmatrix}a&b\\c&d\end{smallmatrix}
+\cancel{x}+\bcancel{y}+\xcancel{z}+\sout{q}+\boxed{E=mc^2}+\fbox{x}
+\color{red}x \textcolor{blue}{x} \colorbox{yellow}{x} \fcolorbox{red}{yellow}{x} \color{#ff0000}{x}
+\underbrace{a+b}_{c} \overbrace{a+b}^{c} \underline{x} \overline{x} \overrightarrow{AB} \utilde{x}
+\hat x \vec{x} \dot x \ddot x \dddot{x} \bar x \tilde x \widehat{abc} \widetilde{abc} \mathring x
+\left(\frac{a}{b}\right) \left.\frac{a}{b}\right|_{x=0} \left( a \middle| b \right) \bigl( \Bigr)
+\sqrt{x} \sqrt[3]{x} \sum_{i=1}^n \prod \int_0^1 \oint \iint \lim_{x\to0} \operatorname*{argmin}_x
+\mathbb{R} \mathcal{L} \mathfrak{g} \mathsf{x} \mathtt{x} \mathbf{x} \boldsymbol\omega \bm{\omega}
+\text{text with $x$ math} \textbf{bold} \textit{it} \texttt{tt} \textsc{ab} \verb|<x>|
+a \xrightarrow{f} b \xleftarrow[g]{f} c \rightarrow \mapsto \stackrel{a}{b} \overset{a}{b}
+\phantom{x} \hphantom{x} \vphantom{x} \smash{x} \mathllap{x} \mathrlap{x} \hspace{1em} \quad \, \!
+\rule{1em}{2em} \raisebox{1em}{x} \vcenter{x} \Large x \small y \displaystyle \sum \textstyle \sum
+\not= \neq \not\in \notin \lVert x\rVert \langle x\rangle \lfloor x \rfloor \bra{x} \ket{y}
+3.14\times10^{-3}\,\mathrm{kg\,m^2} 90^\circ 1{,}000 é ü α 日本 \LaTeX
+\mathbf{I}_c = \sum_i m_i\left(\lVert \mathbf r_i\rVert^2\mathbf 1-\mathbf r_i\mathbf r_i^T\right)
+""".strip().splitlines()
+DISPLAY_ONLY = r"""
+\begin{align}a&=b\\c&=d\end{align}
+\begin{align*}a&=b\\c&=d\end{align*}
+\begin{equation}a=b\label{eq}\end{equation}
+\begin{gather}a=b\\c=d\end{gather}
+\begin{multline}a\\b\end{multline}
+\begin{CD} A @>a>> B \\ @VVbV @AAcA \\ C @= D \end{CD}
+\tag{3} x
+""".strip().splitlines()
+
+
+@pytest.fixture(scope="module")
+def engine() -> Iterator[MathEngine]:
+    with MathEngine() as engine:
+        yield engine
+
+
+def one(engine: MathEngine, tex: str, display: bool = False) -> str | MathError:
+    (result,) = engine.typeset([Formula(tex, display)])
+    return result
+
+
+def mathml(result: str | MathError) -> ElementTree.Element:
+    assert isinstance(result, str), result
+    return ElementTree.fromstring(result)
+
+
+class TestMarkup:
+    @pytest.mark.parametrize("display", [False, True])
+    @pytest.mark.parametrize("tex", FORMULAS)
+    def test_is_valid_in_html(self, engine: MathEngine, tex: str, display: bool) -> None:
+        self.check(one(engine, tex, display), tex, display)
+
+    @pytest.mark.parametrize("tex", DISPLAY_ONLY)
+    def test_displays_are_valid_in_html(self, engine: MathEngine, tex: str) -> None:
+        self.check(one(engine, tex, True), tex, True)
+        assert isinstance(one(engine, tex, False), MathError)
+
+    def check(self, result: str | MathError, tex: str, display: bool) -> None:
+        root = mathml(result)
+        assert root.tag == "math"
+        assert (root.get("display") == "block") is display
+        (semantics,) = root
+        assert len(semantics) == 2
+        assert semantics[1].get("encoding") == "application/x-tex"
+        assert semantics[1].text == tex
+        for element in root.iter():
+            assert set(element.attrib) <= ALLOWED[element.tag] | GLOBAL, element.attrib
+            assert "undefined" not in element.attrib.values()
+
+    def test_text_is_escaped(self, engine: MathEngine) -> None:
+        tex = r"\text{</math><script>\"'\& x}"
+        root = mathml(one(engine, tex))
+        assert root.find(".//annotation").text == tex  # type: ignore[union-attr]
+        assert not root.findall(".//script")
+
+    def test_negated_relations_are_single_characters(self, engine: MathEngine) -> None:
+        root = mathml(one(engine, r"a \not= b \not\in C"))
+        assert [mo.text for mo in root.iter("mo")] == ["≠", "∉"]
+
+    @pytest.mark.parametrize(
+        ("tex", "is_propped"),
+        [
+            (r"\sqrt u", True),
+            (r"\sqrt{1-x^2}", True),
+            (r"\sqrt[3]{\dot q}", True),
+            (r"\sqrt{x_i}", False),
+            (r"\sqrt{\frac12}", False),
+            (r"\sqrt{\sum k}", False),
+        ],
+    )
+    def test_over_what_is_low_a_root_stands_as_over_a_capital(
+        self, engine: MathEngine, tex: str, is_propped: bool
+    ) -> None:
+        root = mathml(one(engine, tex))
+        heights = [space.get("height") for space in root.iter("mspace")]
+        assert ("0.7em" in heights) is is_propped
+        assert all(len(cubic) == 2 for cubic in root.iter("mroot"))
+
+    def test_labels_become_no_ids(self, engine: MathEngine) -> None:
+        result = one(engine, r"\tag{1}\label{introduction} x", True)
+        assert isinstance(result, str) and " id=" not in result
+
+    def test_same_formula_same_bytes(self, engine: MathEngine) -> None:
+        formulas = [Formula(tex, display) for tex in FORMULAS for display in (False, True)]
+        first = engine.typeset(formulas)
+        assert engine.typeset(formulas) == first
+        with MathEngine() as other:
+            assert other.typeset(formulas[::-1]) == first[::-1]
+
+    def test_many_at_a_time(self, engine: MathEngine) -> None:
+        results = engine.typeset([Formula(f"x_{{{i}}}", i % 2 == 0) for i in range(1001)])
+        assert [mathml(r).find(".//annotation").text for r in results] == [  # type: ignore[union-attr]
+            f"x_{{{i}}}" for i in range(1001)
+        ]
+
+    def test_none(self, engine: MathEngine) -> None:
+        assert engine.typeset([]) == []
+
+
+class TestMistakes:
+    @pytest.mark.parametrize(
+        ("tex", "message", "position"),
+        [
+            (r"a + \foo x", r"unknown command \foo", 4),
+            (r"𝒳𝒳 é \foo", r"unknown command \foo", 5),
+            ("x^2^3", "double superscript", 3),
+            ("{", "expected '}', got the end of the formula", 1),
+            ("a}", "unexpected '}'", 1),
+            (r"\frac{1}", "unexpected end of input in a macro argument, expected '}'", 8),
+            (r"\begin{foo}x\end{foo}", "no such environment: foo", 6),
+            (r"\text{a & b}", "unexpected '&'", 8),
+            (r"x $y$", "can't use function '$' in math mode", 2),
+            (r"\tag{1} x", r"\tag works only in display mode", None),
+            (r"\left( x", "expected '\\right', got the end of the formula", 8),
+            (r"\color{notacolour} x", "there is no colour `notacolour`", None),
+            (
+                r"\ref{a}",
+                "references to equations cannot be resolved; link to a heading instead",
+                None,
+            ),
+            (
+                r"a \eqref{a}",
+                "references to equations cannot be resolved; link to a heading instead",
+                None,
+            ),
+            ("", "the formula is empty", None),
+            (" % only a comment", "the formula is empty", None),
+            (r"\nonumber", "the formula is empty", None),
+            (r"\includegraphics{x.png}", 'function "\\includegraphics" is not trusted', 0),
+            ("ab\0", "the formula holds a control character", 2),
+            ("% \x1b", "the formula holds a control character", 2),
+            ("𝒳\ufffe", "the formula holds a control character", 1),
+            (r"\char\"D800 x", "the formula makes a character that a page must not hold", None),
+            (r"\char\"1", "the formula makes a character that a page must not hold", None),
+            (r"\hspace{" + "9" * 400 + "em}", "a length is not a number", None),
+            (r"\bra{\foo}", r"unknown command \foo", 5),
+        ],
+    )
+    def test_is_said(
+        self, engine: MathEngine, tex: str, message: str, position: int | None
+    ) -> None:
+        tex = tex.replace('\\"', '"')
+        assert one(engine, tex) == MathError(message, position)
+
+    def test_one_bad_formula_spoils_no_other(self, engine: MathEngine) -> None:
+        formulas = [Formula(tex, False) for tex in ("a", r"\foo", "b", "{", "c")]
+        kinds = [isinstance(r, str) for r in engine.typeset(formulas)]
+        assert kinds == [True, False, True, False, True]
+
+    @pytest.mark.parametrize("define", [r"\def", r"\gdef", r"\global\def", r"\xdef"])
+    def test_macros_do_not_leak(self, engine: MathEngine, define: str) -> None:
+        good, bad = engine.typeset(
+            [Formula(rf"{define}\zz{{x}} \zz", False), Formula(r"\zz", False)]
+        )
+        assert isinstance(good, str)
+        assert bad == MathError(r"unknown command \zz", 0)
+
+    def test_built_in_commands_cannot_be_changed_for_others(self, engine: MathEngine) -> None:
+        before = one(engine, r"\sin x")
+        engine.typeset([Formula(r"\gdef\sin{\cos} \sin", False)])
+        engine.typeset([Formula(r"\gdef\__proto__{y} \__proto__", False)])
+        assert one(engine, r"\sin x") == before
+
+    def test_position_in_a_macro_of_temml_is_not_taken_for_ours(self, engine: MathEngine) -> None:
+        for tex in (r"\ket{\ket{", r"\implies^a^b", r"\TeX^a^b", r"\dots\foo"):
+            result = one(engine, tex)
+            assert isinstance(result, MathError)
+            assert result.position is None or 0 <= result.position <= len(tex)
+
+    @pytest.mark.parametrize(
+        ("raw", "shown"),
+        [
+            ("ParseError: Unsupported function name: \\x", "unknown command \\x"),
+            (" Expected 'EOF', got '&'", "unexpected '&'"),
+            ("MathML is not text.", "MathML is not text"),
+            ("A thing.\nAnd\tmore", "a thing. And more"),
+            ("x" * 500, "x" * 159 + "…"),
+        ],
+    )
+    def test_wording(self, raw: str, shown: str) -> None:
+        assert readable(raw) == shown
+
+
+NINE = r"\def\a#1{#1#1#1#1#1#1#1#1#1}"
+HOSTILE = {
+    "endless macro": r"\def\a{\a\a}\a",
+    "endless edef": r"\def\a{xx}" + r"\edef\a{\a\a}" * 40 + r"\a",
+    "tokens without end": NINE + r"\a{\a{\a{" + "x" * 19_000 + "}}}",
+    "memory": NINE + r"\a{\a{\a{\a{" + "x" * 10_000 + "}}}}",
+    "markup without end": NINE + r"\a{\a{" + "x" * 1_500 + "}}",
+    "too long": "x" * 100_000,
+    "deep groups": "{" * 9_000 + "x" + "}" * 9_000,
+    "deep fractions": r"\frac{1}{" * 1_000 + "x" + "}" * 1_000,
+    "deep enough for a browser to give up": r"\sqrt{" * 300 + "x" + "}" * 300,
+    "deep delimiters": r"\left(" * 1_200 + r"\right)" * 1_200,
+    "deep scripts": "x^{" * 3_000 + "x" + "}" * 3_000,
+    "columns": r"\begin{matrix}" + "&" * 19_000 + r"\end{matrix}",
+    "combining": "x" + "\u0301" * 19_000,
+    "code point": r'\char"110000',
+    "unfinished": r"\begin{" + "a" * 19_000,
+    "command": "\\" + "a" * 19_000,
+}
+
+
+class TestHostile:
+    @pytest.mark.parametrize("name", HOSTILE)
+    def test_ends_in_an_error_and_harms_nobody(self, engine: MathEngine, name: str) -> None:
+        before, bad, after = engine.typeset(
+            [Formula("a", False), Formula(HOSTILE[name], True), Formula("b", False)]
+        )
+        assert isinstance(before, str) and isinstance(after, str)
+        assert isinstance(bad, MathError)
+        assert len(bad.message) <= 160
+
+
+SCRIPT = """
+const same = x => x
+const spin = x => { for (;;) ; }
+const eat = () => { const a = []; for (;;) a.push(new Array(1e5).fill(1.5)) }
+const fail = x => { throw new Error(x) }
+const number = x => 1
+const busy = x => { for (let i = 0; i < +x; i++); return x }
+let place
+const reserve = (name, size) => place = new ArrayBuffer(size)
+const read = x => String(new Uint8Array(place))
+"""
+
+
+@pytest.fixture
+def isolate() -> Iterator[Isolate]:
+    isolate = Isolate(SCRIPT)
+    yield isolate
+    isolate.close()
+
+
+class TestIsolate:
+    def test_texts_and_bytes_cross_the_border(self, isolate: Isolate) -> None:
+        for text in ("", "é\u2028'\"\\\0\U0001d4b3", "x" * 5_000_000):
+            assert isolate.call("same", text, 120.0) == text
+        isolate.fill("x", b"\x00\x80\xff")
+        assert isolate.call("read", "", 120.0) == "0,128,255"
+        with pytest.raises(TypeError, match="number returned no string"):
+            isolate.call("number", "", 120.0)
+
+    def test_what_is_thrown_is_told(self, isolate: Isolate) -> None:
+        with pytest.raises(ScriptError, match="Error: no such thing\n"):
+            isolate.call("fail", "no such thing", 120.0)
+        with pytest.raises(ScriptError, match="SyntaxError"):
+            Isolate("(").close()
+
+    def test_what_never_ends_is_ended_and_the_next_is_not(self, isolate: Isolate) -> None:
+        for _ in range(3):
+            with pytest.raises(LimitError, match=r"^ran for more than 0\.1 s$"):
+                isolate.call("spin", "", 0.1)
+            assert isolate.call("same", "next", 120.0) == "next"
+
+    def test_a_late_result_is_never_taken_for_the_next(self, isolate: Isolate) -> None:
+        """Nor does what ends at its limit take the next along."""
+        in_time = 0
+        for n in range(300):
+            text = str((0, 2_000, 100_000)[n % 3] + n)
+            try:
+                found = isolate.call("busy", text, (0.00002, 0.0002, 0.002, 120.0)[n % 4])
+            except LimitError:
+                continue
+            assert found == text
+            in_time += 1
+        assert in_time >= 75
+
+    def test_what_takes_all_memory_is_ended(self) -> None:
+        small = Isolate(SCRIPT, memory=32 << 20)
+        with pytest.raises(LimitError, match=r"^took more than 32 MiB$"):
+            small.call("eat", "", 600.0)
+        small.close()
+
+    @pytest.mark.parametrize("end", ["stop", "close"])
+    def test_another_thread_may_end_it_for_good(self, isolate: Isolate, end: str) -> None:
+        threading.Timer(0.1, getattr(isolate, end)).start()
+        with pytest.raises(StoppedError):
+            for _ in range(1_000_000):
+                isolate.call("same", "x", 600.0)
+            isolate.call("spin", "", 600.0)
+        with pytest.raises(StoppedError):
+            isolate.call("same", "x", 600.0)
+
+    def test_whoever_calls_may_run_an_event_loop(self, isolate: Isolate) -> None:
+        async def work() -> str:
+            return isolate.call("same", "here", 120.0)
+
+        with ThreadPoolExecutor(1) as apart:  # in this thread there may be a loop of Playwright's
+            assert apart.submit(asyncio.run, work()).result() == "here"
+
+    def test_a_copy_of_a_process_in_which_v8_was_started_has_its_own(self) -> None:
+        code = (
+            "from coursebuild.core.engine.workers import Workers, can_fork\n"
+            "from coursebuild.core.run.v8 import MathEngine, start\n"
+            "from coursebuild.core.model.results import Formula\n"
+            "def typeset(tex):\n"
+            "    with MathEngine() as engine: return engine.typeset([Formula(tex, False)])\n"
+            "before = typeset('x')\n"
+            "print(can_fork())\n"
+            "with Workers(typeset, 2) as workers:\n"
+            "    made, numbers = workers.map((None, 'x') for _ in range(8))\n"
+            "print(all(one == before for one in made), None in numbers)\n"
+            "with MathEngine() as engine:\n"
+            "    engine.typeset([Formula('x', False)])\n"
+            "    print(can_fork())\n"
+        )
+        can = sys.platform != "darwin"
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+        )
+        assert (done.stdout.splitlines(), done.stderr) == (
+            [str(can), f"True {not can}", "False"],
+            "",
+        )
+
+
+class TestLife:
+    def test_it_can_be_closed_and_used_again(self) -> None:
+        with MathEngine() as engine:
+            one(engine, "a")
+            engine.close()
+            assert isinstance(one(engine, "c"), str)
+
+    def test_threads_take_turns(self, engine: MathEngine) -> None:
+        results: list[list[str | MathError]] = []
+        formulas = [Formula(tex, False) for tex in FORMULAS]
+        threads = [
+            threading.Thread(target=lambda: results.append(engine.typeset(formulas)))
+            for _ in range(4)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(results) == 4
+        assert all(result == results[0] for result in results)
+
+    def test_an_interrupt_is_heard_and_ends_cleanly(self) -> None:
+        code = (
+            "from coursebuild.core.run.v8 import Isolate\n"
+            "isolate = Isolate('function spin(x) { for (;;) {} }')\n"
+            "try:\n"
+            "    print('ready', flush=True)\n"
+            "    isolate.call('spin', '', 600.0)\n"
+            "except KeyboardInterrupt: print('interrupted')\n"
+        )
+        process = subprocess.Popen(
+            [sys.executable, "-W", "always", "-c", code],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
+        with process:
+            assert process.stdout is not None and process.stderr is not None
+            process.stdout.readline()
+            before = computed(process.pid)
+            wait_until(lambda: computed(process.pid) > before + 20, "the endless loop")
+            os.kill(process.pid, signal.SIGINT)
+            said, errors = process.communicate(timeout=120)
+        assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
+
+    def test_a_process_that_forgets_to_close_ends(self) -> None:
+        code = (
+            "from coursebuild.core.run.v8 import MathEngine\n"
+            "from coursebuild.core.model.results import Formula\n"
+            "engine = MathEngine()\nprint(len(engine.typeset([Formula('x', False)])))\n"
+        )
+        for _ in range(3):
+            done = subprocess.run(
+                [sys.executable, "-c", code],
+                capture_output=True,
+                text=True,
+                cwd=ROOT,
+                timeout=300,
+            )
+            assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)

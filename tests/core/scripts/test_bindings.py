@@ -1,0 +1,449 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model import (
+    BlockQuote,
+    Document,
+    Footnote,
+    Lesson,
+    Level,
+    Paragraph,
+    Script,
+    document_blocks,
+)
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.scripts.binding_memory import BindingHistory
+from coursebuild.core.scripts.bindings import Printed, check_bindings, leaning_on
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.text.diagnostics import Diagnostic
+from support.sample_lessons import course, document, ran, told
+
+PRINTED = """\
+an L-shaped body: [0.073333 0.026667 0.      ] m
+moments [0.00376854 0.01383146 0.0168    ]
+axis (z): 0 flips
+axis (y): 4 flips, 20 s
+RK4           kinetic energy  -0.000 %  change 3.9e-11 kg m^2/s
+Euler         kinetic energy  +6.641 %  change 6.9e-04 kg m^2/s
+implicitfast  kinetic energy  -6.040 %  change 6.4e-04 kg m^2/s
+took 12.50ms, limit nan
+"""
+
+
+def script(path: str = "examples/a.py") -> str:
+    return f"```python file={path}\nprint(1)\n```\n"
+
+
+def output(text: str = PRINTED, keys: str = "") -> str:
+    return f"\nOutput:\n\n```text {keys}\n{text}```\n"
+
+
+LESSON = script() + output()
+IF = ", if that is what is meant"
+"""Of a number beside which others are printed."""
+
+
+def check(
+    text: str, *runs: ScriptRun, others: tuple[Document, ...] = (), scripts: tuple[str, ...] = ()
+) -> tuple[Diagnostic, ...]:
+    lesson = document(text)
+    known = [
+        block.path
+        for found in (lesson, *others)
+        for block in document_blocks(found)
+        if isinstance(block, Script)
+    ]
+    verdicts = verify(course(lesson, *others), runs)
+    printed = Printed(verdicts, runs, [*known, *scripts])
+    found = check_bindings(lesson, printed)
+    held = BindingHistory()
+    for _ in range(2):  # what is remembered of the same outputs changes nothing
+        assert check_bindings(lesson, printed, held) == found
+    return found
+
+
+def one(binding: str, printed: str = PRINTED) -> Diagnostic | None:
+    found = check(f"{script()}{output(printed)}\nHere: {binding}\n", ran(printed))
+    assert len(found) <= 1
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize(
+    "binding",
+    [
+        "+6.641 %",
+        "+6.64 %",
+        "6.6 %",
+        "+7 %",
+        "\u22126.0 %",
+        "-6 %",
+        "3.9e-11",
+        "3.9 × 10⁻¹¹",
+        "4·10^-11",
+        "6.9e-04 kg m^2/s",
+        "6.9e-4",
+        "0.0007",
+        "[0.073333 0.026667 0]",
+        "0.0733, 0.0267",
+        "0 flips",
+        "4 flips",
+        "4",
+        "4 flips, 20 s",
+        "12.5ms",
+        "13 ms",
+        "nan",
+        "RK4",
+        "kinetic energy",
+        "kinetic   energy",
+        "Euler kinetic energy +6.6 %",
+        "about +6.6 %",
+        "0.0 %",
+        "axis (y)",
+    ],
+)
+def test_a_printed_value_rounded_to_the_digits_shown(binding: str) -> None:
+    assert one(f"`{binding}`{{out}}") is None
+
+
+@pytest.mark.parametrize(
+    ("binding", "label", "help_text"),
+    [
+        ("+6.65 %", "the nearest printed value is +6.641", "write `+6.64 %`" + IF),
+        ("6.7 %", "the nearest printed value is +6.641", "write `6.6 %`" + IF),
+        (
+            "6.04 %",
+            "the same number is printed with the other sign: -6.040",
+            "write `-6.04 %`" + IF,
+        ),
+        ("6.05 %", "the nearest printed value is -6.040", "write `-6.04 %`" + IF),
+        ("\u22126.1 %", "the nearest printed value is -6.040", "write `\u22126.0 %`" + IF),
+        (
+            "4.0e-11 kg m^2/s",
+            "the nearest printed value is 3.9e-11",
+            "write `3.9e-11 kg m^2/s`" + IF,
+        ),
+        ("5 flips", "the nearest printed value is 4", "write `4 flips`" + IF),
+        ("20 flips", "the nearest printed value is 4", "write `4 flips`" + IF),
+        (
+            "0.073333 0.0168",
+            "the nearest printed values are 0.073333, 0.026667",
+            "write `0.073333 0.0267`" + IF,
+        ),
+        ("6.6411 %", "the nearest printed value is +6.641", "write `6.6410 %`" + IF),
+        ("4.1 × 10⁻¹¹ kg", "the nearest printed value is 3.9e-11", ""),
+        ("1 2 3 4 5", "no printed line has 5 numbers one after the other", ""),
+    ],
+)
+def test_other_values_are_refused(binding: str, label: str, help_text: str) -> None:
+    found = one(f"`{binding}`{{out}}")
+    assert found is not None and found.rule == "binding-mismatch"
+    assert (found.label, found.help) == (label, help_text)
+    assert found.span.text == binding
+
+
+@pytest.mark.parametrize(
+    ("binding", "printed", "label", "help_text"),
+    [
+        # the same number with the other sign, however near others are
+        ("829.030", "work -829.030 J, 263.1 W", "sign: -829.030", "write `-829.030`" + IF),
+        ("829.03", "-829.0301 829.05", "sign: -829.0301", "write `-829.03`" + IF),
+        ("+829", "-829.2 830.1", "sign: -829.2", "write `-829`" + IF),
+        ("-4", "4 -5", "sign: 4", "write `4`" + IF),
+        ("−1.5e-3", "1.5e-03", "sign: 1.5e-03", "write `1.5e-3`"),
+        ("1.50, -2.0", "1.50 2.00\n1.50 -2.1", "signs: 1.50, 2.00", "write `1.50, 2.0`" + IF),
+        ("1.50, 2.0", "-1.50 -2.00", "signs: -1.50, -2.00", "write `-1.50, -2.0`"),
+        # the relatively nearest; another sign costs a digit
+        ("0.1", "0.0001 0.5", "value is 0.5", "write `0.5`" + IF),
+        ("829.030", "-829.040 810.2", "value is -829.040", "write `-829.040`" + IF),
+        ("829.030", "-829.040 829.041", "value is 829.041", "write `829.041`" + IF),
+        ("3.0", "0 -3.1", "value is -3.1", "write `-3.1`" + IF),
+        ("0", "2.5 -0.7", "value is -0.7", "write `-1`" + IF),
+        ("5.1", "nan inf 9.0", "value is 9.0", "write `9.0`" + IF),
+        # the same digits with another power of ten, unless by chance
+        ("6.64 %", "0.0664 31.2", "of ten: 0.0664", ""),
+        ("3.9e-12", "3.9e-11 6.0e-12", "of ten: 3.9e-11", "write `3.9e-11`" + IF),
+        ("6.64 %", "0.0664 6.65", "value is 6.65", "write `6.65 %`" + IF),
+        ("6.641 %", "0.06641 6.65", "of ten: 0.06641", ""),
+        ("49.1", "4.905 6.2", "of ten: 4.905", ""),
+        ("0.4905", "-4.905 1.3", "of ten: -4.905", "write `-4.9050`" + IF),
+        ("5", "50 4", "value is 4", "write `4`" + IF),
+    ],
+)
+def test_what_is_most_probably_meant(
+    binding: str, printed: str, label: str, help_text: str
+) -> None:
+    found = one(f"`{binding}`{{out}}", printed + "\n")
+    assert found is not None and found.label.endswith(label)
+    assert found.help == help_text
+
+
+def test_what_is_said() -> None:
+    found = one("`+6.7 %`{out}")
+    assert found is not None
+    assert (
+        told(found)
+        == """\
+binding-mismatch at 18:8 `+6.7 %`
+  `+6.7 %` is not what `examples/a.py` printed, rounded to the digits shown
+  ^ the nearest printed value is +6.641
+  help: write `+6.6 %`, if that is what is meant"""
+    )
+    found = one("`midpoint`{out}")
+    assert found is not None
+    assert (
+        told(found)
+        == """\
+binding-mismatch at 18:8 `midpoint`
+  `midpoint` does not stand in the output of `examples/a.py`
+  help: write it as it is printed, or take `{out}` away"""
+    )
+    assert (one("`1.5`{out}", "no number here\n") or found).label == "no number was printed"
+
+
+def test_words_stand_whole() -> None:
+    assert one("`implicit`{out}") is not None
+    assert one("`implicitfast`{out}") is None
+
+
+def test_integers_are_equal_and_not_rounded() -> None:
+    assert one("`4`{out}", "4 flips\n") is None
+    assert one("`5`{out}", "4 flips\n") is not None
+    assert one("`7`{out}", "6.641\n") is None
+    assert one("`4.0`{out}", "4 flips\n") is None
+
+
+def test_the_border_is_exact_and_counts() -> None:
+    assert one("`2.5`{out}", "2.45\n") is None
+    assert one("`2.4`{out}", "2.45\n") is None
+    assert one("`2.4`{out}", "2.4500000000000000000000000000001\n") is not None
+
+
+def test_special_values() -> None:
+    assert one("`-inf`{out}", "x = -inf\n") is None
+    assert one("`inf`{out}", "x = -inf\n") is not None
+    assert one("`nan`{out}", "x = 1.0\n") is not None
+
+
+def test_text_beside_the_number_chooses() -> None:
+    printed = "E 6.0 J\nP 6.04 W\nv=6.1 m/s\n"
+    assert one("`6.0`{out}", printed) is None
+    assert one("`6.0 J`{out}", printed) is None
+    assert one("`6.0 W`{out}", printed) is None
+    assert one("`6.1 W`{out}", printed) is not None
+    assert one("`6.1 m`{out}", printed) is None
+    assert one("`v = 6.1`{out}", printed) is None
+    assert one("`P 6.1`{out}", printed) is not None
+    assert one("`6.1 N`{out}", printed) is None
+
+
+def test_the_nearest_output_above_counts() -> None:
+    text = (
+        script() + output("x 1.5\n") + "\n`1.5`{out} `2.5`{out}\n\n" + output("x 2.5\n")
+        + "\n`2.5`{out} `1.5`{out}\n"
+    )  # fmt: skip
+    found = check(text)
+    assert [(d.rule, d.span.text) for d in found] == [
+        ("binding-mismatch", "2.5"),
+        ("binding-mismatch", "1.5"),
+    ]
+
+
+def test_without_an_output_above_there_is_nothing_to_lean_on() -> None:
+    (found,) = check("`1.5`{out}\n\n" + LESSON, ran(PRINTED))
+    assert (
+        told(found)
+        == """\
+binding-orphan at 1:2 `1.5`
+  `1.5` has no recorded output above it to lean on
+  help: write it below the output, or name the script: `{out=examples/…}`"""
+    )
+
+
+def test_a_named_script_is_found_anywhere() -> None:
+    other = document(
+        script("examples/b.py") + output("y 2.5\n") + output("y 3.5\n"), "content/lessons/1.1-x.md"
+    )
+    runs = (ran(PRINTED), ran("y 2.5\ny 3.5\n", path="examples/b.py"))
+    text = (
+        "`+6.6 %`{out=examples/a.py} `2.5`{out=examples/b.py} `3.5`{out=examples/b.py}\n\n" + LESSON
+    )
+    assert check(text, *runs, others=(other,)) == ()
+    (found,) = check("`9.9`{out=examples/b.py}\n\n" + LESSON, *runs, others=(other,))
+    assert (found.rule, found.label) == ("binding-mismatch", "the nearest printed value is 3.5")
+
+
+def test_a_named_script_without_a_recorded_output_counts_by_its_run() -> None:
+    text = (
+        LESSON + script("examples/c.py") + "\n`1.5`{out=examples/c.py} `1.7`{out=examples/c.py}\n"
+    )
+    run = ran("x 1.52\n", path="examples/c.py")
+    assert [d.span.text for d in check(text, ran(PRINTED), run)] == ["1.7"]
+    skipped = ran("", path="examples/c.py", outcome=Outcome.SKIPPED)
+    assert check(text, ran(PRINTED), skipped) == ()
+    assert check(text, ran(PRINTED)) == ()
+    norun = ran("", path="examples/c.py", outcome=Outcome.NORUN)
+    found = check(text, ran(PRINTED), norun)
+    assert (
+        told(found[0])
+        == """\
+binding-orphan at 21:2 `1.5`
+  `1.5` is bound to `examples/c.py`, which has no recorded output and is not run
+  help: record its output below it"""
+    )
+
+
+def test_a_script_that_does_not_exist() -> None:
+    (found,) = check(LESSON + "\n`1.5`{out=examples/aa.py}\n", ran(PRINTED))
+    assert (
+        told(found)
+        == """\
+binding-orphan at 18:2 `1.5`
+  `1.5` is bound to `examples/aa.py`, which is no script of the course
+  help: did you mean `examples/a.py`?"""
+    )
+
+
+def test_volatile_outputs_bear_nothing() -> None:
+    text = script() + output("took 1.5 s\n", "volatile") + "\n`1.5 s`{out}\n"
+    (found,) = check(text, ran("took 1.5 s\n"))
+    assert (
+        told(found)
+        == """\
+binding-volatile at 11:2 `1.5 s`
+  `1.5 s` is bound to an output that differs by machine
+  help: take `{out}` away, or compare the output by another key than `volatile`"""
+    )
+    both = script() + output("x 2.5\n") + output("took 1.5 s\n", "volatile")
+    assert check(both + "\n`2.5`{out=examples/a.py}\n", ran("x 2.5\ntook 1.5 s\n")) == ()
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        ran(outcome=Outcome.FAILED, status=1),
+        ran(outcome=Outcome.TIMEOUT),
+        ran(outcome=Outcome.KILLED, status=9),
+        ran(outcome=Outcome.OUTPUT_LIMIT),
+        ran(outcome=Outcome.ENCODING),
+        ran("\n"),
+    ],
+)
+def test_a_failure_is_enough(run: ScriptRun) -> None:
+    assert check(LESSON + "\n`99`{out} `98`{out=examples/a.py}\n", run) == ()
+
+
+def test_recorded_text_counts_where_nothing_ran() -> None:
+    text = LESSON + "\n`6.6 %`{out} `99`{out}\n"
+    for runs in ((), (ran(outcome=Outcome.SKIPPED),), (ran(outcome=Outcome.NORUN),)):
+        assert [d.span.text for d in check(text, *runs)] == ["99"]
+
+
+def test_where_recorded_text_drifted_the_run_counts_too() -> None:
+    text = LESSON + "\n`6.6 %`{out} `6.7 %`{out} `6.8 %`{out}\n"
+    (found,) = check(text, ran(PRINTED.replace("6.641", "6.702")))
+    assert (found.span.text, found.help) == ("6.8 %", "write `6.7 %`" + IF)
+
+
+def test_before_anything_is_recorded_the_run_counts() -> None:
+    text = script() + output("") + "\n`6.6 %`{out} `6.7 %`{out}\n"
+    (found,) = check(text, ran(PRINTED))
+    assert (found.span.text, found.help) == ("6.7 %", "write `6.6 %`" + IF)
+
+
+def test_what_an_ellipsis_leaves_out_was_printed_too() -> None:
+    text = (
+        script() + output("start\n...\nend 1.5\n", "ellipsis") + "\n`1.5`{out} `8`{out} `9`{out}\n"
+    )
+    assert [d.span.text for d in check(text, ran("start\nx 7.52\nend 1.5\n"))] == ["9"]
+
+
+def test_tables_bear_numbers_too() -> None:
+    text = (
+        script() + "\nOutput:\n\n| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n\n"
+        "`+6.6 %`{out} `6.9e-04`{out} `Euler +6.6 %`{out} `7.7 %`{out}\n"
+    )
+    found = check(text, ran(PRINTED))
+    assert [(d.span.text, d.label) for d in found] == [
+        ("7.7 %", "the nearest printed value is +6.641")
+    ]
+
+
+def test_bindings_in_callouts_and_footnotes() -> None:
+    lesson = document(LESSON + "\n`9.9`{out}\n")
+    *blocks, paragraph = lesson.blocks
+    assert isinstance(paragraph, Paragraph)
+    quoted = Document(lesson.source, (*blocks, BlockQuote(paragraph.span, (paragraph,))), ())
+    footnote = Footnote(paragraph.span, "a", 1, 1, (paragraph,))
+    noted = Document(lesson.source, tuple(blocks), (footnote,))
+    for found in (quoted, noted):
+        verdicts = verify(course(found), [ran(PRINTED)])
+        (diagnostic,) = check_bindings(found, Printed(verdicts, [ran(PRINTED)]))
+        assert diagnostic.span.text == "9.9"
+
+
+def leaning(text: str, printed: str, *others: Document) -> list[tuple[str, str, str]]:
+    lesson = document(text)
+    runs = [ran(printed)]
+    verdicts = verify(course(lesson, *others), runs)
+    printed_now = Printed(verdicts, runs)
+    return [
+        (leans.binding.text, leans.change.recorded, leans.change.ran)
+        for verdict in verdicts
+        for leans in leaning_on(verdict, [lesson, *others], printed_now)
+    ]
+
+
+def test_who_leans_on_what_changed() -> None:
+    text = (
+        LESSON
+        + "\n`+6.6 %`{out} `\u22126.0 %`{out} `4 flips`{out} `0.0733, 0.0267`{out} `RK4`{out}\n"
+    )
+    changed = PRINTED.replace("6.641", "6.702").replace("0.026667", "0.03").replace("RK4", "RK5")
+    assert leaning(text, changed) == [
+        ("+6.6 %", "+6.641", "+6.702"),
+        ("0.0733, 0.0267", "0.026667", "0.03"),
+        ("RK4", "RK4", "RK5"),
+    ]
+    assert leaning(text, PRINTED) == []
+
+
+def test_other_lessons_lean_too() -> None:
+    other = document("`+6.6 %`{out=examples/a.py} `6.6`{out}\n", "content/lessons/5.1-x.md")
+    assert leaning(LESSON, PRINTED.replace("6.641", "6.702"), other) == [
+        ("+6.6 %", "+6.641", "+6.702")
+    ]
+
+
+def test_missing_lines_were_leaned_on() -> None:
+    text = LESSON + "\n`4 flips`{out}\n"
+    printed = PRINTED.replace("axis (y): 4 flips, 20 s\n", "")
+    assert leaning(text, printed) == [("4 flips", "axis (y): 4 flips, 20 s", "")]
+
+
+def test_tables_are_leaned_on() -> None:
+    text = (
+        script()
+        + "\nOutput:\n\n| a | b |\n| --- | --- |\n| `Euler` | **+6.641 %** |\n\n`+6.6 %`{out}\n"
+    )
+    changed = PRINTED.replace("6.641", "6.702")
+    assert leaning(text, changed) == [("+6.6 %", "+6.641", "+6.702")]
+
+
+def test_a_lesson_of_its_own_is_a_course() -> None:
+    """The helper's course is well-formed."""
+    here = course(document(LESSON))
+    assert isinstance(here.levels[0], Level) and isinstance(here.lessons[0], Lesson)
+
+
+@given(st.floats(-1e9, 1e9), st.integers(0, 8), st.integers(0, 8))
+def test_fewer_digits_of_what_was_printed_always_hold(
+    value: float, printed: int, fewer: int
+) -> None:
+    from decimal import ROUND_HALF_EVEN, Decimal
+
+    text = f"{value:.{printed}f}"
+    shown = Decimal(text).quantize(Decimal(1).scaleb(-min(printed, fewer)), ROUND_HALF_EVEN)
+    assert one(f"`{shown:f} J`{{out}}", f"E = {text} J, 3 steps\n") is None

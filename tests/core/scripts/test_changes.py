@@ -1,0 +1,198 @@
+"""Where a drift is, what class it has, and how it is shown."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.core.model.results import DriftKind
+from support.sample_lessons import (
+    DIGITS,
+    ELLIPSIS,
+)
+from support.sample_verdicts import seen, verdict
+
+ENERGY = """\
+conservation over 20 s:
+  RK4           kinetic energy  -0.000 %   3.9e-11
+  Euler         kinetic energy  +6.641 %   6.9e-04
+  implicit      kinetic energy  -6.040 %   6.4e-04"""
+
+
+def test_a_drifted_number_is_that_number_in_that_line() -> None:
+    found = verdict(ENERGY, ENERGY.replace("+6.641", "+6.702"))
+    (change,) = found.changes
+    assert seen(change) == ("numeric", "+6.641", "+6.702", 3)
+    assert (change.span.line, change.span.column) == (9, 33)
+    assert f"{change.relative_error:.1e}" == "9.2e-03"
+    assert change.digits == 2
+
+
+@pytest.mark.parametrize("prefix", ["> ", "   ", ">   "])
+@pytest.mark.parametrize("eol", ["\n", "\r\n"])
+def test_places_in_nested_fences(prefix: str, eol: str) -> None:
+    found = verdict(ENERGY, ENERGY.replace("6.9e-04", "7.0e-04"), prefix=prefix, eol=eol)
+    (change,) = found.changes
+    assert seen(change) == ("rounding", "6.9e-04", "7.0e-04", 3)
+    assert (change.span.line, change.span.column) == (9, 44 + len(prefix))
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "kind"),
+    [
+        ("6.641", "6.642", DriftKind.ROUNDING),
+        ("6.641", "6.640", DriftKind.ROUNDING),
+        ("6.641", "6.643", DriftKind.NUMERIC),
+        ("6.641", "6.6421", DriftKind.NUMERIC),
+        ("6.641", "6.6414", DriftKind.ROUNDING),
+        ("6.999", "7.000", DriftKind.ROUNDING),
+        ("-0.000", "0.001", DriftKind.ROUNDING),
+        ("1.5e-3", "1.6e-3", DriftKind.ROUNDING),
+        ("1.5e-3", "1.6e-2", DriftKind.NUMERIC),
+        ("4", "5", DriftKind.NUMERIC),
+        ("0.5", "0.50", DriftKind.TEXT),
+        ("-0.000", "0.000", DriftKind.TEXT),
+        ("nan", "0.5", DriftKind.NUMERIC),
+        ("inf", "-inf", DriftKind.NUMERIC),
+    ],
+)
+def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
+    found = verdict(f"E {recorded} J", f"E {printed} J")
+    assert [(c.kind, c.recorded, c.ran) for c in found.changes] == [(kind, recorded, printed)]
+
+
+def test_zero_recorded_has_no_relative_error() -> None:
+    (change,) = verdict("E 0.0", "E 0.5").changes
+    assert (change.relative_error, change.digits) == (None, None)
+
+
+def test_enormous_errors_stay_finite() -> None:
+    (change,) = verdict("E 1e-300", "E 1e300").changes
+    assert change.relative_error is None and change.digits == 0
+
+
+def test_every_number_of_a_line_is_compared() -> None:
+    found = verdict("[0.1 0.2 0.3]", "[0.1 0.25 0.4]")
+    assert [seen(c) for c in found.changes] == [
+        ("rounding", "0.2", "0.25", 1),
+        ("rounding", "0.3", "0.4", 1),
+    ]
+
+
+def test_white_space_is_named_only_where_nothing_else_differs() -> None:
+    found = verdict("a   9.9 b", "a  10.9 b")
+    assert [seen(c) for c in found.changes] == [("numeric", "9.9", "10.9", 1)]
+    found = verdict("a   b", "a  b")
+    assert [seen(c) for c in found.changes] == [("text", "   ", "  ", 1)]
+
+
+def test_text_changes_are_small() -> None:
+    found = verdict("the red box at 1.5 m", "the dark blue box at 1.5 m")
+    assert [seen(c) for c in found.changes] == [("text", "red", "dark blue", 1)]
+    found = verdict("E: 6.641 %", "E total: 6.702 %")
+    assert [seen(c) for c in found.changes] == [
+        ("text", "", " total", 1),
+        ("numeric", "6.641", "6.702", 1),
+    ]
+
+
+def test_missing_and_extra_lines() -> None:
+    found = verdict("a one\nb two\nc three\nd four", "a one\nd four")
+    assert [seen(c) for c in found.changes] == [("missing lines", "b two\nc three", "", 0)]
+    assert found.changes[0].span.text == "b two\nc three"
+    found = verdict("a one\nd four", "a one\nb two\nc three\nd four")
+    assert [seen(c) for c in found.changes] == [("extra lines", "", "b two\nc three", 2)]
+    assert (
+        found.changes[0].span.line == 8 and found.changes[0].span.start == found.changes[0].span.end
+    )
+
+
+def test_extra_lines_at_the_end_stand_after_the_last() -> None:
+    (change,) = verdict("a one", "a one\nb two").changes
+    assert seen(change) == ("extra lines", "", "b two", 2)
+    assert (change.span.line, change.span.column) == (7, 6)
+
+
+def test_an_empty_recording() -> None:
+    (change,) = verdict("", "a\nb").changes
+    assert seen(change) == ("extra lines", "", "a\nb", 1)
+    assert change.span.line == 7
+
+
+def test_a_drifted_table_of_equal_rows_with_one_more() -> None:
+    rows = [f"{i}  {i * i / 10:.2f}" for i in range(8)]
+    longer = [*rows[:3], "2.5  0.62", *rows[3:]]
+    found = verdict("\n".join(rows), "\n".join(longer))
+    assert [seen(c) for c in found.changes] == [("extra lines", "", "2.5  0.62", 4)]
+
+
+def test_a_line_that_moved_is_missing_here_and_extra_there() -> None:
+    found = verdict("x alpha\ny beta\nz gamma", "y beta\nz gamma\nx alpha")
+    assert [c.kind.value for c in found.changes] == ["missing lines", "extra lines"]
+
+
+def test_changes_beside_an_ellipsis() -> None:
+    found = verdict("start\n...\nE 1.50\nend", "start\nfoo\nbar\nE 1.70\nend", ELLIPSIS)
+    assert [seen(c) for c in found.changes] == [("numeric", "1.50", "1.70", 4)]
+    found = verdict("t=... s, E 1.5 J", "t=0.1 s, E 2.5 J", ELLIPSIS)
+    assert [seen(c) for c in found.changes] == [("numeric", "1.5", "2.5", 1)]
+    found = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
+    assert [seen(c) for c in found.changes] == [("text", "t=... s, E", "u=0.1 s, F", 1)]
+
+
+def test_the_diff_is_unified() -> None:
+    found = verdict("a\nb\nc 1.5\nd\ne\nf\ng 2\nh", "a\nb\nc 1.6\nd\ne\nf\nh\ni")
+    assert (
+        found.diff
+        == """\
+--- recorded
++++ this run
+@@ -1,5 +1,5 @@
+ a
+ b
+-c 1.5
++c 1.6
+ d
+ e
+@@ -5,4 +5,4 @@
+ e
+ f
+-g 2
+ h
++i"""
+        or found.diff
+        == """\
+--- recorded
++++ this run
+@@ -1,8 +1,8 @@
+ a
+ b
+-c 1.5
++c 1.6
+ d
+ e
+ f
+-g 2
+ h
++i"""
+    )
+
+
+def test_lines_that_match_by_value_are_context_in_the_diff() -> None:
+    found = verdict("a 1.5\nb 2.5", "a 1.51\nb 3.5", DIGITS)
+    assert (
+        found.diff
+        == """\
+--- recorded
++++ this run
+@@ -1,2 +1,2 @@
+ a 1.5
+-b 2.5
++b 3.5"""
+    )
+
+
+def test_the_diff_has_a_readable_size() -> None:
+    found = verdict("\n".join(f"a {i} " + "x" * 500 for i in range(100)), "b")
+    lines = found.diff.split("\n")
+    assert len(lines) == 43 and all(len(line) <= 161 for line in lines)
+    assert lines[-1] == "… and 62 more lines"

@@ -1,0 +1,270 @@
+"""When a printed output is the recorded one: modes, ellipsis, filters."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.scripts.compare import compare
+from support.sample_lessons import (
+    DIGITS,
+    DIGITS_ELLIPSIS,
+    ELLIPSIS,
+    EXACT,
+    VOLATILE,
+    recording,
+    within,
+)
+from support.sample_verdicts import matches, seen, verdict
+
+# ---------------------------------------------------------------------------------------- modes
+
+
+def test_exact_is_the_same_text() -> None:
+    assert matches("a 1.0\nb", "a 1.0\nb\n")
+    assert not matches("a 1.0", "a 1.00")
+    assert not matches("a  b", "a b")
+    assert not matches("0.000", "-0.000")
+
+
+def test_white_space_at_ends_does_not_count() -> None:
+    assert matches("a  \nb", "a\nb \t\n\n  \n\n")
+    assert matches("a\n\n\n", "a\n")
+    assert not matches("a\n\nb", "a\nb")
+    assert not matches("a", "\na")
+
+
+def test_line_ends_do_not_count() -> None:
+    for eol in ("\n", "\r\n", "\r"):
+        for printed in ("a\nb\n", "a\r\nb\r\n", "a\rb"):
+            found = compare(recording("a\nb", eol=eol), EXACT, (), printed)
+            assert found.status == "verified"
+
+
+def test_other_line_separators_are_characters() -> None:
+    assert matches("a\u2028b", "a\u2028b")
+    assert not matches("a\u2028b", "a\nb")
+    assert matches("a\x0cb\x85c", "a\x0cb\x85c")
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("3.14", "3.1449", True),
+        ("3.14", "3.149", False),
+        ("3.14", "3.145", True),
+        ("3.14", "3.135", True),
+        ("3.14", "3.1450000000000000000000001", False),
+        ("1.5e-3", "0.00155", True),
+        ("1.5e-3", "1.551e-3", False),
+        ("3.9e-11", "3.94e-11", True),
+        ("3.9e-11", "4.0e-11", False),
+        ("-0.000", "0.000", True),
+        ("-0.000", "+0.0004", True),
+        ("0.", "0.4", True),
+        ("+6.641", "6.641", True),
+        ("6.641", "-6.641", False),
+        ("4 flips", "4 flips", True),
+        ("4 flips", "5 flips", False),
+        ("4 flips", "4.0 flips", False),
+        ("4.0 flips", "4 flips", False),
+        ("+4", "4", False),
+        ("nan", "nan", True),
+        ("nan", "NaN", False),
+        ("inf", "1.0", False),
+        ("1.0", "nan", False),
+        ("v3.14.0", "v3.14.1", False),
+        ("2026-11-20", "2026-11-21", False),
+        ("x 3.14 y", "x 3.1402 z", False),
+        ("12.5ms", "12.52ms", True),
+        ("12.5ms", "12.52 ms", False),
+        ("1.5+2.0j", "1.52+1.98j", True),
+        ("1.5+0.0j", "1.5-0.0j", True),
+    ],
+)
+def test_digits(recorded: str, printed: str, expected: bool) -> None:
+    assert matches(recorded, printed, DIGITS) is expected
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "comparison", "expected"),
+    [
+        ("1.0", "1.000001", within("1e-6"), True),
+        ("1.0", "1.0000010000000000000000001", within("1e-6"), False),
+        ("100", "101", within("0.01"), True),
+        ("100", "102", within("0.01"), False),
+        ("101", "100", within("0.01"), True),
+        ("0", "1e-13", within("1e-6", "1e-12"), True),
+        ("0", "1e-11", within("1e-6", "1e-12"), False),
+        ("0.3", "0.1", within(atol="0.2"), True),
+        ("-1.0", "1.0", within("1"), False),
+        ("nan", "nan", within("1e-6"), True),
+        ("nan", "NaN", within("1e-6"), True),
+        ("nan", "0.0", within("1e9", "1e9"), False),
+        ("inf", "inf", within("1e-6"), True),
+        ("inf", "-inf", within("1e-6"), False),
+        ("inf", "Infinity", within("1e-6"), True),
+        ("1e300", "inf", within("1"), False),
+        ("4 flips", "4.0 flips", within("1e-6"), True),
+        ("a 1", "b 1", within("1"), False),
+        ("1.2.3", "1.2.4", within("1"), False),
+        ("1 2", "1", within("1"), False),
+    ],
+)
+def test_tolerance(recorded: str, printed: str, comparison: Comparison, expected: bool) -> None:
+    assert matches(recorded, printed, comparison) is expected
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed"),
+    [
+        ("[ 0.1 -0.2]", "[-0.0 -0.2]"),
+        ("[0.1 0.2]", "[ 0.1  0.2 ]"),
+        ("   9.9 x", "  10.1 x"),
+        ("9.9 x", " 9.9 x"),
+        ("Euler   9.9 %", "Euler  10.1 %"),
+        ("x= 0.10", "x=-0.05"),
+        ("array([ 0.1, 0.2])", "array([0.1,  0.2])"),
+        ("| 0.1 | 0.2 |", "|0.1  |0.2  |"),
+        ("0.1       foo", "0.12 foo"),
+        ("[[ 0.1  0.2]", "[[0.1 0.2]"),
+        ("[ nan 1.0]", "[nan   1.0]"),
+        ("a\t0.1", "a 0.1"),
+    ],
+)
+def test_columns_may_shift_where_a_number_gets_wider(recorded: str, printed: str) -> None:
+    assert matches(recorded, printed, within(atol="0.3"))
+    assert matches(printed, recorded, within(atol="0.3"))
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed"),
+    [
+        ("a 0.1", "a0.1"),
+        ("0.1 %", "0.1%"),
+        ("0.1 0.2", "0.10.2"),
+        ("a  b 0.1", "a b 0.1"),
+        ("0.1 m", "0.1m"),
+        ("  a 0.1", "a 0.1"),
+    ],
+)
+def test_white_space_away_from_numbers_counts(recorded: str, printed: str) -> None:
+    assert not matches(recorded, printed, within(atol="0.3"))
+
+
+def test_volatile_is_not_compared() -> None:
+    found = verdict("took 1 s", "took 2 s", VOLATILE)
+    assert (found.status, found.changes, found.diff) == ("volatile", (), "")
+
+
+# ------------------------------------------------------------------------------------- ellipsis
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("a ... c", "a b c", True),
+        ("a ... c", "a  c", True),
+        ("a ... c", "a c", False),
+        ("a...c", "ac", True),
+        ("a...b...c", "a b b c", True),
+        ("a...b...c", "a c b", False),
+        ("ab...ba", "aba", False),
+        ("...", "", True),
+        ("...", "a\nb\nc", True),
+        ("a\n...", "a", True),
+        ("a\n...\nc", "a\nc", True),
+        ("a\n...\nc", "a\nb\nb\nc", True),
+        ("a\n...\nc", "a\nb\nd", False),
+        ("a\n...\nb\n...\nc", "a\nx\nb\ny\nb\nc", True),
+        ("...\nb", "b\nb\nb", True),
+        ("...\nb", "b\nc", False),
+        ("b\n...", "c\nb", False),
+        ("a\n...\n...\nb", "a\nb", True),
+        ("  ...\nb", "a\nb", True),
+        ("a\n...\na", "a", False),
+        ("a...", "a\nb", False),
+        ("...a", "xa", True),
+        ("....", ".", True),
+        ("x...y...", "xy", True),
+    ],
+)
+def test_ellipsis(recorded: str, printed: str, expected: bool) -> None:
+    assert matches(recorded, printed, ELLIPSIS) is expected
+    assert matches(recorded, printed, DIGITS_ELLIPSIS) is expected
+
+
+def test_dots_are_dots_without_the_key() -> None:
+    assert not matches("a ... c", "a b c")
+    assert not matches("...", "a", DIGITS)
+    assert matches("[0. ... 9.]", "[0. ... 9.]")
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("x = 3.14 ... E = 0.50", "x = 3.1402 and so on E = 0.502", True),
+        ("x = 3.14 ... E = 0.50", "x = 3.15 and so on E = 0.502", False),
+        ("x = 3.14 ... E = 0.50", "x = 3.14 and so on E = 0.51", False),
+        ("pi = 3.1...", "pi = 3.19", True),
+        ("pi = 3.1...", "pi = 3.2", False),
+        ("...59 done 0.50", "3.14159 done 0.501", True),
+        ("a 0.50 ...", "a 0.501", True),
+        ("a ... 0.50", "a b= 0.501", True),
+        ("a 0.10 ... 0.10 b", "a 0.102 0.3 0.4 0.099 b", True),
+        ("a 0.10 ... 0.10 ... 0.30", "a 0.10 0.2 0.1 0.2 0.30", True),
+        ("a 0.10 ... 0.1 ... 0.30", "a 0.10 0.2 0.2 0.2 0.30", False),
+        ("0.10\n...\n0.20", "0.101\nfoo\n0.199", True),
+        ("0.10\n...\n0.20", "0.101\nfoo\n0.21", False),
+        ("i 1\n...\ni 9", "i 1\ni 2\ni 9", True),
+    ],
+)
+def test_ellipsis_with_digits(recorded: str, printed: str, expected: bool) -> None:
+    assert matches(recorded, printed, DIGITS_ELLIPSIS) is expected
+
+
+def test_ellipsis_with_tolerance() -> None:
+    assert matches("n 100 ... m", "n 101 or so m", within("0.01", ellipsis=True))
+    assert not matches("n 100 ... m", "n 103 or so m", within("0.01", ellipsis=True))
+
+
+# --------------------------------------------------------------------------------------- filters
+
+
+def test_filters_apply_to_both_sides() -> None:
+    address = Filter(r"0x[0-9a-f]+", "0x…")
+    assert verdict("<body at 0x7f>", "<body at 0xab>", EXACT, (address,)).status == "verified"
+    assert verdict("<body at 0x…>", "<body at 0xab>", EXACT, (address,)).status == "verified"
+
+
+def test_filters_come_one_after_the_other() -> None:
+    filters = (Filter(r"took \d+ s", "took T"), Filter(r" T\b", " TIME"))
+    assert verdict("took TIME", "took 12 s", EXACT, filters).status == "verified"
+
+
+def test_a_filter_can_drop_lines() -> None:
+    warning = Filter(r"^Warning:.*\n", "")
+    assert verdict("a\nb", "a\nWarning: x\nWarning: y\nb\n", EXACT, (warning,)).status == "verified"
+
+
+def test_groups_and_empty_matches() -> None:
+    swap = Filter(r"(\w)-(\w)?", r"\2\1")
+    assert verdict("ba c", "a-b c-", EXACT, (swap,)).status == "verified"
+
+
+def test_places_behind_filters_are_true() -> None:
+    filters = (Filter(r"0x[0-9a-f]+", "somewhere"), Filter(r"^#.*\n", ""))
+    lesson = "# one\nat 0x1 E 1.5 b\n# two\nat 0x22 F 2.5"
+    found = verdict(lesson, "at 0x333 E 1.5 b\n# more\nat 0x4 F 2.6", EXACT, filters)
+    assert [seen(c) for c in found.changes] == [("numeric", "2.5", "2.6", 3)] or [
+        seen(c) for c in found.changes
+    ] == [("rounding", "2.5", "2.6", 3)]
+    (change,) = found.changes
+    assert change.span.source.line_text(change.span.line) == "at 0x22 F 2.5"
+    assert change.span.column == len("at 0x22 F ") + 1
+
+
+def test_a_change_inside_what_a_filter_wrote_is_all_that_it_replaced() -> None:
+    shorter = Filter(r"(\d\.\d)\d+", r"\1")
+    found = verdict("E 6.6411 J", "E 6.7022 J", EXACT, (shorter,))
+    assert [seen(c) for c in found.changes] == [("rounding", "6.6411", "6.7022", 1)]

@@ -1,0 +1,90 @@
+"""What holds of the comparison for all outputs."""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Comparison
+from coursebuild.core.model.results import DriftKind
+from support.sample_lessons import (
+    DIGITS,
+    DIGITS_ELLIPSIS,
+    ELLIPSIS,
+    EXACT,
+    within,
+)
+from support.sample_verdicts import matches, seen, verdict
+
+WORDS = st.sampled_from(
+    ["a", "b c", "x=1.5", "1.5", "2", "-0.0", "nan", "...", "", "  ", "e-3", "|"]
+)
+OUTPUTS = st.lists(st.lists(WORDS, max_size=4).map(" ".join), max_size=6).map("\n".join)
+MODES = st.sampled_from([EXACT, DIGITS, within("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
+
+
+@given(OUTPUTS, MODES)
+def test_every_output_matches_itself(output: str, comparison: Comparison) -> None:
+    assert verdict(output, output, comparison).status == "verified"
+
+
+@given(OUTPUTS, OUTPUTS, MODES)
+def test_changes_have_true_places(recorded: str, printed: str, comparison: Comparison) -> None:
+    found = verdict(recorded, printed, comparison, prefix="> ", eol="\r\n")
+    assert found.status in ("verified", "drift")
+    assert bool(found.changes) == (found.status == "drift") == bool(found.diff)
+    lines = printed.split("\n")
+    for change in found.changes:
+        seen(change)
+        assert found.recording.body_span.contains(change.span)
+        if change.kind is not DriftKind.MISSING:
+            assert change.ran.split("\n")[0] in lines[change.ran_line - 1]
+
+
+@given(OUTPUTS, OUTPUTS)
+def test_exact_is_equality_of_stripped_lines(recorded: str, printed: str) -> None:
+    def bare(text: str) -> list[str]:
+        return [line.rstrip() for line in text.rstrip().split("\n")]
+
+    assert matches(recorded, printed) == (bare(recorded) == bare(printed))
+
+
+@given(OUTPUTS, OUTPUTS)
+def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: str) -> None:
+    def bare(text: str) -> list[str]:
+        return [line.rstrip() for line in text.rstrip().split("\n")] if text.strip() else []
+
+    pattern = ""
+    for line in bare(recorded):
+        if line.strip() == "...":
+            pattern += r"(?:[^\n]*\n)*"
+        else:
+            pattern += r"[^\n]*".join(re.escape(part) for part in line.split("...")) + r"\n"
+    text = "".join(line + "\n" for line in bare(printed))
+    expected = re.fullmatch(pattern, text) is not None
+    assert matches(recorded, printed, ELLIPSIS) == expected
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6, allow_subnormal=False), min_size=1, max_size=8), st.integers(0, 6)
+)
+def test_digits_takes_every_value_that_rounds_to_the_recorded_one(
+    values: list[float], places: int
+) -> None:
+    recorded = " ".join(f"{value:.{places}e}" for value in values)
+    printed = " ".join(repr(value) for value in values)
+    assert matches(f"[{recorded}]", f"[{printed}]", DIGITS)
+
+
+@given(st.integers(-(10**6), 10**6), st.integers(1, 6))
+def test_the_border_of_digits_is_exact(value: int, places: int) -> None:
+    number = Decimal(value).scaleb(-places)
+    half = Decimal(5).scaleb(-places - 1)
+    little = Decimal(1).scaleb(-places - 12)
+    assert matches(f"{number:f}", f"{number + half:f}", DIGITS)
+    assert matches(f"{number:f}", f"{number - half:f}", DIGITS)
+    assert not matches(f"{number:f}", f"{number + half + little:f}", DIGITS)
+    assert not matches(f"{number:f}", f"{number - half - little:f}", DIGITS)

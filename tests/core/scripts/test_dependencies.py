@@ -1,0 +1,286 @@
+"""Keys of results, what counts as a change, and the words for it."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.core.scripts.dependencies import (
+    ABSENT,
+    FOLDER,
+    SPECIAL,
+    Dependency,
+    Inputs,
+    Kind,
+    Need,
+    described,
+    folded,
+    forgotten,
+    group_key,
+    input_changes,
+    inputs_of,
+    needs,
+    result_key,
+    sought,
+    sought_files,
+    state_changes,
+)
+
+AROUND = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
+INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND)
+OTHERS = {
+    "path": "examples/b.py",
+    "text": "1" * 64,
+    "args": ("--slow",),
+    "timeout": 20.0,
+    "requires": (),
+    "around": (*AROUND, ("environment variable MUJOCO_GL", "egl")),
+    "version": "0",
+}
+PLACES = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
+NOTHING = Trace((), (), (), (), "")
+
+
+def run(
+    outcome: Outcome = Outcome.OK, trace: Trace | None = NOTHING, **fields: object
+) -> ScriptRun:
+    base = ScriptRun("examples/a.py", outcome, 0, "", "", 0.1, trace=trace)
+    return replace(base, **fields)  # type: ignore[arg-type]
+
+
+# --- keys
+
+
+def test_every_input_is_in_the_key() -> None:
+    keys = {group_key(replace(INPUTS, **{name: value})) for name, value in OTHERS.items()}
+    assert len(keys | {group_key(INPUTS)}) == len(OTHERS) + 1
+
+
+@given(st.lists(st.text(max_size=3), max_size=3), st.lists(st.text(max_size=3), max_size=3))
+def test_arguments_are_told_apart(one: list[str], two: list[str]) -> None:
+    keys = [group_key(replace(INPUTS, args=tuple(args))) for args in (one, two)]
+    assert (keys[0] == keys[1]) == (one == two)
+    moved = group_key(replace(INPUTS, args=(), requires=tuple(one)))
+    assert moved != keys[0] or not one
+
+
+def test_a_name_that_is_no_text_has_a_key() -> None:
+    dependency = Dependency(Kind.FILE, "models/\udcff.bin", "0" * 64)
+    assert len(result_key([dependency])) == 64
+
+
+def test_the_order_of_dependencies_does_not_count() -> None:
+    one, two = Dependency(Kind.FILE, "a", "1"), Dependency(Kind.FILE, "b", "2")
+    assert result_key([one, two]) == result_key([two, one])
+    assert result_key([one]) != result_key([replace(one, kind=Kind.OUTSIDE)])
+
+
+def test_inputs_of_a_job() -> None:
+    job = ScriptJob("examples/a.py", ("-v",), 5, ("scipy",), False)
+    one = inputs_of(job, b"print(1)\n", AROUND)
+    assert one == inputs_of(job, b"print(1)\n", AROUND)
+    assert one.text != inputs_of(job, b"print(2)\n", AROUND).text
+    assert (one.timeout, one.args, one.requires) == (5.0, ("-v",), ("scipy",))
+
+
+# --- needs
+
+
+def test_needs_of_a_run() -> None:
+    trace = Trace(
+        files=("models/a.xml", "models/b.xml"),
+        folders=("models",),
+        outside=("/etc/hosts", "/opt/tool/mjcourse/spatial.py", "/opt/tool/mjcourse/__init__.py"),
+        modules=("numpy",),
+        opaque="",
+    )
+    found = needs(run(trace=trace), ("scipy.optimize", "numpy"), PLACES)
+    assert found == (
+        Need(Kind.FILE, "models/a.xml"),
+        Need(Kind.FILE, "models/b.xml"),
+        Need(Kind.LISTING, "models"),
+        Need(Kind.MODULE, "mjcourse"),
+        Need(Kind.MODULE, "numpy"),
+        Need(Kind.MODULE, "scipy"),
+        Need(Kind.OUTSIDE, "/etc/hosts"),
+    )
+
+
+def test_who_prints_a_path_of_this_machine_depends_on_it() -> None:
+    found = needs(run(stdout="read /home/me/course/models/a.xml\n"), (), PLACES)
+    assert found == (Need(Kind.PLACE, "course"), Need(Kind.PLACE, "home"))
+    assert needs(run(stdout="nothing\n", stderr="/home/me/course"), (), PLACES) == ()
+    short = (("course", "/"), ("library", "/opt/tool"), ("home", ""))
+    assert needs(run(stdout="1/2 of it\n"), (), short) == ()
+
+
+# --- what is not remembered
+
+
+@pytest.mark.parametrize(
+    ("outcome", "fields", "words"),
+    [
+        (Outcome.OK, {}, ""),
+        (Outcome.FAILED, {"stderr": "ValueError: no"}, ""),
+        (Outcome.OUTPUT_LIMIT, {}, ""),
+        (Outcome.ENCODING, {}, ""),
+        (Outcome.TIMEOUT, {}, "it was stopped after its time limit"),
+        (Outcome.KILLED, {}, "a signal ended it"),
+        (Outcome.SKIPPED, {"missing": ("scipy", "jax")}, "it needs scipy, jax"),
+        (Outcome.NORUN, {}, "its lesson says `norun`"),
+        (Outcome.FAILED, {"stderr": "x\nModuleNotFoundError: jax"}, "it did not find a module"),
+        (Outcome.FAILED, {"stderr": "ImportError: cannot import name"}, "it did not find a module"),
+        (Outcome.OK, {"trace": None}, "nobody could watch what it looks at"),
+        (Outcome.OK, {"trace": replace(NOTHING, opaque="it starts others")}, "it starts others"),
+        (Outcome.OK, {"trace": replace(NOTHING, outside=("/dev/null",))}, ""),
+        (Outcome.OK, {"trace": replace(NOTHING, outside=("/dev/random",))}, "it reads /dev/random"),
+        (Outcome.OK, {"trace": replace(NOTHING, outside=("/proc/stat",))}, "it reads /proc/stat"),
+    ],
+)  # fmt: skip
+def test_what_is_not_remembered(outcome: Outcome, fields: dict[str, object], words: str) -> None:
+    assert forgotten(run(outcome, **fields)) == words
+
+
+# --- words
+
+
+def test_changes_of_inputs() -> None:
+    now = Inputs(
+        "examples/a.py",
+        "1" * 64,
+        (),
+        20.0,
+        (),
+        (("Python", "CPython 3.12.1"), ("environment variable MUJOCO_GL", "egl")),
+        "of another version",
+    )
+    assert input_changes(INPUTS, now) == [
+        "its text changed",
+        "its arguments changed: --fast → none",
+        "its option `timeout` changed: 10 → 20",
+        "its option `requires` changed: scipy → none",
+        "Python: CPython 3.11.7 → CPython 3.12.1",
+        "environment variable MUJOCO_GL: unset → egl",
+        "platform: linux x86_64 → unset",
+        "this version of coursebuild runs scripts in another way",
+    ]
+    assert input_changes(INPUTS, INPUTS) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "then", "now", "words"),
+    [
+        (Kind.FILE, "models/a.xml", "1", "2", "models/a.xml changed"),
+        (Kind.FILE, "models/a.xml", "1", ABSENT, "models/a.xml is gone"),
+        (Kind.FILE, "models/a.xml", ABSENT, "1", "models/a.xml appeared"),
+        (Kind.FILE, "models/a.xml", "1", FOLDER, "models/a.xml is a folder now"),
+        (Kind.FILE, "models/a.xml", FOLDER, "1", "models/a.xml changed"),
+        (Kind.FILE, "models/a.xml", "1", "unreadable: permission denied",
+         "models/a.xml is unreadable: permission denied"),
+        (Kind.OUTSIDE, "/etc/hosts", "1", "2", "/etc/hosts changed"),
+        (Kind.OUTSIDE, "/dev/tty", SPECIAL, SPECIAL, "/dev/tty may have changed"),
+        (Kind.LISTING, "models", "1", "2", "the list of files in models changed"),
+        (Kind.LISTING, "models", "1", ABSENT, "the folder models is gone"),
+        (Kind.LISTING, "models", ABSENT, "1", "the folder models appeared"),
+        (Kind.SOUGHT, "examples/{ast,json}", "", "json",
+         "examples has a file now with the name of a module: json"),
+        (Kind.MODULE, "numpy", "numpy 2.3.1", "numpy 2.3.2", "numpy 2.3.1 → numpy 2.3.2"),
+        (Kind.MODULE, "numpy", "numpy 2.3.1", "",
+         "numpy is no longer installed (it was numpy 2.3.1)"),
+        (Kind.MODULE, "scipy", "", "scipy 1.17.1", "scipy is installed now: scipy 1.17.1"),
+        (Kind.MODULE, "mjcourse", "files 1", "files 2",
+         "the files of the module mjcourse changed"),
+        (Kind.PLACE, "course", "/a", "/b", "it printed a path of this machine: /a → /b"),
+    ],
+)  # fmt: skip
+def test_changes_of_states(kind: Kind, name: str, then: str, now: str, words: str) -> None:
+    dependency = Dependency(kind, name, then)
+    assert list(state_changes([dependency], lambda _: now)) == [words]
+    assert (list(state_changes([dependency], lambda _: then)) == []) == (then != SPECIAL)
+
+
+def test_dependencies_as_lines() -> None:
+    dependencies = [
+        Dependency(Kind.FILE, "models/a.xml", "1"),
+        Dependency(Kind.FILE, "models/b.xml", ABSENT),
+        Dependency(Kind.LISTING, "models", "1"),
+        Dependency(Kind.LISTING, "", "1"),
+        Dependency(Kind.SOUGHT, "examples/{ast,json}", ""),
+        Dependency(Kind.SOUGHT, "examples/{a,b,c,d,e,f,g,h}", ""),
+        Dependency(Kind.MODULE, "numpy", "numpy 2.3.1"),
+        Dependency(Kind.MODULE, "jax", ""),
+        Dependency(Kind.MODULE, "mjcourse", "files 12"),
+        Dependency(Kind.PLACE, "course", "/home/me"),
+    ]
+    assert [described(dependency) for dependency in dependencies] == [
+        "models/a.xml",
+        "models/b.xml (not there)",
+        "the list of files in models",
+        "the list of files in .",
+        "no file of examples having the name of a module (ast, json)",
+        "no file of examples having the name of a module (a, b, c, d, e, f and 2 more)",
+        "numpy 2.3.1",
+        "the module jax (not installed)",
+        "the files of the module mjcourse",
+        "that /home/me is where it is: it printed that",
+    ]
+
+
+def test_modules_sought_in_vain_are_one_need_a_folder() -> None:
+    def pair(package: str) -> list[Need]:
+        return [Need(Kind.FILE, f"{package}{end}") for end in (".py", "/__init__.py")]
+
+    there = Need(Kind.FILE, "examples/helper.py")
+    lone = Need(Kind.FILE, "examples/data.py")
+    odd = pair("examples/no-module") + pair("examples/a,b")
+    vain = [*pair("examples/json"), *pair("examples/ast"), *pair("lib/x{y/re")]
+    here = [*pair("examples/helper"), Need(Kind.MODULE, "numpy")]
+    states = {there: "1"}
+    found = folded([*vain, *here, lone, *odd], lambda need: states.get(need, ABSENT))
+    assert set(found) == {
+        Need(Kind.SOUGHT, "examples/{ast,json}"),
+        Need(Kind.SOUGHT, "lib/x{y/{re}"),
+        *here,
+        lone,
+        *odd,
+    }
+    assert sought("lib/x{y/{re}") == ("lib/x{y", ("re",))
+    assert sought_files("examples/{ast,json}") == (
+        "examples/ast.py",
+        "examples/ast/__init__.py",
+        "examples/json.py",
+        "examples/json/__init__.py",
+    )
+
+
+PARTS = st.lists(st.sampled_from(("a", "b-c", "__init__", "é")), min_size=1, max_size=3)
+NAMED = st.builds(
+    lambda parts, end: "/".join(parts) + end,
+    PARTS,
+    st.sampled_from((".py", "/__init__.py", "", ".txt")),
+)
+
+
+@given(st.sets(NAMED), st.sets(NAMED), st.randoms())
+def test_folding_leaves_nothing_out(names: set[str], there: set[str], random: Random) -> None:
+    def state(need: Need) -> str:
+        return "1" if need.name in there else ABSENT
+
+    needed = [Need(Kind.FILE, name) for name in sorted(names)] + [Need(Kind.MODULE, "a.py")]
+    found = folded(needed, state)
+    random.shuffle(needed)
+    assert folded(needed, state) == found
+    left = {need.name for need in found if need.kind is Kind.FILE}
+    hidden = [one for need in found if need.kind is Kind.SOUGHT for one in sought_files(need.name)]
+    assert sorted([*left, *hidden]) == sorted(names)
+    assert not there.intersection(hidden)
+    folders = [sought(need.name)[0] for need in found if need.kind is Kind.SOUGHT]
+    assert len(folders) == len(set(folders))
+    modules = (name.removesuffix(".py") for name in left if name.endswith(".py"))
+    pairs = [(f"{m}.py", f"{m}/__init__.py") for m in modules if m.split("/")[-1].isidentifier()]
+    assert all(pair[1] not in left or there.intersection(pair) for pair in pairs)

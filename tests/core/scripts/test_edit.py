@@ -1,0 +1,240 @@
+"""New outputs as edits of a lesson's text, and what is refused."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.text.diagnostics import Edit
+from coursebuild.core.text.source import Source
+from support.sample_edits import body, edited, refused
+from support.sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, VOLATILE, recording
+
+# ------------------------------------------------------------------------------------ new text
+
+
+def test_the_output_is_written() -> None:
+    assert body("a 1.5\nb", "a 2.5\nb\nc  \n\n\n") == "a 2.5\nb\nc\n"
+    assert body("", "a\n") == "a\n"
+    assert body("a\nb\nc", "\n\na") == "\n\na\n"
+
+
+def test_the_whole_text_is_that_of_the_first_run() -> None:
+    assert body("a 1.50\nb 2.50", "a 1.502\nb 2.6", DIGITS) == "a 1.502\nb 2.6\n"
+
+
+def test_line_ends_and_prefixes_are_the_lesson_s() -> None:
+    assert body("a", "b\n\nc", eol="\r\n") == "b\r\n\r\nc\r\n"
+    assert body("a", "b\n\nc", eol="\r") == "b\r\rc\r"
+    assert body("a", "b\r\n\r\nc", prefix="> ") == "> b\n>\n> c\n"
+    assert body("a", " b\n\nc", prefix="   ", eol="\r\n") == "    b\r\n\r\n   c\r\n"
+    assert body("", "b\n\nc", prefix=">   ") == ">   b\n>\n>   c\n"
+
+
+def test_what_matches_is_left_alone() -> None:
+    for recorded, printed, comparison in (
+        ("a", "a\n", EXACT),
+        ("a  ", "a", EXACT),
+        ("a 1.50", "a 1.502", DIGITS),
+        ("a ... b", "a x b", ELLIPSIS),
+        ("a\n...", "a\nb", ELLIPSIS),
+        ("took 1 s", "took 1 s", VOLATILE),
+    ):
+        assert updated_body(recording(recorded), comparison, (), printed, printed) is None
+
+
+def test_volatile_text_is_refreshed_from_the_first_run() -> None:
+    new = edited(recording("took 1 s"), "took 2 s\n", VOLATILE, again="took 3 s\n")
+    assert new.body_span.text == "took 2 s\n"
+
+
+def test_a_tilde_fence_holds_backticks() -> None:
+    assert body("a", "```\nb", fence="~~~") == "```\nb\n"
+    assert body("a", "```\n~~~~\nb", fence="~~~~~") == "```\n~~~~\nb\n"
+    assert body("a", "    ```\n```x\n``\nb") == "    ```\n```x\n``\nb\n"
+
+
+def test_control_characters_are_kept() -> None:
+    assert body("a", "\x1b[31mred\x1b[0m\x07\tb") == "\x1b[31mred\x1b[0m\x07\tb\n"
+
+
+# ------------------------------------------------------------------------------------- refusals
+
+
+def test_a_line_that_closes_the_fence() -> None:
+    assert (
+        refused("a", "x\n  `````  \n")
+        == """\
+output-not-updatable at 6:1 ````
+  the output has a line that would close this fence
+  help: open and close it with 6 backticks, then update again""".replace("````\n", "`" * 5 + "\n")
+    )
+    assert "with 4 tildes" in refused("a", "~~~", fence="~~~")
+
+
+def test_a_nul() -> None:
+    assert (
+        refused("a", "x\nb\x00\n")
+        == """\
+output-not-updatable at 6:1 `````
+  line 2 of the output has a NUL character, which Markdown cannot hold
+  help: print text only"""
+    )
+
+
+def test_nothing_printed() -> None:
+    for comparison in (EXACT, VOLATILE):
+        assert (
+            refused("a", " \n", comparison)
+            == """\
+output-not-updatable at 4:1 `Output:`
+  the script printed nothing to record"""
+        )
+
+
+def test_runs_that_differ() -> None:
+    assert (
+        refused("a", "x 1\ny\nz 3\n", again="x 1\ny\nz 4\nnew\n")
+        == """\
+output-unstable at 4:1 `Output:`
+  two runs of the script printed different lines
+  note: line 3: `z 3` in one run, `z 4` in the next
+  note: `new` was printed in the second run only
+  help: make the script print the same each time (a fixed seed, no clock), \
+put `volatile` on the fence, elide what varies by `ellipsis` and `...`, \
+or filter it by `[[verify.filter]]` in content/course.toml"""
+    )
+
+
+def test_a_recording_that_matches_one_run_only_is_unstable() -> None:
+    assert "`lost` was printed in the first run only" in refused("a\nlost", "a\nlost", again="a")
+    text = refused(
+        "a", "\n".join(f"{i}" for i in range(12)), again="\n".join(f"{i}x" for i in range(12))
+    )
+    assert "note: and 2 more lines" in text
+    text = refused(
+        "a", "\n".join(f"{i}" for i in range(11)), again="\n".join(f"{i}x" for i in range(11))
+    )
+    assert "note: and 1 more line\n" in text
+
+
+def test_stable_is_what_the_comparison_takes() -> None:
+    new = edited(recording("x 9.99"), "x 1.500", DIGITS, again="x 1.5004")
+    assert new.body_span.text == "x 1.500\n"
+    assert "output-unstable" in refused("x 9.99", "x 1.500", DIGITS, again="x 1.501")
+    new = edited(recording("a 1\n..."), "a 2\n0x1", ELLIPSIS, again="a 2\n0x2")
+    assert new.body_span.text == "a 2\n...\n"
+    filters = (Filter("0x.", "0x"),)
+    found = updated_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
+    assert isinstance(found, Edit) and found.text == "b 0x1\n"
+
+
+# -------------------------------------------------------------------------------------- ellipsis
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("a 1\n...\nb 2", "a 3\nx\ny\nb 4", "a 3\n...\nb 4\n"),
+        ("a 1\n...\nb 2", "a 3\nb 2", "a 3\n...\nb 2\n"),
+        ("t=... s\na 1", "t=0.3 s\na 2", "t=... s\na 2\n"),
+        ("t=... s, E=1.5 J", "t=0.3 s, E=2.5 J", "t=... s, E=2.5 J\n"),
+        ("E 1.5 at t=...", "E 2.5 at t=0.3", "E 2.5 at t=...\n"),
+        ("a\n...\n...\nb 1", "a\nb 2", "a\n...\n...\nb 2\n"),
+        ("...\nb 1\nc", "x\nb 2\nc", "...\nb 2\nc\n"),
+        ("a 1\n...", "a 2", "a 2\n...\n"),
+        ("a\nb\nc\n...\nd", "a\nc\nx\nd", "a\nc\n...\nd\n"),
+        ("a x\nb\n...\nz 1", "a x\nnew\nb\nw\nz 1", "a x\nnew\nb\n...\nz 1\n"),
+    ],
+)
+@pytest.mark.parametrize("comparison", [ELLIPSIS, DIGITS_ELLIPSIS], ids=["exact", "digits"])
+def test_ellipses_are_kept(
+    recorded: str, printed: str, expected: str, comparison: Comparison
+) -> None:
+    assert body(recorded, printed, comparison) == expected
+
+
+def test_under_digits_the_numbers_beside_an_ellipsis_are_brought_up_to_date() -> None:
+    assert (
+        body("a 1.50\n...\nb 2.50", "a 1.502\nx\nb 2.9", DIGITS_ELLIPSIS) == "a 1.502\n...\nb 2.9\n"
+    )
+
+
+def test_ellipses_that_cannot_be_kept() -> None:
+    assert (
+        refused("t=... s, E", "u=0.3 s, F", ELLIPSIS)
+        == """\
+output-not-updatable at 7:1 `t=... s, E`
+  an output with `...` cannot be brought up to date here
+  ^ this line no longer fits what the script prints
+  help: write the line anew by hand, or take the `...` away and update again"""
+    )
+    assert (
+        refused("a\n...\nthe end", "a\nx\ny", ELLIPSIS)
+        == """\
+output-not-updatable at 9:1 `the end`
+  an output with `...` cannot be brought up to date here
+  ^ this line was not printed where `...` is
+  help: write the line anew by hand, or take the `...` away and update again"""
+    )
+
+
+# --------------------------------------------------------------------------------------- filters
+
+
+def test_what_matches_by_a_filter_stays_as_written() -> None:
+    filters = (Filter(r"\d+ ms", "T ms"), Filter(r"^#.*\n", ""))
+    recorded = "# kept\nrun T ms\nE 1.5\n# also"
+    printed = "# other\n# more\nrun 17 ms\nE 2.5\n"
+    # What a filter deletes before a line goes with the line above it.
+    assert body(recorded, printed, EXACT, filters) == "# kept\nrun T ms\nE 2.5\n"
+
+
+def test_filters_see_no_white_space_at_ends() -> None:
+    assert body("a", "x 1\ny  \n", EXACT, (Filter(r" +$", "!"),)) == "x 1\ny\n"
+    assert body("", "b", EXACT, (Filter(r"^b.*\n", "c\n"),)) == "b\n"
+    # All that was printed is filtered away, and so is what is recorded.
+    assert updated_body(recording("b 1"), EXACT, (Filter(r"^b.*\n", ""),), "b 2", "b 3") is None
+
+
+# ----------------------------------------------------------------------------------------- edits
+
+
+def edits_of(text: str, *changes: tuple[int, int, str]) -> list[Edit]:
+    source = Source("a.md", text)
+    return [Edit(source.span(start, end), new) for start, end, new in changes]
+
+
+def test_edits_are_applied_by_offset() -> None:
+    edits = edits_of("abcdef", (4, 5, "X"), (0, 1, ""), (1, 3, "YZW"), (6, 6, "!"))
+    assert apply_edits("abcdef", edits) == "YZWdXf!"
+    assert apply_edits("abc", []) == "abc"
+    assert apply_edits("abc", edits_of("abc", (1, 1, "X"), (1, 2, "Y"))) == "aXYc"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [[(0, 2, ""), (1, 3, "")], [(1, 1, "x"), (1, 1, "y")], [(0, 3, ""), (1, 1, "x")], [(2, 1, "")]],
+)
+def test_edits_that_overlap_are_a_bug(changes: list[tuple[int, int, str]]) -> None:
+    with pytest.raises(ValueError, match="edits overlap at offset"):
+        apply_edits("abcdef", edits_of("abcdef", *changes))
+
+
+def test_edits_of_another_text_are_a_bug() -> None:
+    with pytest.raises(ValueError, match=re.escape("an edit of another text than a.md is now")):
+        apply_edits("abcdef", edits_of("abc", (0, 1, "x")))
+
+
+def test_a_body_span_inside_a_line_is_widened() -> None:
+    """Whether a parser's span begins before or after the prefix, whole lines are replaced."""
+    lesson = recording("a\nb", prefix="> ")
+    inner = replace(
+        lesson.body_span, start=lesson.body_span.start + 2, end=lesson.body_span.end + 2
+    )
+    edit = updated_body(replace(lesson, body_span=inner), EXACT, (), "c", "c")
+    assert isinstance(edit, Edit) and (edit.span, edit.text) == (lesson.body_span, "> c\n")

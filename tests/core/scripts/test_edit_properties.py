@@ -1,0 +1,108 @@
+"""Whatever was recorded and printed: after an update all is well, or it was refused."""
+
+from __future__ import annotations
+
+import re
+
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.edit import updated_body
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from support.sample_edits import edited
+from support.sample_lessons import (
+    DIGITS,
+    DIGITS_ELLIPSIS,
+    ELLIPSIS,
+    EXACT,
+    VOLATILE,
+    recording,
+    within,
+)
+
+CHARACTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\x00\n\r")
+LINES = st.one_of(
+    st.text(CHARACTERS, max_size=12),
+    st.sampled_from(
+        ["", "a 1.5", "a 1.6", "b", "[ 0.1 -0.2]", "x=3 y", "c  ", "\td", "e-3 nan", "``", "> q"]
+    ),
+)
+OUTPUTS = st.lists(LINES, min_size=1, max_size=7).map("\n".join)
+PREFIXES = st.sampled_from(["", "> ", "   ", ">   ", "> > "])
+EOLS = st.sampled_from(["\n", "\r\n"])
+RULES = st.lists(
+    st.sampled_from(
+        [Filter(r"\d\.\d", "N"), Filter(r"^b.*\n", ""), Filter("x", "y"), Filter(r" +$", "")]
+    ),
+    max_size=2,
+).map(tuple)
+
+
+@given(
+    OUTPUTS,
+    OUTPUTS,
+    st.sampled_from([EXACT, DIGITS, VOLATILE, within("0.05", "0.05")]),
+    RULES,
+    PREFIXES,
+    EOLS,
+)
+def test_after_an_update_all_is_well(
+    recorded: str,
+    printed: str,
+    comparison: Comparison,
+    filters: tuple[Filter, ...],
+    prefix: str,
+    eol: str,
+) -> None:
+    assume(printed.strip())
+    assume(
+        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
+    )
+    lesson = recording(recorded, prefix=prefix, eol=eol)
+    found = updated_body(lesson, comparison, filters, printed, printed)
+    if found is None:
+        assert compare(lesson, comparison, filters, printed).status != "drift"
+    else:
+        new = edited(lesson, printed, comparison, filters)
+        if not filters:
+            assert compare(new, EXACT, (), printed).status == "verified"
+
+
+MARKED = st.lists(
+    st.one_of(LINES, st.sampled_from(["...", "a ... b", "a 1.5 ...", "x=... y", "... 1.5"])),
+    max_size=7,
+).map("\n".join)
+
+
+@given(MARKED, OUTPUTS, st.sampled_from([ELLIPSIS, DIGITS_ELLIPSIS]), PREFIXES, EOLS)
+def test_an_update_with_ellipses_is_right_or_refused(
+    recorded: str, printed: str, comparison: Comparison, prefix: str, eol: str
+) -> None:
+    assume(printed.strip())
+    assume(
+        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
+    )
+    lesson = recording(recorded, prefix=prefix, eol=eol)
+    found = updated_body(lesson, comparison, (), printed, printed)
+    if isinstance(found, Edit):
+        edited(lesson, printed, comparison)
+    elif isinstance(found, Diagnostic):
+        assert found.rule == "output-not-updatable"
+        assert "..." in recorded
+
+
+@given(OUTPUTS, OUTPUTS, OUTPUTS)
+def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
+    assume(
+        first.strip()
+        and not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + first).split("\n"))
+    )
+    lesson = recording(recorded)
+    found = updated_body(lesson, EXACT, (), first, second)
+    same = compare(recording(first), EXACT, (), second).status == "verified"
+    if isinstance(found, Diagnostic):
+        assert not same and found.rule == "output-unstable"
+    else:
+        assert same

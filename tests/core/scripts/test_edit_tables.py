@@ -1,0 +1,103 @@
+"""Recorded tables are updated in place, or the update is refused."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.edit import updated_body
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from support.sample_edits import edited
+from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, told, within
+
+HEAD = "| a | b | c |\n| --- | --- | --- |\n"
+
+
+def table_after(
+    rows: str, printed: str, comparison: Comparison = EXACT, filters: tuple[Filter, ...] = ()
+) -> str:
+    new = edited(table(HEAD + rows), printed, comparison, filters)
+    return new.body_span.text.removeprefix(HEAD)
+
+
+def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
+    rows = "| `RK4` | **−0.000 %** |  3.9e-11|\n| Euler | +6.641 % | 6.9e-04 |"
+    printed = "RK4    -0.001 % of 3.9e-11\nEuler  +6.702 % of 7.5e-04\n"
+    assert table_after(rows, printed) == (
+        "| `RK4` | **−0.001 %** |  3.9e-11|\n| Euler | +6.702 % | 7.5e-04 |"
+    )
+
+
+def test_a_table_under_digits_keeps_its_decimals() -> None:
+    rows = "| Euler | 6.6 | 7e-04 |\n| RK4 | −1.25 | 4 |"
+    printed = "Euler +6.7021 9.12e-04\nRK4 -2.349 5\n"
+    assert table_after(rows, printed, DIGITS) == "| Euler | 6.7 | 9e-04 |\n| RK4 | −2.35 | 5 |"
+    assert table_after(rows, printed, within("0.01")) == (
+        "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
+    )
+
+
+def test_a_table_that_matches_is_left_alone() -> None:
+    for comparison in (EXACT, VOLATILE):
+        assert updated_body(table(HEAD + "| x | 1.5 | |"), comparison, (), "x 1.5", "x 1.5") is None
+
+
+def test_a_row_without_a_line_is_refused() -> None:
+    found = updated_body(
+        table(HEAD + "| x | 1.5 | |\n| **y** | 2.5 | |"), EXACT, (), "x 2.5", "x 2.5"
+    )
+    assert isinstance(found, Diagnostic)
+    assert (
+        told(found)
+        == """\
+output-not-updatable at 10:3 `**y** | 2.5`
+  no line of this run has the cells of this row in order
+  help: bring the row up to date by hand"""
+    )
+
+
+def test_a_table_of_runs_that_differ() -> None:
+    found = updated_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5", "x 2.6")
+    assert isinstance(found, Diagnostic)
+    assert (
+        told(found)
+        == """\
+output-unstable at 5:1 `Output:`
+  two runs of the script printed different lines
+  note: line 1: `x 2.5` in one run, `x 2.6` in the next
+  help: make the script print the same each time (a fixed seed, no clock), \
+or record the output in a `text` fence with `volatile`"""
+    )
+
+
+def test_lines_that_no_row_shows_may_differ_between_runs() -> None:
+    found = updated_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
+    assert isinstance(found, Edit) and found.text == "2.5"
+
+
+CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])
+
+
+@given(
+    st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=4),
+    st.lists(
+        st.sampled_from(["Euler 1.6 % -2.51 4", "RK4 1.5 % 3.8e-11 5", "x 7 x 8 -9.25", "4"]),
+        min_size=1,
+        max_size=5,
+    ),
+    st.sampled_from([EXACT, DIGITS, within("0.5")]),
+)
+def test_tables_are_updated_right_or_refused(
+    rows: list[tuple[str, str, str]], lines: list[str], comparison: Comparison
+) -> None:
+    lesson = table(HEAD + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows))
+    printed = "\n".join(lines)
+    found = updated_body(lesson, comparison, (), printed, printed)
+    if isinstance(found, Edit):
+        edited(lesson, printed, comparison)
+    elif isinstance(found, Diagnostic):
+        assert found.rule == "output-not-updatable"
+    else:
+        assert compare(lesson, comparison, (), printed).status == "verified"

@@ -1,0 +1,265 @@
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.core.model.results import Outcome
+from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.scripts.failures import failure, in_lessons, silence
+from support.sample_lessons import course, document, ran, recording, told
+
+
+def extractions() -> tuple[Extraction, ...]:
+    one = """\
+Intro.
+
+```python file=examples/a.py timeout=2.5
+import helper
+
+def go():
+    helper.fall()
+go()
+```
+"""
+    two = (
+        "# x\n\n> ```python file=examples/helper.py\n> def fall():\n>     raise ValueError\n> ```\n"
+    )
+    return extract(
+        course(
+            document(one, "content/lessons/4.2-mass.md"),
+            document(two, "content/lessons/1.1-first.md", "> "),
+        )
+    ).value
+
+
+def said(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -> str:
+    found = extractions()
+    diagnostic = failure(found[0], ran(outcome=outcome, status=status, stderr=stderr), found)
+    assert diagnostic is not None
+    return f"{diagnostic.span.path}\n{told(diagnostic)}"
+
+
+OWN = """\
+Traceback (most recent call last):
+  File "/any/abs/examples/a.py", line 5, in <module>
+    go()
+  File "/any/abs/examples/a.py", line 4, in go
+    helper.fall()
+  File "/usr/lib/python3.11/json/decoder.py", line 355, in decode
+    raise JSONDecodeError("Expecting value", s, err.value) from None
+json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
+and a second line
+"""
+
+
+def test_a_traceback_points_into_the_lesson() -> None:
+    assert (
+        said(OWN)
+        == """\
+content/lessons/4.2-mass.md
+script-failed at 7:5 `helper.fall()`
+  `examples/a.py` exited with status 1
+  ^ json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
+  note: its standard error:
+    Traceback (most recent call last):
+      File "content/lessons/4.2-mass.md", line 8, in <module>
+        go()
+      File "content/lessons/4.2-mass.md", line 7, in go
+        helper.fall()
+      File "/usr/lib/python3.11/json/decoder.py", line 355, in decode
+        raise JSONDecodeError("Expecting value", s, err.value) from None
+    json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
+    and a second line"""
+    )
+
+
+def test_a_traceback_that_ends_in_a_sibling_example() -> None:
+    stderr = (
+        "Traceback (most recent call last):\n"
+        '  File "C:\\course\\examples\\a.py", line 5, in <module>\n    go()\n'
+        '  File "C:\\course\\examples\\helper.py", line 2, in fall\n    raise ValueError\n'
+        "ValueError\n"
+    )
+    assert (
+        said(stderr)
+        == """\
+content/lessons/1.1-first.md
+script-failed at 5:7 `raise ValueError`
+  `examples/a.py` exited with status 1
+  ^ ValueError
+  note at 3:1 ````python file=examples/a.py timeout=2.5`: `examples/a.py` was running
+  note: its standard error:
+    Traceback (most recent call last):
+      File "content/lessons/4.2-mass.md", line 8, in <module>
+        go()
+      File "content/lessons/1.1-first.md", line 5, in fall
+        raise ValueError
+    ValueError"""
+    )
+
+
+def test_chained_exceptions_end_with_the_last() -> None:
+    stderr = (
+        OWN
+        + "\nDuring handling of the above exception, another exception occurred:\n\n"
+        + (
+            'Traceback (most recent call last):\n  File "/x/examples/a.py", line 1, in <module>\n'
+            "    import helper\nKeyError: 'a'\n"
+        )
+    )
+    assert said(stderr).split("\n")[1:4] == [
+        "script-failed at 4:1 `import helper`",
+        "  `examples/a.py` exited with status 1",
+        "  ^ KeyError: 'a'",
+    ]
+
+
+def test_an_exception_group_ends_with_its_last_exception() -> None:
+    stderr = (
+        "  + Exception Group Traceback (most recent call last):\n"
+        '  |   File "/x/examples/a.py", line 5, in <module>\n  |     go()\n'
+        "  | ExceptionGroup: two (1 sub-exception)\n  +-+---------------- 1 ----------------\n"
+        '    | Traceback (most recent call last):\n    |   File "/x/examples/a.py", line 4, in go\n'
+        "    |     helper.fall()\n    | ValueError: bad\n    +------------------------\n"
+    )
+    assert said(stderr).split("\n")[1:4] == [
+        "script-failed at 7:5 `helper.fall()`",
+        "  `examples/a.py` exited with status 1",
+        "  ^ ValueError: bad",
+    ]
+
+
+def test_an_exit_without_a_traceback() -> None:
+    assert (
+        said("warming up\nno model given\n", status=3)
+        == """\
+content/lessons/4.2-mass.md
+script-failed at 3:1 ````python file=examples/a.py timeout=2.5`
+  `examples/a.py` exited with status 3
+  ^ no model given
+  note: its standard error:
+    warming up
+    no model given"""
+    )
+    assert (
+        said("")
+        == """\
+content/lessons/4.2-mass.md
+script-failed at 3:1 ````python file=examples/a.py timeout=2.5`
+  `examples/a.py` exited with status 1"""
+    )
+
+
+def test_a_syntax_error_and_warnings() -> None:
+    stderr = (
+        "/x/examples/a.py:4: RuntimeWarning: divide by zero\n  helper.fall()\n"
+        "  File \"/x/examples/a.py\", line 5\n    go(\n      ^\nSyntaxError: '(' was never closed\n"
+    )
+    assert said(stderr).split("\n")[1:6] == [
+        "script-failed at 8:1 `go()`",
+        "  `examples/a.py` exited with status 1",
+        "  ^ SyntaxError: '(' was never closed",
+        "  note: its standard error:",
+        "    content/lessons/4.2-mass.md:7: RuntimeWarning: divide by zero",
+    ]
+
+
+def test_only_extracted_files_are_replaced() -> None:
+    found = extractions()
+    for text in (
+        'File "/x/site-packages/pkg/examples/a.py", line 1',
+        'File "/x/examples/b.py", line 1',
+        'File "/x/examples/a.py", line 99',
+        'File "/x/myexamples/a.py", line 1',
+        'File "<string>", line 1',
+        "/x/examples/a.py is here",
+    ):
+        assert in_lessons(text, found) == text
+    assert in_lessons('File "examples/a.py", line 1', found) == (
+        'File "content/lessons/4.2-mass.md", line 4'
+    )
+    assert in_lessons("/my course/examples/a.py:1: X", found) == "content/lessons/4.2-mass.md:4: X"
+
+
+def test_a_long_standard_error_shows_its_end() -> None:
+    text = said("".join(f"line {i}\n" for i in range(100)))
+    assert "its standard error ended with:\n    line 70\n" in text and text.endswith("line 99")
+    text = said("x" * 10_000 + "\x1b[31mred\x1b[0m")
+    assert text.endswith("xred") and len(text) < 4500
+    assert f"  ^ {'x' * 119}…" in text
+
+
+def test_timeout() -> None:
+    assert (
+        said("step 5\n", Outcome.TIMEOUT, -9)
+        == """\
+content/lessons/4.2-mass.md
+script-timeout at 3:1 ````python file=examples/a.py timeout=2.5`
+  `examples/a.py` was stopped after 2.5 s, its time limit
+  note: its standard error:
+    step 5
+  help: make it do less, or set `timeout=SECONDS` on its fence to a higher limit"""
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "message", "help_text"),
+    [
+        (11, "`examples/a.py` was ended by SIGSEGV", []),
+        (
+            9,
+            "`examples/a.py` was ended by SIGKILL",
+            ["  help: the system ends a process that takes too much memory"],
+        ),
+        (63, "`examples/a.py` was ended by signal 63", []),
+    ],
+)
+def test_killed(status: int, message: str, help_text: list[str]) -> None:
+    assert said("", Outcome.KILLED, status).split("\n")[2:] == [f"  {message}", *help_text]
+
+
+def test_a_crash_dump_has_its_innermost_line_first() -> None:
+    stderr = (
+        "Fatal Python error: Segmentation fault\n\nCurrent thread 0x1 (most recent call first):\n"
+        '  File "/x/examples/a.py", line 4 in go\n  File "/x/examples/a.py", line 5 in <module>\n'
+    )
+    assert said(stderr, Outcome.KILLED, 11).split("\n")[1] == "script-killed at 7:5 `helper.fall()`"
+
+
+@pytest.mark.parametrize(
+    ("outcome", "rule", "message", "help_text"),
+    [
+        (
+            Outcome.OUTPUT_LIMIT,
+            "script-output-limit",
+            "`examples/a.py` printed more than 1 MiB",
+            "print less: a recorded output is to be read",
+        ),
+        (
+            Outcome.ENCODING,
+            "script-encoding",
+            "`examples/a.py` printed bytes that are not UTF-8",
+            "print text; `sys.stdout.buffer` takes bytes as they are",
+        ),
+    ],
+)
+def test_wrong_outputs(outcome: Outcome, rule: str, message: str, help_text: str) -> None:
+    assert said("", outcome) == (
+        f"content/lessons/4.2-mass.md\n{rule} at 3:1 ````python file=examples/a.py timeout=2.5`\n"
+        f"  {message}\n  help: {help_text}"
+    )
+
+
+@pytest.mark.parametrize("outcome", [Outcome.OK, Outcome.SKIPPED, Outcome.NORUN])
+def test_nothing_is_said_of_the_others(outcome: Outcome) -> None:
+    found = extractions()
+    assert failure(found[0], ran("x", outcome=outcome), found) is None
+
+
+def test_silence() -> None:
+    assert (
+        told(silence(recording("a"), "examples/a.py"))
+        == """\
+script-silent at 4:1 `Output:`
+  an output is recorded here and `examples/a.py` printed nothing
+  help: print what is recorded, or take the recorded output away"""
+    )

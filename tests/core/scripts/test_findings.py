@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+from coursebuild.core.model import Document
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.findings import script_findings
+from support.sample_lessons import course, document, ran, told
+
+LESSON = """\
+```python file=examples/a.py
+import b
+```
+
+Output:
+
+```text
+E 1.5
+```
+
+See `1.5`{out} and `7.0`{out=examples/b.py}.
+
+```python file=examples/b.py
+print(7)
+1/0
+```
+"""
+
+
+def findings(*runs: ScriptRun, lessons: tuple[Document, ...] = (document(LESSON),)) -> list[str]:
+    here = course(*lessons)
+    wanted = {run.path for run in runs}
+    chosen = [e for e in extract(here).value if e.path in wanted]
+    found = script_findings(here, chosen, runs, verify(here, runs))
+    return [told(d).split("\n")[0] for d in found]
+
+
+def test_all_is_well() -> None:
+    assert findings(ran("E 1.5\n"), ran("7.04\n", path="examples/b.py")) == []
+
+
+def test_drift_brings_the_bindings_that_lean_on_it() -> None:
+    here = course(document(LESSON))
+    runs = (ran("E 1.7\n"), ran("7\n", path="examples/b.py"))
+    (found,) = script_findings(here, extract(here).value, runs, verify(here, runs))
+    assert found.help == "if the change is intended, run `coursebuild update 4.2`"
+    assert found.notes[-1].message == "`1.5` leans on 1.5, which this run printed as 1.7"
+
+
+def test_each_failure_is_told_once() -> None:
+    assert findings(ran(outcome=Outcome.FAILED, status=1), ran("7\n", path="examples/b.py")) == [
+        "script-failed at 1:1 ````python file=examples/a.py`"
+    ]
+    assert findings(ran(" \n"), ran("7\n", path="examples/b.py")) == [
+        "script-silent at 5:1 `Output:`"
+    ]
+    assert findings(ran("E 1.5"), ran("8\n", path="examples/b.py")) == [
+        "binding-mismatch at 11:21 `7.0`"
+    ]
+
+
+def test_a_skipped_script_is_no_mistake() -> None:
+    skipped = ran(outcome=Outcome.SKIPPED)
+    assert findings(skipped, ran(path="examples/b.py", outcome=Outcome.SKIPPED)) == []
+
+
+def test_where_only_some_scripts_ran_the_others_are_known() -> None:
+    stderr = (
+        'Traceback (most recent call last):\n  File "/x/examples/a.py", line 1, in <module>\n'
+        '  File "/x/examples/b.py", line 2, in <module>\nZeroDivisionError: division by zero\n'
+    )
+    failed = ran(outcome=Outcome.FAILED, status=1, stderr=stderr)
+    assert findings(failed) == ["script-failed at 15:1 `1/0`"]
+    assert findings(ran("E 1.5")) == []
+
+
+def test_lessons_lean_on_each_other() -> None:
+    other = document(
+        "`1.5`{out=examples/a.py} `1.6`{out=examples/a.py}\n", "content/lessons/5.1-x.md"
+    )
+    runs = (ran("E 1.5"), ran("7\n", path="examples/b.py"))
+    assert findings(*runs, lessons=(document(LESSON), other)) == ["binding-mismatch at 1:27 `1.6`"]

@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import re
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Filter
+from coursebuild.core.scripts.mapped_text import MappedText, Side, filtered
+
+TEXTS = st.text(alphabet="ab1 \n-x", max_size=30)
+PATTERNS = st.sampled_from(
+    [
+        ("a", "xyz"),
+        ("b+", ""),
+        (r"\d", r"<\g<0>>"),
+        ("x*", "-"),
+        (r"^a.*\n", ""),
+        ("$", "!"),
+        (r"(a)|b", r"\1"),
+    ]
+)
+
+
+@given(TEXTS, st.lists(PATTERNS, max_size=4))
+def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> None:
+    expected = text
+    for pattern, replacement in rules:
+        expected = re.sub(pattern, replacement, expected, flags=re.MULTILINE)
+    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    assert mapped.text == expected
+
+
+@given(TEXTS, st.lists(PATTERNS, max_size=4), st.data())
+def test_origins_lie_in_the_text_and_grow(
+    text: str, rules: list[tuple[str, str]], data: st.DataObject
+) -> None:
+    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    start = data.draw(st.integers(0, len(mapped.text)))
+    end = data.draw(st.integers(start, len(mapped.text)))
+    low, high = mapped.origin(start, end)
+    assert 0 <= low <= high <= len(text)
+    if start < end < len(mapped.text):
+        later = mapped.origin(end, len(mapped.text))
+        assert later[0] >= low and later[1] >= high
+    copies = [p for p in mapped.pieces if p.verbatim]
+    for piece in copies:
+        length = piece.end - piece.start
+        assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]
+
+
+def test_a_copied_character_is_traced_to_itself() -> None:
+    mapped = filtered(MappedText.of_text("aa 17 bb 25 cc"), [Filter("a+", "<A>"), Filter("b", "")])
+    at = mapped.text.index("25")
+    assert mapped.origin(at, at + 2) == (9, 11)
+    assert mapped.origin(0, 1) == (0, 2)
+    assert mapped.origin(1, 8) == (0, 9)
+
+
+OUTPUTS = st.text(alphabet="ab \t\r\n", max_size=20)
+
+
+@given(OUTPUTS)
+def test_an_output_loses_what_does_not_count(text: str) -> None:
+    lines = [line.rstrip() for line in re.split(r"\r\n?|\n", text)]
+    while lines and not lines[-1]:
+        lines.pop()
+    mapped = MappedText.of_output(text)
+    assert mapped.text == "".join(line + "\n" for line in lines)
+    for at, character in enumerate(mapped.text):
+        low, high = mapped.origin(at, at + 1)
+        if character != "\n":
+            assert text[low:high] == character
+        else:
+            assert re.fullmatch(r"[ \t]*(\r\n?|\n|\Z)", text[low:high])
+
+
+def test_windows_line_ends_are_traced() -> None:
+    mapped = MappedText.of_output("a\r\nb \rc\n\n")
+    assert mapped.text == "a\nb\nc\n"
+    assert mapped.origin(4, 5) == (6, 7)
+
+
+def test_lines_know_their_raw_text() -> None:
+    side = Side.of("#0\na 0x1  \n#1\nb\n\n#2\nc \n\n", [Filter(r"^#.*\n", ""), Filter("0x1", "X")])
+    assert side.texts == ("a X", "b", "", "c")
+    assert [side.raw_lines(i) for i in range(4)] == [
+        ("#0", "a 0x1", "#1"),
+        ("b",),
+        ("", "#2"),
+        ("c",),
+    ]
+
+
+@given(TEXTS, st.lists(PATTERNS, max_size=3))
+def test_raw_lines_are_all_of_the_text(text: str, rules: list[tuple[str, str]]) -> None:
+    side = Side.of(text, [Filter(*rule) for rule in rules])
+    if not side.lines:
+        return
+    raw = [line for i in range(len(side.lines)) for line in side.raw_lines(i)]
+    kept = "".join(raw).replace(" ", "")
+    assert kept == text.replace("\n", "").replace(" ", "")

@@ -1,0 +1,248 @@
+"""Numbers in text: where they are, what they are worth, and how they are rounded."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.scripts.numbers import (
+    Number,
+    agreeing_digits,
+    relative_error,
+    round_like,
+    scan,
+    scan_prose,
+    within_half_unit,
+    within_tolerance,
+)
+from support.growth import processor_time_growth
+
+
+def texts(text: str) -> list[str]:
+    return [number.text for number in scan(text)]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("kinetic energy  +6.641 %", ["+6.641"]),
+        ("-.5 and .25", ["-.5", ".25"]),
+        ("[0.073333 0.026667 0.      ]", ["0.073333", "0.026667", "0."]),
+        ("[-1. 2.]", ["-1.", "2."]),
+        ("1e-3 3.9E-11 1.e+00 2e5", ["1e-3", "3.9E-11", "1.e+00", "2e5"]),
+        ("took 12.5ms, 3x faster, 45deg", ["12.5", "3", "45"]),
+        ("6 %", ["6"]),
+        ("x=1.5 y=-2", ["1.5", "-2"]),
+        (
+            "(1+2j) 1.5-0.5j [1.+2.j 3.e-05-4.j]",
+            ["1", "+2", "1.5", "-0.5", *"1. +2.".split(), "3.e-05", "-4."],
+        ),
+        ("1.0-2.0", ["1.0", "2.0"]),
+        ("1.5±0.02 1.5+-0.02 1.5+/-0.02", ["1.5", "0.02", "1.5", "-0.02", "1.5", "-0.02"]),
+        ("nan -inf inf NaN Infinity", ["nan", "-inf", "inf", "NaN", "Infinity"]),
+        ("step 3/10, ratio 1:2", ["3", "10", "1", "2"]),
+        ("\u22126.04", ["\u22126.04"]),
+        ("|0.5|", ["0.5"]),
+        ("0:1.5", ["0", "1.5"]),
+        ("found 5.", ["5."]),
+        ("0, 1,2", ["0", "1", "2"]),
+    ],
+)
+def test_numbers_are_found(text: str, expected: list[str]) -> None:
+    assert texts(text) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "v3.14.0",
+        "MuJoCo 3.14.0",
+        "3.14.0rc1",
+        "0x1f 0xff 0b101 0o17",
+        "x1 l4_2_inertia.py axis2",
+        "2026-11-20 2026-11-20T10:30:05Z 11/20/2026 20.11.2026",
+        "10:30:05 00:00:12.345",
+        "127.0.0.1:8000",
+        "3fa9e12 0deadbeef 1234567e89ab",
+        "550e8400-e29b-41d4-a716-446655440000",
+        "4x4 12ab34 1_000",
+        "UTF-8 sha-256 mujoco-3.14",
+        "10-20 555-1234",
+        "nano info infer np.nan",
+        "1e99999 1e-12345",
+        "9" * 1001,
+        "x[1_0]",
+        "kg m^2 s^-2 x^0.5",
+        "\u0663\u0664",
+    ],
+)
+def test_text_stays_text(text: str) -> None:
+    assert texts(text) == []
+
+
+def test_a_sign_belongs_to_a_number_only_where_nothing_stands_before_it() -> None:
+    assert texts("a - 1") == ["1"]
+    assert texts("a -1") == ["-1"]
+    assert texts("x[0]-1") == ["0", "1"]
+    assert texts("3-x") == ["3"]
+
+
+def test_an_ellipsis_is_no_decimal_point() -> None:
+    assert texts("1...") == ["1"]
+    assert texts("[0. 1. ... 8. 9.]") == ["0.", "1.", "8.", "9."]
+
+
+def test_places() -> None:
+    def place(text: str) -> int:
+        return scan(text)[0].place
+
+    assert [place(t) for t in ("6.641", "1.5e-3", "3.9e-11", "0.", "7", "1e3", "-.50")] == [
+        -3, -4, -12, 0, 0, 3, -2,
+    ]  # fmt: skip
+
+
+def test_integers_have_neither_point_nor_exponent() -> None:
+    assert [n.integer for n in scan("4 -4 4. 4e0 inf nan")] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
+
+
+def test_offsets_slice_back() -> None:
+    text = "a 1.5 b\u22122e-3kg (nan)"
+    assert [text[n.start : n.end] for n in scan(text)] == [n.text for n in scan(text)]
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "place"),
+    [
+        ("3.9 × 10⁻¹¹", "3.9e-11", -12),
+        ("3.9×10^-11", "3.9e-11", -12),
+        ("1.5 · 10^{6}", "1.5e6", 5),
+        ("\u22122·10\u00b3", "-2e3", 3),
+        ("1e\u22125", "1e-5", -5),
+    ],
+)
+def test_powers_of_ten_in_prose(text: str, value: str, place: int) -> None:
+    (number,) = scan_prose(text)
+    assert (number.value, number.place, number.integer) == (Decimal(value), place, False)
+    assert number.text == text
+
+
+def test_a_product_is_no_power_of_ten() -> None:
+    assert [n.text for n in scan_prose("3 × 10 m, 2 × 105")] == ["3", "10", "2", "105"]
+
+
+def test_the_half_unit_is_a_border_that_counts() -> None:
+    (recorded,) = scan("3.14")
+    assert within_half_unit(recorded, Decimal("3.145"))
+    assert within_half_unit(recorded, Decimal("3.135"))
+    assert within_half_unit(recorded, Decimal("3.1449"))
+    assert not within_half_unit(recorded, Decimal("3.145" + "0" * 40 + "1"))
+    assert not within_half_unit(recorded, Decimal("3.149"))
+
+
+def test_exponents_move_the_half_unit() -> None:
+    (recorded,) = scan("1.5e-3")
+    assert within_half_unit(recorded, Decimal("0.00155"))
+    assert not within_half_unit(recorded, Decimal("0.0015500001"))
+    (huge,) = scan("1e9999")
+    assert not within_half_unit(huge, Decimal("1e-9999"))
+    assert within_half_unit(huge, Decimal("1.5e9999"))
+
+
+def test_tolerances_are_exact() -> None:
+    a, b = Decimal("0.1"), Decimal("0.3")
+    assert within_tolerance(a, b, Decimal(2), Decimal(0))
+    assert not within_tolerance(a, Decimal("0.3" + "0" * 40 + "1"), Decimal(2), Decimal(0))
+    assert within_tolerance(Decimal(0), Decimal("1e-12"), Decimal("1e-6"), Decimal("1e-12"))
+
+
+def test_relative_error_and_agreeing_digits() -> None:
+    error = relative_error(Decimal("6.641"), Decimal("6.702"))
+    assert error is not None and f"{float(error):.1e}" == "9.2e-03"
+    assert agreeing_digits(error) == 2
+    assert agreeing_digits(Decimal("0.01")) == 2
+    assert agreeing_digits(Decimal("0.0100001")) == 1
+    assert agreeing_digits(Decimal("0.00999")) == 2
+    assert agreeing_digits(Decimal(7)) == 0
+    assert agreeing_digits(Decimal(0)) is None
+    assert relative_error(Decimal(0), Decimal(1)) is None
+    assert relative_error(Decimal("nan"), Decimal(1)) is None
+
+
+@pytest.mark.parametrize(
+    ("written", "value", "expected"),
+    [
+        ("+6.6", "6.702", "+6.7"),
+        ("6.6", "-6.65", "-6.6"),
+        ("-.5", "0.25", ".2"),
+        ("0.", "3.6", "4."),
+        ("1.0e-04", "0.000249", "2.5e-04"),
+        ("1.0e-04", "0.9996", "1.0e+00"),
+        ("9.9e-4", "0.000996", "1.0e-3"),
+        ("\u22126.0", "-7.77", "\u22127.8"),
+        ("-0.0", "-0.01", "0.0"),
+        ("4", "5.5", "6"),
+        ("1e3", "2345", "2e3"),
+    ],
+)
+def test_rounding_in_the_notation_of_another_number(
+    written: str, value: str, expected: str
+) -> None:
+    assert round_like(scan(written)[0], Decimal(value)) == expected
+
+
+def test_no_rounding_for_what_no_machine_writes() -> None:
+    assert round_like(scan_prose("3.9 × 10⁻¹¹")[0], Decimal(1)) is None
+    assert round_like(scan("nan")[0], Decimal(1)) is None
+
+
+@given(
+    st.decimals(
+        allow_nan=False, allow_infinity=False, places=4, min_value=-(10**6), max_value=10**6
+    ),
+    st.integers(0, 4),
+)
+def test_a_rounded_number_shows_its_value(value: Decimal, places: int) -> None:
+    (pattern,) = scan(f"{1:.{places}f}")
+    rounded = round_like(pattern, value)
+    assert rounded is not None
+    assert within_half_unit(scan(rounded)[0], value)
+
+
+@given(st.text())
+def test_scanning_never_fails_and_spans_slice_back(text: str) -> None:
+    end = 0
+    for number in scan_prose(text):
+        assert end <= number.start < number.end
+        assert text[number.start : number.end] == number.text
+        end = number.end
+
+
+@given(st.floats(), st.sampled_from(["", ".3f", "e", ".1e", "g", "+.6g", ".0f"]))
+def test_every_way_to_print_a_float_is_one_number(value: float, spec: str) -> None:
+    printed = format(value, spec)
+    numbers: tuple[Number, ...] = scan(f"x: {printed} m")
+    assert [n.text for n in numbers] == ([printed] if len(printed) <= 1000 else [])
+
+
+REPEATED = ["1-", "00:", "1", "1.1111", "1+", "a", "1 ", "1e", "1f", "-", "1/", ".", "a-1", "nan"]
+
+
+@pytest.mark.site
+def test_whatever_is_repeated_is_scanned_in_time_that_grows_in_proportion() -> None:
+    """What one expression does shows in no count of calls."""
+
+    def growth(piece: str) -> float:
+        return processor_time_growth(lambda size: scan((piece * size)[:size] + "x"), 4096)
+
+    growths = {piece: growth(piece) for piece in [*REPEATED, "1.2.3-"]}
+    assert {piece: growth for piece, growth in growths.items() if growth > 24} == {}

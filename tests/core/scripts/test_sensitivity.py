@@ -1,0 +1,275 @@
+"""Which printed digits hold, given what was printed with initial states moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import Decimal
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model import Comparison, Filter, Recording
+from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity, Standing
+from coursebuild.core.scripts.numbers import scan
+from coursebuild.core.scripts.sensitivity import noise, rounded, sensitivity, worth_moving
+from support.sample_lessons import (
+    DIGITS,
+    ELLIPSIS,
+    EXACT,
+    VOLATILE,
+    course,
+    document,
+    recording,
+    table,
+    within,
+)
+from support.sample_lessons import told as told_text
+
+TRACE = Trace((), (), (), ("mujoco",), "")
+
+
+def run(stdout: str, states: Sequence[str] = (), *, moved: bool = True) -> ScriptRun:
+    trace = replace(TRACE, moved=moved, states=tuple(states))
+    return ScriptRun("examples/a.py", Outcome.OK, 0, stdout, "", 1.0, trace=trace)
+
+
+def measured(
+    recorded: str | Recording,
+    *moved: str | ScriptRun,
+    comparison: Comparison = EXACT,
+    base: str | None = None,
+    filters: tuple[Filter, ...] = (),
+) -> Sensitivity:
+    """What runs that printed this say of a recorded output; four runs, the last repeated."""
+    one = recording(recorded) if isinstance(recorded, str) else recorded
+    assert base is not None or isinstance(recorded, str)
+    printed = base if base is not None else str(recorded)
+    runs = [each if isinstance(each, ScriptRun) else run(each) for each in moved]
+    runs += [runs[-1]] * (4 - len(runs))
+    whole = course(document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters)
+    return sensitivity(whole, "examples/a.py", "1.1", [one], run(printed), runs)
+
+
+def digits(found: Sensitivity) -> list[tuple[str, int, int, str]]:
+    assert found.standing is Standing.MEASURED
+    assert found.flips == ()
+    return [(d.printed, d.digits, d.trusted, d.instead) for d in found.doubts]
+
+
+def flips(found: Sensitivity) -> list[tuple[str, str]]:
+    assert found.standing is Standing.MEASURED
+    assert found.doubts == ()
+    return [(flip.printed, flip.other) for flip in found.flips]
+
+
+def warnings(found: Sensitivity) -> list[str]:
+    return [told_text(diagnostic) for diagnostic in noise(found)]
+
+
+# --- numbers
+
+
+def test_what_is_printed_alike_holds() -> None:
+    found = measured("x 1.25 after 12 steps", "x 1.25 after 12 steps")
+    assert digits(found) == []
+    assert found.numbers == 2
+    assert warnings(found) == []
+
+
+@pytest.mark.parametrize(
+    ("recorded", "moved", "expected"),
+    [
+        ("1.23456", ["1.23457", "1.23456"], ("1.23456", 6, 5, "1.2346")),
+        ("1.23456", ["1.23461", "1.23451"], ("1.23456", 6, 5, "1.2346")),
+        ("1.23456", ["1.23462"], ("1.23456", 6, 4, "1.235")),
+        ("1.23456", ["1.3"], ("1.23456", 6, 1, "1")),
+        ("1.23456", ["4.2"], ("1.23456", 6, 0, "")),
+        ("-0.00123", ["-0.00124"], ("-0.00123", 3, 2, "-0.0012")),
+        ("+6.641", ["+6.645"], ("+6.641", 4, 3, "+6.64")),
+        ("\u22126.641", ["\u22126.645"], ("\u22126.641", 4, 3, "\u22126.64")),
+        ("1.2345e-03", ["1.2349e-03"], ("1.2345e-03", 5, 4, "1.234e-03")),
+        ("1.2345E+7", ["1.2445E+7"], ("1.2345E+7", 5, 2, "1.2E+7")),
+        ("6e-17", ["-2e-17"], ("6e-17", 1, 0, "")),
+        ("12345.6", ["12395.6"], ("12345.6", 6, 3, "1.23e+04")),
+        ("9.9996", ["9.9999"], ("9.9996", 5, 4, "10.000")),
+        ("0.000", ["0.001"], ("0.000", 4, 0, "")),
+        ("26", ["27"], ("26", 2, 1, "")),
+        ("3", ["4"], ("3", 1, 0, "")),
+        ("1.5", ["nan"], ("1.5", 2, 0, "")),
+    ],
+)
+def test_digits_that_hold(
+    recorded: str, moved: list[str], expected: tuple[str, int, int, str]
+) -> None:
+    text = "value {} m"
+    found = measured(text.format(recorded), *(text.format(value) for value in moved))
+    assert digits(found) == [expected]
+
+
+def test_the_furthest_of_all_runs_counts() -> None:
+    [one] = measured("1.000", "1.001", "0.98", "1.003").doubts
+    assert (one.least, one.most, one.trusted) == ("0.98", "1.003", 2)
+
+
+def test_each_number_has_its_place_in_the_lesson() -> None:
+    found = measured("a 1.25 b 2.5\nc 3.75", "a 1.25 b 2.6\nc 3.85")
+    assert [(d.span.text, d.span.line, d.span.column) for d in found.doubts] == [
+        ("2.5", 7, 10),
+        ("3.75", 8, 3),
+    ]
+
+
+def test_in_a_table() -> None:
+    recorded = table("| h | error |\n| --- | --- |\n| 0.1 | 1.2345 |\n| 0.2 | 5.0 |")
+    base = "h error\n0.1 1.2345\n0.2 5.0\n"
+    found = measured(recorded, "h error\n0.1 1.2399\n0.2 5.0\n", base=base)
+    assert digits(found) == [("1.2345", 5, 2, "1.2")]
+    assert found.doubts[0].span.line == 9
+    assert found.numbers == 4
+
+
+def test_beside_what_an_ellipsis_leaves_out() -> None:
+    recorded = "a 1.25\n...\nb 2.5 took ..."
+    base, other = "a 1.25\nx 9\nb 2.5 took 3\n", "a 1.25\nx 8\ny 7\nb 2.6 took 4\n"
+    found = measured(recorded, other, comparison=ELLIPSIS, base=base)
+    assert digits(found) == [("2.5", 2, 1, "2")]
+
+
+def test_what_a_filter_takes_out_does_not_count() -> None:
+    filters = (Filter("took [0-9.]+ s", "took TIME"),)
+    found = measured("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", filters=filters)
+    assert digits(found) == []
+
+
+def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> None:
+    comparison = within("1e-3")
+    found = measured("x 1.2345", "x 1.2347", comparison=comparison, base="x 1.2347")
+    assert digits(found) == [], "moving has changed nothing"
+    found = measured("x 1.2345", "x 1.2348", comparison=comparison, base="x 1.2347")
+    assert digits(found) == [("1.2347", 5, 4, "1.235")]
+
+
+# --- text
+
+
+@pytest.mark.parametrize(
+    ("recorded", "moved", "expected"),
+    [
+        ("heads", "tails", [("heads", "tails")]),
+        ("x -0.0", "x 0.0", [("-0.0", "0.0")]),
+        ("a\nb", "a", [("b", "")]),
+        ("a", "a\nb", [("", "b")]),
+    ],
+)
+def test_text_that_changes(recorded: str, moved: str, expected: list[tuple[str, str]]) -> None:
+    assert flips(measured(recorded, moved)) == expected
+
+
+def test_a_line_less_does_not_blur_the_others() -> None:
+    found = measured("bounce 1 at 1.25\nbounce 2 at 2.5\nend 3.0", "bounce 1 at 1.25\nend 3.0")
+    assert flips(found) == [("bounce 2 at 2.5", "")]
+
+
+# --- scripts
+
+
+def test_states_that_end_far_apart_are_chaotic() -> None:
+    def state(position: float) -> list[str]:
+        numbers = [1.0, 0.0, position, 0.5]
+        return [f"0 1 {' '.join(x.hex() for x in numbers)}"]
+
+    runs = [run("x 1", state(x)) for x in (2.0, 2.5, 2.0, 2.0 + 1e-12)]
+    found = measured("x 1", *runs)
+    assert found.amplification == pytest.approx(0.5 / 2.0 / 2e-12)
+    assert found.chaotic
+    still = [run("x 1", state(x)) for x in (2.0, 2.0 + 4e-12, 2.0, 2.0)]
+    assert measured("x 1", *still).amplification == pytest.approx(1.0, rel=1e-3)
+    assert not measured("x 1", *still).chaotic
+
+
+def test_states_that_are_lost_end_infinitely_far_apart() -> None:
+    lost = [run("x 1", [f"0 1 0x1p+0 0x0p+0 {x} 0x0p+0"]) for x in ("nan", "0x1p+0")]
+    found = measured("x 1", *lost, *lost)
+    assert found.amplification == math.inf
+    assert found.chaotic
+
+
+@pytest.mark.parametrize(
+    ("base", "moved", "standing"),
+    [
+        (replace(run("x 1"), trace=replace(TRACE, modules=())), run("x 1"), Standing.NO_MUJOCO),
+        (run("x 1", moved=False), run("x 1", moved=False), Standing.NOT_MOVED),
+        (run("x 2"), run("x 1"), Standing.DRIFTED),
+        (replace(run(""), outcome=Outcome.FAILED, status=1), run("x 1"), Standing.DRIFTED),
+        (run("x 1"), replace(run("x 1"), outcome=Outcome.TIMEOUT), Standing.FAILED),
+        (run("x 1"), replace(run("x 1"), outcome=Outcome.FAILED, status=1), Standing.FAILED),
+    ],
+)
+def test_why_nothing_can_be_said(base: ScriptRun, moved: ScriptRun, standing: Standing) -> None:
+    whole = course(document("", "content/lessons/1.1-a.md"))
+    one = recording("x 1")
+    found = sensitivity(whole, "examples/a.py", "1.1", [one], base, [moved] * 4)
+    assert found == Sensitivity("examples/a.py", "1.1", standing)
+    if standing not in (Standing.FAILED, Standing.NOT_MOVED):
+        assert not worth_moving(whole, [one], base)
+
+
+def test_what_is_not_compared_is_not_asked() -> None:
+    assert measured("x 1", "x 2", comparison=VOLATILE).standing is Standing.UNRECORDED
+
+
+# --- warnings
+
+
+@pytest.mark.parametrize(
+    ("comparison", "recorded", "moved", "compared"),
+    [
+        (EXACT, "1.2345", "1.2346", True),
+        (DIGITS, "1.2345", "1.2346", True),
+        (within("1e-3"), "1.2345", "1.2346", False),
+        (within("1e-6"), "1.2345", "1.2346", True),
+        (within("0", "1e-12"), "3e-13", "-2e-13", False),
+    ],
+)
+def test_only_what_would_be_drift_is_warned_of(
+    comparison: Comparison, recorded: str, moved: str, compared: bool
+) -> None:
+    found = measured(recorded, moved, comparison=comparison)
+    assert [doubt.compared for doubt in found.doubts] == [compared]
+    assert len(warnings(found)) == int(compared)
+
+
+def test_a_number_that_came_no_further_than_it_was_moved_is_no_noise() -> None:
+    assert warnings(measured("3.000000000000", "3.000000000003")) == []
+    assert warnings(measured("3.000000000000", "3.000000000300")) != []
+    assert warnings(measured("2.9999999999999654", "2.9999999999970046")) != []
+
+
+def test_what_a_warning_says() -> None:
+    found = measured("a 1.2345 b 2\nc 0.5\nd", "a 1.2349 b 7\nc 0.5", "a 1.2341 b 2\nc 0.5\nd")
+    [warning] = warnings(found)
+    assert warning.splitlines() == [
+        "output-noise at 7:3 `1.2345`",
+        "  `examples/a.py` prints digits that are noise: a change of its initial states by 1e-12"
+        " changes them",
+        "  ^ 4 digits hold, print 1.234: printed from 1.2341 to 1.2349",
+        "  note at 7:12 `2`: no digit holds: printed from 2 to 7",
+        "  note at 9:1 `d`: not always printed",
+        "  help: print fewer digits, or say how to compare: `digits`, or `rtol` and `atol`",
+    ]
+
+
+def test_a_rounded_number_is_written_as_the_printed_one() -> None:
+    for text in ("1.25", "-0.0125", "+1.25e-07", "\u22121.25E+10", "125000", ".125"):
+        [number] = scan(text)
+        for count in range(1, 4):
+            value = Decimal(rounded(number, count).replace("\u2212", "-"))
+            assert abs(value - number.value) <= abs(number.value) * Decimal(10) ** (1 - count)
+    assert rounded(scan("1.25")[0], 0) == ""
+
+
+def test_kinds() -> None:
+    found = measured("x 1.5 heads", "x 1.6 tails")
+    assert {type(one) for one in (*found.doubts, *found.flips)} == {Doubt, Flip}

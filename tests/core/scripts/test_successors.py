@@ -1,0 +1,285 @@
+"""What is proposed for a bound number when its output is recorded anew."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.scripts.binding_memory import BindingHistory
+from coursebuild.core.scripts.bindings import Printed, check_bindings
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.text.diagnostics import Diagnostic
+from support.sample_lessons import course, document, ran, told
+
+PENDULUM = "period   2.006 s\nhalf     1.003 s\n"
+
+
+def lesson(prose: str, output: str, fence: str = "text") -> str:
+    body = output if output.startswith("|") else f"```{fence}\n{output}```\n"
+    return f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{body}\n{prose}\n"
+
+
+def look(held: BindingHistory, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
+    here = document(text)
+    verdicts = verify(course(here), runs)
+    return check_bindings(here, Printed(verdicts, runs, ["examples/a.py"]), held)
+
+
+def anew(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic:
+    """What is wrong with a binding when another output is recorded than the one by which it held.
+
+    In between the old one stands beside the new run, as it does before it is accepted.
+    """
+    prose, held = f"`{binding}`{{out}}", BindingHistory()
+    assert look(held, lesson(prose, before, fence), ran(before)) == ()
+    assert look(held, lesson(prose, before, fence), ran(now)) == ()
+    (found,) = look(held, lesson(prose, now, fence), ran(now))
+    offered = [edit.text for edit in found.edits]
+    assert offered == ([found.help[7:-1]] if found.help.startswith("write `") else [])
+    for text in offered:  # what is offered holds
+        assert look(held, lesson(f"`{text}`{{out}}", now, fence), ran(now)) == ()
+    return found
+
+
+def test_what_is_said() -> None:
+    found = anew("2.006 s", PENDULUM, "period   2.950 s\nhalf     1.975 s\n")
+    assert (
+        told(found)
+        == """\
+binding-mismatch at 12:2 `2.006 s`
+  `2.006 s` is not what `examples/a.py` printed, rounded to the digits shown
+  ^ 2.950 is printed where 2.006 was
+  help: write `2.950 s`"""
+    )
+    found = anew("2.006", PENDULUM, "half   1.975 s\nwhole   2.950 s\n")
+    assert (
+        told(found)
+        == """\
+binding-mismatch at 12:2 `2.006`
+  `2.006` is not what `examples/a.py` printed, rounded to the digits shown
+  ^ it is not certain what is printed in place of 2.006 now; the nearest printed value is 1.975
+  help: write the number that the sentence is about"""
+    )
+    found = anew("2.0", "a 2.00\nb 2.04\n", "a 3.00\nb 2.10\n")
+    assert (
+        told(found)
+        == """\
+binding-mismatch at 12:2 `2.0`
+  `2.0` is not what `examples/a.py` printed, rounded to the digits shown
+  ^ it was printed in 2 places, where now 3.00 and 2.10 are printed
+  help: write the number that the sentence is about"""
+    )
+
+
+@pytest.mark.parametrize(
+    ("binding", "before", "now", "label", "help_text"),
+    [
+        # swapped, as lines and as values: the one beside the same words counts
+        ("1.5", "a 1.5\nb 2.5", "b 1.6\na 2.6", "2.6 is printed where 1.5 was", "2.6"),
+        ("1.5", "a 1.5\nb 2.5", "a 2.4\nb 1.4", "2.4 is printed where 1.5 was", "2.4"),
+        # several lines more and fewer
+        ("2.5", "x 1\ny 2\na 2.5\nz 9", "Euler:\na 3.5\nb 2.4\nc 2.6", "3.5 is printed where 2.5",
+            "3.5"),
+        ("2.5", "a 2.5", "steps 7\nt 2.4\na 9.5\ndone\nt 2.6", "9.5 is printed where", "9.5"),
+        # inside a line
+        ("2.0", "a 1.0 b 2.0 c 3.0", "a 2.1 b 7.0 c 2.2", "7.0 is printed where 2.0 was", "7.0"),
+        ("1, 2.0", "[1.0 2.0 3.0]", "[3.1  4.0 1.1]", "3.1, 4.0 are printed where 1.0, 2.0 were",
+            "3, 4.0"),
+        # columns get wider, numbers get signs, minus signs are real ones, exponents move
+        ("6.6 %", "E  6.641 %  p 6.2", "E -12.700 %  p 6.5", "-12.700 is printed where 6.641 was",
+            "-12.7 %"),
+        ("\u22120.5", "a \u22120.5\nb 0.6", "a \u22120.9\nb \u22120.6",
+            "\u22120.9 is printed where \u22120.5 was", "\u22120.9"),
+        ("3.9e-11", "a 3.9e-11\nb 1e-3", "a 1.23E-07\nb 3.8e-11",
+            "1.23E-07 is printed where 3.9e-11 was", "1.2e-07"),
+        ("+6.6", "a +6.641", "a +7.25", "+7.25 is printed where +6.641 was", "+7.2"),
+        ("4 flips", "a 4 flips\nb 9 flips", "a 12 flips\nb 5 flips", "12 is printed where 4 was",
+            "12 flips"),
+        # rounded as the author rounds; where digits would be lost there is nothing to write
+        ("2.01", "a 2.00613", "a 3.14159", "3.14159 is printed where 2.00613 was", "3.14"),
+        ("3.9 × 10⁻¹¹", "a 3.9e-11 b 5", "a 4.9e-11 b 5", "4.9e-11 is printed where 3.9e-11", ""),
+        ("6.64 %", "a 6.641\nb 2", "a 0.06641\nb 2", "0.06641 is printed where 6.641 was", ""),
+        ("2.5", "a 2.5\nb 3", "a nan\nb 3", "nan is printed where 2.5 was", ""),
+        ("2.01", "a 2.00613", "a 0.00314", "0.00314 is printed where 2.00613 was", ""),
+        ("12", "a 12", "a 0.2", "0.2 is printed where 12 was", ""),
+        ("12", "a 12", "a 0", "0 is printed where 12 was", "0"),
+        # with its unit it would be another one
+        ("2.5 J", "a 2.5\nb 3", "a 3.5\nb 4 J", "3.5 is printed where 2.5 was", ""),
+        # two places that are one number
+        ("2.5", "a 2.5 2.50", "a 3.5 3.50", "3.5 is printed where 2.5 was", "3.5"),
+        # the unit chooses the place
+        ("2.5 J", "a 2.5 m 2.5 J", "a 3.5 m 4.5 J", "4.5 is printed where 2.5 was", "4.5 J"),
+        # nothing is printed any more
+        ("2.5", "a 2.5", "nothing here", "no number was printed", ""),
+        ("2.5, 3.5", "a 2.5 3.5", "a 2.5\nb 3.6", "no printed line has 2 numbers one after", ""),
+    ],
+)  # fmt: skip
+def test_the_number_in_the_same_place_is_proposed(
+    binding: str, before: str, now: str, label: str, help_text: str
+) -> None:
+    found = anew(binding, before + "\n", now + "\n")
+    assert found.label.startswith(label)
+    assert found.help == (help_text and f"write `{help_text}`")
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "successor"),
+    [
+        # headings tell lines that are alike apart, wherever they stand
+        ("Euler:\nerr 2.5\nRK4:\nerr 1", "RK4:\nerr 2.4\nEuler:\nerr 7.5", "7.5"),
+        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5\nMid:\nerr 2.4\nRK4:\nerr 1", "7.5"),
+        ("Euler, dt 0.1\nerr 2.5\nRK4, dt 0.2\nerr 1",
+            "RK4, dt 0.2\nerr 2.4\nEuler, dt 0.1\nerr 7.5", "7.5"),
+        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5", "7.5"),
+        # one that is gone may have been what the number was about
+        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Midpoint:\nerr 7.5\nRK4:\nerr 1", None),
+        ("Euler:\nerr 2.5", "Midpoint:\nerr 7.5", None),
+        ("err 2.5", "Midpoint:\nerr 7.5", "7.5"),
+        ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", None),
+        ("Euler\nerr 2.5", "Euler\nblew up\nRK4\nerr 7.5", None),
+        ("Euler\nerr 2.5", "Euler\nRK4\nerr 7.5", None),
+        ("Euler:\nerr 2.5\nRK4:\nE 1", "Euler:\nE 1\nRK4:\nerr 7.5", None),
+        # rows
+        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.1 7.5\n0.2 9", "7.5"),
+        ("dt err\n0.1 2.5\n0.2 9", "Errors\ndt err\n0.1 7.5\n0.2 8", "7.5"),
+        ("1.5\n2.5\n3.5", "1.6\n2.6\n3.6", "2.6"),
+        ("n err\n0 10 3.5\n0 20 2.5", "n err\n0 10 8\n0 20 7.5", "7.5"),
+        # as many rows, but not the same
+        ("n err\n10 3.5\n20 2.5\n40 4.5", "n err\n10 3.1\n30 2.1\n40 4.1", None),
+        ("n err\n10 3.5\n20 2.5", "n err\n30 0.35\n40 0.25", None),
+        ("1 0 2.5\n2 1 9", "2 0 8\n1 1 7.5", None),
+        ("1.5\n2.5\n3.5", "2.6\n1.5\n3.5", None),
+        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5", None),
+        ("dt err\n0.1 9\n0.2 2.5", "dt err\n0.2 7.5\n0.3 2.4", None),
+        ("dt 0.1\nerr 2.5\ndt 0.2\nerr 9", "dt 0.05\nerr 2.4\ndt 0.1\nerr 7.5", None),
+        ("A:\n1 9.5\n1 8.5\nB:\n2 2.5", "A:\nB:\nC:\n1 9.5\n2 2.4\n2 7.5", None),
+        # more rows, or fewer
+        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5\n0.2 9", None),
+        ("1.5\n2.5\n3.5", "2.6\n3.6", None),
+        ("err 2.5", "err 2.6\nerr 2.7", None),
+        # another wording is another quantity
+        ("period 2.5 s", "frequency 2.6 s", None),
+        ("period 2.5 s", "period 2.6 ms", None),
+        ("a 2.5 b 3", "b 3 a 2.6", None),
+    ],
+)  # fmt: skip
+def test_which_line_is_the_same(before: str, now: str, successor: str | None) -> None:
+    found = anew("2.5", before + "\n", now + "\n")
+    if successor is None:
+        assert found.label.startswith("it is not certain what is printed in place of 2.5 now; the ")
+        assert (found.help, found.edits) == ("write the number that the sentence is about", ())
+    else:
+        assert found.label == f"{successor} is printed where 2.5 was"
+        assert found.help == f"write `{successor}`"
+
+
+def test_of_two_places_one_is_gone() -> None:
+    found = anew("2.5", "a 2.5\nb 2.5\n", "a 3.5\nc 2.6\n")
+    assert found.label == (
+        "it is not certain what is printed in place of 2.5 now; the nearest printed value is 2.6"
+    )
+    found = anew("2", "".join(f"{name} 2\n" for name in "abcdef"), "a 3\nb 4\nc 5\nd 6\ne 7\nf 8\n")
+    assert found.label == (
+        "it was printed in 6 places, where now 3; 4; 5; 6 and 2 more are printed"
+    )
+
+
+def test_recorded_tables() -> None:
+    before = "| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n| RK4 | 2.0 |\n"
+    now = before.replace("+6.641", "+9.5").replace("2.0", "6.7")
+    runs = "Euler +6.641 %\nRK4 2.0\n", "Euler +9.5 %\nRK4 6.7\n"
+    held, prose = BindingHistory(), "| the error | `6.6`{out} |"
+    assert look(held, lesson(prose, before), ran(runs[0])) == ()
+    assert look(held, lesson(prose, before), ran(runs[1])) == ()
+    (found,) = look(held, lesson(prose, now), ran(runs[1]))
+    assert (found.label, found.help) == ("+9.5 is printed where +6.641 was", "write `9.5`")
+
+
+def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
+    held, prose = BindingHistory(), "`7.5`{out}"
+    recorded = "start\n...\nend 1.5\n"
+    text = lesson(prose, recorded, "text ellipsis")
+    assert look(held, text, ran("start\nx 7.52\nend 1.5\n")) == ()
+    (found,) = look(held, text, ran("start\nx 9.52\ny 7.6\nend 1.5\n"))
+    assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
+
+
+def test_an_output_that_is_not_recorded_has_places_too() -> None:
+    held, text = BindingHistory(), "`7.5`{out=examples/a.py}\n"
+    assert look(held, text, ran("x 7.52\ny 1\n")) == ()
+    (found,) = look(held, text, ran("x 9.52\ny 7.6\n"))
+    assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
+
+
+def test_a_script_that_fails_in_between_takes_nothing_away() -> None:
+    held, now = BindingHistory(), "period 2.950 s\nhalf 1.975 s\n"
+    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
+    failed = ran(outcome=Outcome.FAILED, status=1)
+    assert look(held, lesson("`2.006`{out}", PENDULUM), failed) == ()
+    (found,) = look(held, lesson("`2.006`{out}", now), ran(now))
+    assert found.help == "write `2.950`"
+    # It is the same as long as the number stands there, whatever is recorded next.
+    later = "period 5.000 s\nhalf 2.005 s\n"
+    (found,) = look(held, lesson("`2.006`{out}", later), ran(later))
+    assert (found.label, found.help) == ("5.000 is printed where 2.006 was", "write `5.000`")
+    # As it was before it was, the one that held last counts.
+    assert look(held, lesson("`2.006`{out}", "half 2.006 s\n"), ran(PENDULUM)) == ()
+    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
+    (found,) = look(held, lesson("`2.006`{out}", later), ran(later))
+    assert found.help == "write `5.000`"
+
+
+def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
+    held, now = BindingHistory(), "period 2.950 s\nhalf 1.975 s\n"
+    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
+    twice = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
+    (found,) = look(held, twice, ran(now))
+    assert found.label == "the nearest printed value is 1.975"
+
+
+@pytest.mark.parametrize(
+    ("binding", "printed", "help_text", "offered"),
+    [
+        ("2.5", "a 2.6", "write `2.6`", True),
+        ("2.5", "a 2.6 2.60", "write `2.6`", True),
+        ("2.5", "a 2.6 9.1", "write `2.6`, if that is what is meant", False),
+        ("b 2.5", "a 2.4 b 9.1", "write `b 9.1`", True),
+        ("2.5 J", "a 2.4 J b 9.1", "write `2.4 J`", True),
+        ("2.5 s", "energy 2.4 J", "write `2.4 s`, if that is what is meant", False),
+    ],
+)
+def test_where_nothing_is_known_of_before(
+    binding: str, printed: str, help_text: str, offered: bool
+) -> None:
+    text = lesson(f"`{binding}`{{out}}", printed + "\n")
+    (found,) = look(BindingHistory(), text, ran(printed + "\n"))
+    assert found.help == help_text
+    assert bool(found.edits) is offered
+
+
+NUMBER = st.integers(1000, 9999).map(lambda n: f"{n / 100:.2f}")
+
+
+@given(
+    st.lists(NUMBER, min_size=2, max_size=6, unique=True), st.randoms(use_true_random=False),
+    st.data(),
+)  # fmt: skip
+def test_a_named_number_is_never_taken_for_another(
+    numbers: list[str], random: object, data: st.DataObject
+) -> None:
+    """Lines with names of their own, in any order, with others between them."""
+    names = [f"{chr(97 + k)} is" for k in range(len(numbers))]
+    before = "".join(f"{name} {number}\n" for name, number in zip(names, numbers, strict=True))
+    others = data.draw(st.lists(NUMBER, min_size=len(names), max_size=len(names), unique=True))
+    rows = [f"{name} {number}\n" for name, number in zip(names, others, strict=True)]
+    rows += data.draw(st.lists(st.sampled_from(["done\n", "more 17\n"]), max_size=2, unique=True))
+    now = "".join(data.draw(st.permutations(rows)))
+    if numbers[0] in others:
+        return
+    found = anew(numbers[0], before, now)
+    if found.edits:
+        assert (found.label, found.edits[0].text) == (
+            f"{others[0]} is printed where {numbers[0]} was", others[0],
+        )  # fmt: skip

@@ -1,0 +1,151 @@
+"""Recorded tables: their cells are compared with what was printed."""
+
+from __future__ import annotations
+
+import pytest
+
+from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.model.results import Verdict
+from coursebuild.core.scripts.compare import compare
+from support.growth import grows_in_proportion
+from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, within
+
+PRINTED = """\
+integrators
+  RK4           kinetic energy  -0.000 %   |change| 3.9e-11 kg m^2/s
+  Euler         kinetic energy  +6.641 %   |change| 6.9e-04 kg m^2/s
+  implicitfast  kinetic energy  -6.040 %   |change| 6.4e-04 kg m^2/s
+  implicit      kinetic energy  -6.040 %   |change| 6.4e-04 kg m^2/s
+"""
+HEAD = "| integrator | energy | momentum |\n| --- | ---: | ---: |\n"
+ROWS = """\
+| RK4 | −0.000 % | 3.9e-11 |
+| `Euler` | **+6.641 %** | 6.9e-04 |
+| implicitfast | −6.040 % | 6.4e-04 |
+| implicit | -6.040  % | 6.4e-04 kg m^2/s |"""
+
+
+def verdict(
+    rows: str,
+    printed: str = PRINTED,
+    comparison: Comparison = EXACT,
+    filters: tuple[Filter, ...] = (),
+) -> Verdict:
+    return compare(table(HEAD + rows), comparison, filters, printed)
+
+
+def test_rows_stand_in_lines() -> None:
+    assert verdict(ROWS).status == "verified"
+    assert verdict(ROWS.split("\n")[2]).status == "verified"
+    assert verdict("| Euler | | 6.9e-04 |").status == "verified"
+    assert verdict("| | | |").status == "verified"
+
+
+def test_rows_stand_in_order() -> None:
+    lines = ROWS.split("\n")
+    assert verdict("\n".join(lines[::-1])).status == "drift"
+    assert verdict("\n".join([lines[1], lines[1]])).status == "drift"
+
+
+def test_cells_stand_in_order() -> None:
+    assert verdict("| 6.9e-04 | Euler | |").status == "drift"
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "| implicit | 3.9e-11 | |",
+        "| RK4 | 0.000 % | |",
+        "| Euler | 6.641 % | |",
+        "| Euler | +6.64 % | |",
+        "| Eul | +6.641 % | |",
+        "| Euler | +6.641 | 6.9 |",
+        "| K4 | | |",
+    ],
+)
+def test_words_and_numbers_stand_whole(row: str) -> None:
+    assert verdict(row).status == "drift"
+
+
+def test_numbers_match_by_the_mode() -> None:
+    assert verdict("| Euler | 6.64 % | 6.9e-04 |", comparison=DIGITS).status == "verified"
+    assert verdict("| Euler | 6.6 % | 7e-04 |", comparison=DIGITS).status == "verified"
+    assert verdict("| Euler | 6.63 % | 7e-04 |", comparison=DIGITS).status == "drift"
+    assert verdict("| Euler | 6.7 % | 7e-04 |", comparison=within("0.1")).status == "verified"
+    assert verdict("| Euler | 9.9 % | 7e-04 |", comparison=VOLATILE).status == "volatile"
+
+
+def test_the_number_that_drifted_is_named() -> None:
+    found = verdict(ROWS.replace("6.641", "6.702"))
+    (change,) = found.changes
+    assert (change.kind.value, change.recorded, change.ran) == ("numeric", "+6.702", "+6.641")
+    assert change.ran_line == 3
+    assert change.span.text == "+6.702"
+    assert change.span.source.line_text(change.span.line).startswith("| `Euler` | **+6.702")
+    assert (
+        found.diff
+        == """\
+--- recorded
++++ this run
+-Euler  +6.702 %  6.9e-04
++Euler kinetic energy +6.641 % |change| 6.9e-04 kg m^2/s"""
+    )
+
+
+def test_a_minus_sign_keeps_its_place() -> None:
+    (change,) = verdict(ROWS.replace("−6.040", "−6.041")).changes
+    assert (change.kind.value, change.recorded, change.ran) == ("rounding", "−6.041", "-6.040")
+    assert change.span.text == "−6.041"
+
+
+def test_of_several_numbers_the_nearest_is_meant() -> None:
+    (change,) = verdict("| Euler | | 6.8e-04 |").changes
+    assert (change.recorded, change.ran) == ("6.8e-04", "6.9e-04")
+    (change,) = verdict("| Euler | 7.0 | |", comparison=EXACT).changes
+    assert (change.recorded, change.ran) == ("7.0", "+6.641")
+
+
+def test_a_row_without_a_line_is_missing() -> None:
+    (change,) = verdict(ROWS.replace("`Euler`", "`Midpoint`")).changes
+    assert (change.kind.value, change.ran_line) == ("missing lines", 0)
+    assert change.recorded == "Midpoint +6.641 % 6.9e-04".replace(" +", "  +").replace("% ", "%  ")
+    assert change.span.text == "`Midpoint` | **+6.641 %** | 6.9e-04"
+
+
+def test_drift_in_one_row_does_not_move_the_others() -> None:
+    printed = PRINTED.replace("+6.641", "+7.000").replace("3.9e-11", "4.0e-11")
+    found = verdict(ROWS, printed)
+    assert [(c.recorded, c.ran, c.ran_line) for c in found.changes] == [
+        ("3.9e-11", "4.0e-11", 2),
+        ("+6.641", "+7.000", 3),
+    ]
+
+
+def test_filters_apply_to_cells_and_lines() -> None:
+    printed = "run 17: took 3.25 s, E 1.5\nrun 18: took 9.99 s, E 2.5\n"
+    seconds = Filter(r"\d+\.\d+ s", "… s")
+    rows = "| run 17 | took 1.00 s | 1.5 |\n| run 18 | took … s | 2.6 |"
+    (change,) = verdict(rows, printed, EXACT, (seconds,)).changes
+    assert (change.recorded, change.ran, change.span.text) == ("2.6", "2.5", "2.6")
+
+
+def test_crlf_and_white_space_in_the_output() -> None:
+    assert (
+        verdict(ROWS, PRINTED.replace("\n", "\r\n").replace(" kinetic", "\tkinetic")).status
+        == "verified"
+    )
+
+
+def test_large_tables_take_work_in_proportion() -> None:
+    def compared(size: int) -> Verdict:
+        rows = "\n".join(f"| p{i} | {i / 7:.4f} |" for i in range(size))
+        printed = "\n".join(f"noise {i}\nq p{i} = {i / 7:.4f}" for i in range(size))
+        assert verdict(rows, printed).status == "verified"
+        drifted = printed.replace(f"{70 / 7:.4f}", "99.5").replace("q p3 ", "q p_3 ")
+        return verdict(rows, drifted)
+
+    found = grows_in_proportion(compared, 200)
+    assert [(change.recorded, change.ran) for change in found.changes] == [
+        ("p3  0.4286", ""),
+        ("10.0000", "99.5"),
+    ]

@@ -1,0 +1,208 @@
+"""The course map: what it becomes."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Comparison, Filter, Mode, Silence, Status
+from coursebuild.core.model.vocabulary import CALLOUTS
+from support.course_maps import parse, told
+
+ROOT = Path(__file__).parents[3]
+
+COMPLETE = r"""# the course
+[course]
+title = "Simulation with MuJoCo"
+summary = "From a first step to $\\tau$."
+language = "pt-BR"
+base_url = "https://example.org/course/"
+repository = "https://example.org/course.git"
+licence = "CC-BY-4.0"
+engine = "3.14.0"
+
+[verify]
+rtol = 1e-6
+atol = 0
+ellipsis = true
+[[verify.filter]]
+pattern = 'took (\d+) s'
+replacement = 'took \1'
+
+[callouts]
+warning = "Aviso"
+lab = { label = "In the lab", promise = "Done by hand." }
+try = { label = "Experimente" }
+
+[[silence]]
+rule = "heading-skip"
+reason = "the layout of the exercises"
+path = "content/lessons/4.*"
+
+[[level]]
+id = 4
+title = "Rigid bodies"
+summary = "What turns."
+
+[[level.lesson]]
+id = "4.1"
+slug = "rotations"
+title = "Rotations"
+status = "planned"
+
+[[level.lesson]]
+id = "4.2"
+slug = "mass-and-inertia"
+title = "Mass and inertia"
+status = "complete"
+summary = "How hard it is to spin."
+objectives = ["Compose inertias", "Find principal axes"]
+prerequisites = ["4.1",
+  "A.1"]
+minutes = 90
+
+[[level]]
+id = "A"
+title = "Appendix"
+lesson = [ { id = "A.1", slug = "a", title = "Units", status = "draft" } ]
+
+[[page]]
+id = "about"
+title = "About"
+file = "content/pages/about.md"
+"""
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_a_complete_map(newline: str) -> None:
+    parsed = parse(COMPLETE.replace("\n", newline))
+    assert parsed.diagnostics == ()
+    course = parsed.value
+    assert course is not None
+    assert course.map.path == "content/course.toml"
+    assert (course.title, course.summary) == (
+        "Simulation with MuJoCo",
+        "From a first step to $\\tau$.",
+    )
+    assert (course.language, course.licence) == ("pt-BR", "CC-BY-4.0")
+    assert (course.base_url, course.repository) == (
+        "https://example.org/course/",
+        "https://example.org/course.git",
+    )
+    assert course.engine == "3.14.0"
+    assert course.engine_span is not None and course.engine_span.text == '"3.14.0"'
+    assert course.comparison == Comparison(Mode.TOLERANCE, Decimal("1e-6"), Decimal(0), True)
+    assert course.filters == (Filter(r"took (\d+) s", r"took \1"),)
+    assert course.silences == (
+        Silence("heading-skip", "the layout of the exercises", "content/lessons/4.*"),
+    )
+    assert [level.id for level in course.levels] == ["4", "A"]
+    assert [level.title for level in course.levels] == ["Rigid bodies", "Appendix"]
+    assert course.levels[0].summary == "What turns."
+    first, second, third = course.lessons
+    assert (first.id, first.status, first.minutes, first.prerequisites, first.level) == (
+        "4.1",
+        Status.PLANNED,
+        None,
+        (),
+        "4",
+    )
+    assert (second.slug, second.status, second.minutes) == ("mass-and-inertia", Status.COMPLETE, 90)
+    assert second.objectives == ("Compose inertias", "Find principal axes")
+    assert second.prerequisites == ("4.1", "A.1")
+    assert [span.text for span in second.prerequisite_spans] == ['"4.1"', '"A.1"']
+    assert [span.line for span in second.prerequisite_spans] == [47, 48]
+    assert second.span.text.startswith("[[level.lesson]]") and second.span.text.endswith("= 90")
+    assert second.path == "content/lessons/4.2-mass-and-inertia.md"
+    assert (third.id, third.level, third.status) == ("A.1", "A", Status.DRAFT)
+    assert course.levels[0].span.contains(second.span)
+    assert all(lesson.document is None for lesson in course.lessons)
+    (page,) = course.pages
+    assert (page.id, page.title, page.path, page.document) == (
+        "about",
+        "About",
+        "content/pages/about.md",
+        None,
+    )
+    assert (course.models, course.files) == ((), ())
+
+
+def test_callouts_are_the_built_in_ones_and_the_courses_own() -> None:
+    course = parse(COMPLETE).value
+    assert course is not None
+    kinds = {kind.name: kind for kind in course.callouts}
+    built_in = {kind.name: kind for kind in CALLOUTS}
+    assert list(kinds) == [*built_in, "lab"]
+    assert (kinds["warning"].label, kinds["warning"].promise) == (
+        "Aviso",
+        built_in["warning"].promise,
+    )
+    assert (kinds["try"].label, kinds["try"].promise) == ("Experimente", built_in["try"].promise)
+    assert (kinds["lab"].label, kinds["lab"].promise) == ("In the lab", "Done by hand.")
+    assert kinds["note"] == built_in["note"]
+
+
+def test_every_course_has_the_kinds_of_the_contract() -> None:
+    assert {kind.name for kind in CALLOUTS} == {
+        *("established", "derivation", "implementation", "recommendation", "research"),
+        *("unverified", "version", "warning", "try", "solution", "note", "tip"),
+        *("important", "caution"),
+    }
+    assert all(kind.label and kind.promise for kind in CALLOUTS)
+
+
+def test_the_least_that_a_map_needs() -> None:
+    course = parse('[course]\ntitle = "T"\n').value
+    assert course is not None
+    assert (course.language, course.base_url, course.repository, course.licence) == (
+        "en",
+        "",
+        "",
+        "",
+    )
+    assert (course.engine, course.engine_span) == (None, None)
+    assert course.comparison == Comparison()
+    assert (course.filters, course.silences, course.levels, course.pages) == ((), (), (), ())
+    assert course.callouts == CALLOUTS
+
+
+@pytest.mark.parametrize(
+    ("verify", "expected"),
+    [
+        ("", Comparison()),
+        ('compare = "exact"', Comparison()),
+        ('compare = "digits"', Comparison(Mode.DIGITS)),
+        ('compare = "rtol"\nrtol = 0.001', Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("rtol = 1e-3", Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("atol = 1_000.5", Comparison(Mode.TOLERANCE, Decimal(0), Decimal("1000.5"))),
+        ("atol = 0x10", Comparison(Mode.TOLERANCE, Decimal(0), Decimal(16))),
+        ("ellipsis = true", Comparison(ellipsis=True)),
+    ],
+)
+def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
+    course = parse(f'[course]\ntitle = "T"\n[verify]\n{verify}\n').value
+    assert course is not None and course.comparison == expected
+
+
+def test_the_real_course() -> None:
+    text = (ROOT / "content" / "course.toml").read_text(encoding="utf-8")
+    assert told(text) == []
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
+    at = data.draw(st.integers(0, len(COMPLETE)))
+    piece = data.draw(
+        st.sampled_from([*"[]{}=.,\"'\\\n#", "id = 4.2\n", "[[level]]\n", "[course]\n", "1", "\r"])
+        | st.text(max_size=3)
+    )
+    mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 20)) :]
+    parsed = parse(mutated)
+    assert parsed.value is not None or parsed.diagnostics
+    orders = [d.order for d in parsed.diagnostics]
+    assert orders == sorted(orders)

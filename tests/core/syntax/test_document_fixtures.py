@@ -1,0 +1,43 @@
+"""What a document becomes, and what its author is told: the fixture files, case by case.
+
+A file in `tests/fixtures/syntax/` whose name begins with `page` is parsed as a page, all others as
+lessons. `pytest tests/core/syntax --rewrite-fixtures` writes the expected parts anew.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+from support.fixture_cases import Case, read_cases, rewrite
+from support.tree_dump import dump
+
+FOLDER = Path(__file__).parents[2] / "fixtures" / "syntax"
+FILES = sorted(FOLDER.glob("*.md"))
+KINDS = frozenset(kind.name for kind in CALLOUTS)
+
+
+def dumped(path: Path, case: Case) -> str:
+    source = Source("content/lessons/1.1-x.md", case.input)
+    return dump(parse_document(source, KINDS, lesson=not path.stem.startswith("page")))
+
+
+def test_every_file_of_the_folder_is_read() -> None:
+    assert len(FILES) >= 10
+    assert set(FOLDER.iterdir()) == set(FILES)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_documents_are_as_their_fixtures_say(path: Path, request: pytest.FixtureRequest) -> None:
+    cases = read_cases(path)
+    found = [replace(case, expected=dumped(path, case)) for case in cases]
+    if request.config.getoption("--rewrite-fixtures"):
+        rewrite(path, found)
+        return
+    for case, now in zip(cases, found, strict=True):
+        assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"

@@ -1,0 +1,258 @@
+"""Parsing never raises, and every node stands where it says, whatever the text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from markdown_it.common.utils import unescapeAll
+
+from coursebuild.core.model import (
+    Block,
+    CodeBlock,
+    CodeSpan,
+    Document,
+    Emphasis,
+    FootnoteRef,
+    Heading,
+    HtmlFlow,
+    Inline,
+    Link,
+    ListBlock,
+    Math,
+    MathBlock,
+    Mjcf,
+    NumberBinding,
+    Paragraph,
+    PlainCode,
+    Recording,
+    Script,
+    Strikethrough,
+    Strong,
+    Table,
+    Text,
+    block_inlines,
+    child_blocks,
+    document_blocks,
+    walk_blocks,
+    walk_inlines,
+)
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.plain import plain_html
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.features.quiz.model import Quiz
+
+KINDS = frozenset(kind.name for kind in CALLOUTS)
+
+PIECES = [
+    *("$", "$$", "`", "``", "*", "**", "_", "~~", "\\", "|", "[", "](", ")", "]", "![", "<", ">"),
+    *("\n", "\n\n", "\r\n", "\r", "\t", "    ", " ", "  \n", "\\\n", "\0", "\ufeff", "\ud800"),
+    *("> ", "- ", "1. ", "- [x] ", "# ", "## ", "### A {#b .c}\n", "---\n", "===\n", "***\n"),
+    *("a", "é", "𝔘", "word word", "&amp;", "&nbsp;", "&#65;", "\\*", "<b>", "</b>", "<!--", "-->"),
+    *(
+        "| a | b |\n| - | :-: |\n",
+        "a|b\n-|-\n1|2\\|3\n",
+        "$x^2$",
+        "$$y$$",
+        "$$\nz\n$$\n",
+        "$5 and $6",
+    ),
+    *("```python file=examples/x.py\nprint(1)\n```\n", "```python\n", "```text digits\n1\n```\n"),
+    *("```\n", "~~~\n", "Output:\n\n", "```io\nINPUT: a\nPROCESS: b\n", "```mjcf error=x\n"),
+    "```bench box show=plot\n",
+    *(
+        '```quiz\n{"id": "q", "questions": [{"kind": "open", "q": "<p>$x$ \\\\$ a</p>",',
+        "```lab\n{}",
+    ),
+    *(
+        "> [!note] T\n",
+        "> [!nope]- T\n",
+        "`1`{out}",
+        "`1`{out=x}",
+        "[^a]",
+        "[^a]: x\n",
+        "[a]: /u\n",
+    ),
+    *(
+        "[a](lesson:1.1#b)",
+        "[a](javascript:x)",
+        "![](x)",
+        "<http://a.b>",
+        "Lesson 2.2",
+        "Levels 1, 2",
+    ),
+    *(
+        "Lesson\n2.2",
+        "<p>a $x$ b</p>\n",
+        "<div>\n",
+        "</div>\n\n",
+        "---\na: b\n---\n",
+        "{.x}",
+        "[a]",
+    ),
+]
+PREFIXES = ["", "> ", "  ", "   ", "- ", "> - ", "\t", "    "]
+LINE_ENDS = ["\n", "\r\n", "\r"]
+
+
+@st.composite
+def markdown(draw: st.DrawFn) -> str:
+    """A text that likes to look like a lesson, in a quote or a list or not."""
+    pieces = draw(st.lists(st.sampled_from(PIECES) | st.text(max_size=8), max_size=24))
+    text = "".join(pieces)
+    prefix = draw(st.sampled_from(PREFIXES))
+    rest = prefix.replace("-", " ")
+    text = prefix + text.replace("\n", "\n" + rest)
+    line_end = draw(st.sampled_from(LINE_ENDS))
+    return text.replace("\n", line_end) if line_end != "\n" else text
+
+
+def parsed(text: str, lesson: bool = True) -> Parsed[Document]:
+    return parse_document(Source("x.md", text), KINDS, lesson=lesson)
+
+
+@settings(max_examples=150)
+@given(markdown(), st.booleans())
+def test_parsing_and_rendering_never_raise(text: str, lesson: bool) -> None:
+    result = parsed(text, lesson)
+    plain_html(result.value)
+    for diagnostic in result.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+        assert diagnostic.message and not diagnostic.message.endswith(".")
+        assert diagnostic.span.line >= 1 and diagnostic.severity is not None
+
+
+@settings(max_examples=150)
+@given(st.binary(max_size=200))
+def test_decoded_bytes_never_raise(data: bytes) -> None:
+    parsed(data.decode("utf-8", "replace"))
+    parsed(data.decode("latin-1"))
+
+
+@settings(max_examples=150)
+@given(markdown())
+def test_spans_nest_and_follow_each_other(text: str) -> None:
+    document = parsed(text).value
+    for block in document_blocks(document):
+        within(block.span, Span(document.source, 0, len(text)))
+        for child in child_blocks(block):
+            within(child.span, block.span)
+        if isinstance(block, ListBlock):
+            for item in block.items:
+                within(item.span, block.span)
+        if isinstance(block, Heading | Paragraph | HtmlFlow):
+            inlines_within(block.children, block.span)
+    siblings(document.blocks)
+
+
+@settings(max_examples=150)
+@given(markdown())
+def test_spans_slice_back_to_their_text(text: str) -> None:
+    document = parsed(text).value
+    for block in own_blocks(document):
+        for excerpt in excerpts(block):
+            faithful(excerpt, text)
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, Math):
+                faithful(inline.tex, text)
+            if not isinstance(block, Table | HtmlFlow):
+                slices_back(inline)
+
+
+@settings(max_examples=100)
+@given(markdown())
+def test_recorded_bodies_are_whole_lines(text: str) -> None:
+    for block in own_blocks(parsed(text).value):
+        if isinstance(block, Script) or (
+            isinstance(block, Recording) and isinstance(block.body, Excerpt)
+        ):
+            span = block.body_span
+            assert span.start == 0 or text[span.start - 1] in "\r\n"
+            assert span.end == len(text) or text[span.end - 1] in "\r\n"
+            assert block.prefix.strip("> \t") == ""
+
+
+def within(inner: Span, outer: Span) -> None:
+    assert outer.start <= inner.start <= inner.end <= outer.end
+
+
+def siblings(nodes: tuple[Block, ...]) -> None:
+    for first, second in pairwise(nodes):
+        assert first.span.end <= second.span.start
+
+
+def inlines_within(inlines: tuple[Inline, ...], outer: Span) -> None:
+    for first, second in pairwise(inlines):
+        assert first.span.end <= second.span.start
+    for inline in inlines:
+        within(inline.span, outer)
+        if isinstance(inline, Emphasis | Strong | Strikethrough | Link):
+            inlines_within(inline.children, inline.span)
+
+
+def own_blocks(document: Document) -> Iterator[Block]:
+    """The blocks that are not in the JSON of a quiz or lab."""
+    inner = {
+        id(b)
+        for block in document_blocks(document)
+        if isinstance(block, Quiz)
+        for b in walk_blocks((block,))
+    }
+    return (block for block in document_blocks(document) if id(block) not in inner)
+
+
+def excerpts(block: Block) -> Iterator[Excerpt]:
+    if isinstance(block, CodeBlock | PlainCode | Mjcf | Script) and block.code.text != "\n":
+        yield block.code
+    if isinstance(block, MathBlock):
+        yield block.tex
+    if isinstance(block, Recording) and isinstance(block.body, Excerpt):
+        yield block.body
+    if isinstance(block, Table):
+        yield from (cell.text for row in (block.header, *block.rows) for cell in row)
+
+
+def faithful(excerpt: Excerpt, text: str) -> None:
+    """Each character stands at its offset, but for line ends, NUL and the spaces of a tab."""
+    for i, char in enumerate(excerpt.text):
+        at = excerpt.offset(i)
+        there = text[at : at + 1]
+        assert (
+            there == char
+            or (char == "\n" and there in ("\r", "\n", ""))
+            or (char == " " and there == "\t")
+            or (char == "\ufffd" and there == "\0")
+        ), (i, char, there)
+
+
+def slices_back(inline: Inline) -> None:
+    text = inline.span.text
+    match inline:
+        case Text() if not {"\0", "\r"} & set(text) and "&#" not in text:
+            decoded = unescapeAll(text)
+            autolink = ":" in inline.text or "@" in inline.text
+            assert decoded == inline.text or autolink or "\n" in text
+        case CodeSpan():
+            assert text[0] == text[-1] == "`"
+        case NumberBinding():
+            assert text[0] == "`" and text[-1] == "}"
+            same = inline.text_span.text == inline.text
+            assert same or {"\n", "\r", "\0"} & set(inline.text_span.text)
+        case Math():
+            assert text[0] == text[-1] == "$"
+        case Emphasis():
+            assert text[0] == text[-1] and text[0] in "*_"
+        case Strong():
+            assert text[:2] == text[-2:] and text[:2] in ("**", "__")
+        case Strikethrough():
+            assert text[:2] == text[-2:] == "~~"
+        case Link() if inline.mention:
+            assert inline.target_span.text == getattr(inline.target, "id", None)
+        case FootnoteRef():
+            assert text == f"[^{inline.label}]"
+        case _:
+            pass

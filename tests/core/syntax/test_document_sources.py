@@ -1,0 +1,196 @@
+"""What a file can be besides its Markdown: line ends, a byte order mark, NUL, extremes of size."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from types import FrameType
+
+import pytest
+
+from coursebuild.core.model import (
+    BlockQuote,
+    Callout,
+    CodeBlock,
+    Document,
+    Emphasis,
+    Heading,
+    Paragraph,
+    Recording,
+    Script,
+    document_blocks,
+    document_inlines,
+)
+from coursebuild.core.pages.plain import plain_html
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Excerpt, Source
+
+KINDS = frozenset({"note", "try"})
+LESSON = """## Title
+
+> [!try] It
+> ```python file=examples/x.py
+> print(1)
+>
+> print(2)
+> ```
+>
+> Output:
+>
+> ```text
+> 1
+> 2
+> ```
+
+$$
+a
+$$
+
+| a | b |
+| - | - |
+| 1 | 2\\|3 |
+"""
+
+
+def parsed(text: str) -> Document:
+    result = parse_document(Source("x.md", text), KINDS, lesson=True)
+    assert result.diagnostics == ()
+    return result.value
+
+
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
+def test_line_ends(line_end: str) -> None:
+    text = LESSON.replace("\n", line_end)
+    document = parsed(text)
+    callout = document.blocks[1]
+    assert isinstance(callout, Callout)
+    script, recording = callout.blocks
+    assert isinstance(script, Script) and isinstance(recording, Recording)
+    assert script.code.text == "print(1)\n\nprint(2)\n"
+    assert script.code.span().text.startswith("print(1)" + line_end)
+    assert isinstance(recording.body, Excerpt) and recording.body.text == "1\n2\n"
+    assert recording.body_span.text == f"> 1{line_end}> 2{line_end}"
+    assert recording.prefix == "> "
+    assert recording.span.line == 10
+    assert plain_html(document) == plain_html(parsed(LESSON))
+
+
+def test_mixed_line_ends() -> None:
+    document = parsed("a\r\n\rb\n\r\nc")
+    assert [block.span.text for block in document.blocks] == ["a", "b", "c"]
+
+
+def test_a_byte_order_mark_is_skipped() -> None:
+    document = parsed("\ufeff## A\n")
+    heading = document.blocks[0]
+    assert isinstance(heading, Heading) and heading.anchor == "a"
+    assert (heading.span.start, heading.span.end) == (1, 5)
+
+
+def test_a_byte_order_mark_elsewhere_is_text() -> None:
+    paragraph = parsed("a \ufeff b").blocks[0]
+    assert isinstance(paragraph, Paragraph)
+    assert plain_html(parsed("a \ufeff b")) == "<p>a \ufeff b</p>\n"
+
+
+def test_nul_is_a_replacement_character() -> None:
+    assert plain_html(parsed("a\0b `c\0`")) == "<p>a\ufffdb <code>c\ufffd</code></p>\n"
+
+
+def test_no_final_line_end() -> None:
+    block = parsed("```c\nx\n```").blocks[0]
+    assert isinstance(block, CodeBlock) and block.code.text == "x\n"
+
+
+def test_an_unclosed_fence_without_final_line_end_has_one() -> None:
+    result = parse_document(Source("x.md", "```c\nx"), KINDS, lesson=True)
+    block = result.value.blocks[0]
+    assert isinstance(block, CodeBlock) and block.code.text == "x\n"
+    assert [d.rule for d in result.diagnostics] == ["fence-unclosed"]
+
+
+def test_deep_nesting_becomes_paragraphs_and_loses_nothing() -> None:
+    document = parsed(">" * 300 + " a")
+    blocks = list(document_blocks(document))
+    assert sum(isinstance(block, BlockQuote) for block in blocks) == 60
+    assert blocks[-1].span.text == ">" * 240 + " a"
+
+
+def test_deep_lists_become_paragraphs() -> None:
+    text = "".join("  " * i + "- a\n" for i in range(200))
+    assert str(plain_html(parsed(text))).count("a\n") + 1 >= 30
+
+
+def test_deep_emphasis_loses_its_marks_and_no_text() -> None:
+    text = "*a " * 500 + "b*" * 500
+    inlines = list(document_inlines(parsed(text)))
+    assert sum(isinstance(inline, Emphasis) for inline in inlines) == 60
+    assert str(plain_html(parsed(text))).count("a ") == 500
+
+
+REPEATED = [
+    *("[", "]", "*", "_", "$", "$$", "`", "~", "|", "<", "&", "!", "![", "[^", "[^a]", "("),
+    *("{", "\\", "#", ">", "> ", "- ", "1. ", "\t", "$a", "a$ ", "$$a\n\n", "*a ", "a*"),
+    *("*a_", "**a ", "a**b", "[a](", '[a](b "', "[a](<b", "[a][b]", "[a]: b\n"),
+    *("[a]: b 'x\n", "[a\n", "`a", "``a`", "`a$", "<a ", '<a "', "<!--", "<?"),
+    *('<a href="x">', "<b>", "</b>", "&amp;", "|\n", "a|b\n-|-\n", "- a\n", "> a\n"),
+    *("$$\n", "$$\na\n", "```\n", "a\n===\n", "a\n=\n", "[^a]: x\n", "Lesson 2.2 "),
+    *("Lessons 1.1, 2.2, ", "- [ ] a\n", "<http://a.b>", "~~a", "~~~a~~~ ", "[a](u) "),
+    *("`x`{out}", "`x`{out", "\\$", "> [!note] a\n\n", "a\\\n", "a  \n", "<p>", "<div>\n\n"),
+    *("# a {#b}\n", "# a {#\n", "Output:\n\n", "    a\n", "```python\nx\n```\n"),
+    "Output:\n\n```text\na\n```\n",
+]
+
+
+def calls(text: str) -> int:
+    """How many functions parsing and rendering call: a measure of time that is always the same."""
+    count = 0
+
+    def counted(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal count
+        count += 1
+
+    sys.setprofile(counted)
+    try:
+        plain_html(parse_document(Source("x.md", text), KINDS, lesson=True).value)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+NESTED = [("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")]
+
+
+@pytest.mark.site
+def test_work_grows_in_proportion_to_repeated_pieces() -> None:
+    faster = []
+    for piece in REPEATED:
+        size = 1000 // len(piece)
+        calls(piece)
+        once, twice = calls(piece * size), calls(piece * (2 * size))
+        if twice >= 2.2 * once + 400:
+            faster.append(f"{piece!r}: {once} and {twice} calls")
+    assert faster == []
+
+
+def test_work_grows_in_proportion_to_nested_brackets() -> None:
+    faster = []
+    for left, right in NESTED:
+        once = calls(left * 300 + "x" + right * 300)
+        twice = calls(left * 600 + "x" + right * 600)
+        if twice >= 2.3 * once + 500:
+            faster.append(f"{left!r} and {right!r}: {once} and {twice} calls")
+    assert faster == []
+
+
+def test_reading_leaves_nothing_for_the_collector() -> None:
+    text = "## A {#a}\n\nSee[^1] [a].\n\n[^1]: A note with `code`.\n\n[a]: #a\n"
+    for _ in range(40):  # after which all is made that is made once
+        parse_document(Source("a.md", text), frozenset(), lesson=True)
+    gc.collect()
+    gc.disable()
+    try:
+        parse_document(Source("a.md", text), frozenset(), lesson=True)
+        assert gc.collect() == 0
+    finally:
+        gc.enable()

@@ -1,0 +1,176 @@
+"""JSON with places: what is JSON, and where its values stand."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.text.source import Excerpt, Source
+from support.json_texts import parse
+from support.positioned_nodes import plain, shown
+
+
+def walk(node: Node) -> list[Node]:
+    if isinstance(node, ObjectNode):
+        inner = [n for member in node.members for n in (member.key, member.value)]
+        return [node, *(m for n in inner for m in walk(n))]
+    if isinstance(node, ArrayNode):
+        return [node, *(n for item in node.items for n in walk(item))]
+    return [node]
+
+
+def test_values_that_json_has_and_python_stretches() -> None:
+    node = parse(
+        '[1e999, -0, -0.0, 1E+2, 123456789012345678901234567890, "\\u0000\\ud83d\\ude00\\/"]'
+    )
+    assert node.diagnostics == ()
+    assert node.value is not None
+    assert repr(plain(node.value)) == (
+        "[inf, 0, -0.0, 100.0, 123456789012345678901234567890, '\\x00😀/']"
+    )
+
+
+def test_a_prefix_is_cut_off_and_counted() -> None:
+    text = '> {"a": [1,\n>   "$\\\\x$",\n> \n>  tru]}\n'
+    source = Source("lesson.md", text)
+    lines = [(line[2:], text.index(line) + 2) for line in text.split("\n") if line]
+    parsed = parse_json(Excerpt.of_lines(source, lines), source.span(0, 0))
+    assert shown(parsed.diagnostics) == [
+        "4:4-7 json-syntax: expected a value, found `tru` [text stands between double quotes]"
+    ]
+
+
+def test_each_character_of_a_string_knows_its_place() -> None:
+    text = '> ["a\\n\\u00e9\\ud83d\\ude00\\\\x",\n>  "plain", ""]'
+    source = Source("lesson.md", text)
+    first, second = text.split("\n")
+    body = Excerpt.of_lines(source, [(first[2:], 2), (second[2:], len(first) + 3)])
+    node = parse_json(body, source.span(0, 0)).value
+    assert isinstance(node, ArrayNode)
+    escaped, simple, empty = node.items
+    assert isinstance(escaped, StringNode) and isinstance(simple, StringNode)
+    assert isinstance(empty, StringNode)
+    excerpt = escaped.excerpt
+    assert excerpt.text == "a\n\u00e9\U0001f600\\x"
+    places = [excerpt.offset(i) for i in range(len(excerpt.text))]
+    assert [text[p : p + 2] for p in places] == ["a\\", "\\n", "\\u", "\\u", "\\\\", 'x"']
+    assert simple.excerpt.span().text == "plain"
+    assert simple.excerpt.span(2, 4).text == "ai"
+    assert (simple.span.line, simple.span.column) == (2, 4)
+    assert empty.excerpt.text == "" and text[empty.excerpt.span().start] == '"'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r'"a\nabout"',  # a line end before a word, no formula
+        r'"\nabla"',  # no dollar: not a text with formulas
+        r'"costs $5 and $6\nnu"',
+        r'"$x$\nnot"',  # after the formula
+        r'"$x$\tabc"',
+        r'"$\\tau$"',
+        r'"a\r\n$b$"',
+        r'"$a$ \b"',
+    ],
+)
+def test_escapes_that_may_be_meant_are_left_alone(text: str) -> None:
+    assert parse(text).diagnostics == ()
+
+
+# ------------------------------------------------------------------------------------- properties
+
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.text(st.characters(exclude_categories=["Cs"]), max_size=4), inner, max_size=4
+        )
+    ),
+    max_leaves=12,
+)
+PIECES = st.sampled_from(
+    [
+        *"{}[],:\" \n\t\r0123456789-+.eE/*#\\='",
+        *('"a"', '"b":', "true", "false", "null", "NaN", "True", "//", "/*", "*/", '"$\\tau$"'),
+        *("\\u00e9", "\\ud83d\\ude00", "“", "\u00a0", "\x0c"),
+    ]
+)
+
+
+@settings(max_examples=200)
+@given(VALUES, st.sampled_from([None, 0, 2]), st.booleans())
+def test_valid_json_is_read_as_the_standard_library_reads_it(
+    value: object, indent: int | None, ascii_only: bool
+) -> None:
+    text = json.dumps(value, indent=indent, ensure_ascii=ascii_only)
+    parsed = parse(text)
+    assert [d for d in parsed.diagnostics if d.rule != "field-value"] == []
+    assert parsed.value is not None
+    assert repr(plain(parsed.value)) == repr(json.loads(text))
+
+
+@settings(max_examples=200)
+@given(VALUES, st.sampled_from([None, 1]))
+def test_spans_nest_and_slice_back(value: object, indent: int | None) -> None:
+    text = json.dumps(value, indent=indent)
+    root = parse(text).value
+    assert root is not None
+    for node in walk(root):
+        assert json.loads(node.span.text) == plain(node)
+        assert root.span.contains(node.span)
+        assert node.span.contains(node.mark)
+        if isinstance(node, StringNode):
+            excerpt = node.excerpt
+            assert excerpt.text == node.value
+            for i, char in enumerate(excerpt.text):
+                there = text[excerpt.offset(i)]
+                assert there in (char, "\\")
+                assert node.span.start < excerpt.offset(i) < node.span.end - 1
+
+
+def is_json(text: str) -> bool:
+    def refuse(name: str) -> None:
+        raise ValueError(name)
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+        json.dumps(value, ensure_ascii=False).encode()
+    except (ValueError, UnicodeEncodeError):
+        return False
+    return True
+
+
+@settings(max_examples=200)
+@given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20))
+@example('{"a":1}{')
+@example("[1]]")
+@example('["\\u')
+def test_any_text_is_json_or_told_why_not(text: str) -> None:
+    parsed = parse(text)
+    syntax = [d for d in parsed.diagnostics if d.rule == "json-syntax"]
+    assert is_json(text) == (not syntax)
+    for diagnostic in parsed.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+    assert syntax or parsed.value is not None
+
+
+@settings(max_examples=100)
+@given(VALUES, st.data())
+def test_any_edit_of_a_good_text_is_read_or_told(value: object, data: st.DataObject) -> None:
+    text = json.dumps(value, indent=1)
+    at = data.draw(st.integers(0, len(text)))
+    cut = data.draw(st.integers(0, 3))
+    mutated = text[:at] + data.draw(PIECES) + text[at + cut :]
+    parsed = parse(mutated)
+    syntax = [d for d in parsed.diagnostics if d.rule == "json-syntax"]
+    assert is_json(mutated) == (not syntax)

@@ -1,0 +1,211 @@
+"""TOML with places: values are tomllib's, places are the author's, mistakes are told there."""
+
+from __future__ import annotations
+
+import datetime
+import tomllib
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.syntax.nodes import (
+    ArrayNode,
+    Node,
+    ObjectNode,
+    StringNode,
+)
+from coursebuild.core.syntax.toml_text import parse_toml
+from coursebuild.core.text.source import Source
+from support.positioned_nodes import plain, shown
+
+DATES = (datetime.date, datetime.time)
+
+
+def root_of(text: str) -> ObjectNode:
+    parsed = parse_toml(Source("content/course.toml", text))
+    assert parsed.diagnostics == ()
+    assert parsed.value is not None
+    return parsed.value
+
+
+def dated(value: object) -> object:
+    """A value of tomllib as `plain` gives it."""
+    if isinstance(value, dict):
+        return {key: dated(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [dated(inner) for inner in value]
+    return "a date" if isinstance(value, DATES) else value
+
+
+ALL = r'''# a comment
+top = 1
+a.b."c d".'e' = 0x1F   # dotted
+
+[course]
+title = "Mass and \"inertia\""
+path = 'C:\temp'
+long = """
+first \
+   joined
+ second""""
+raw = """""\u00e9"""
+literal = LLL'quoted'LLL
+when = 1979-05-27 07:32:00Z
+day = 1979-05-27
+hour = 07:32:00.999
+numbers = [ 1, 2.5e3, +inf, -nan, 1_000, # comment ] here
+  0o17, 0b1,
+]
+inline = { x = 1, y.z = [ "a", { b = true } ], "q" = 'r' }
+
+[[level]]
+id = 0
+[[level.lesson]]
+id = "0.1"
+[level.lesson.more]
+k = []
+[[level.lesson]]
+id = "0.2"
+[[level]]
+id = 1
+[other.deep]
+[other]
+x = false
+'''.replace("LLL", "'''")
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_every_kind_of_statement(newline: str) -> None:
+    text = ALL.replace("\n", newline)
+    assert repr(plain(root_of(text))) == repr(dated(tomllib.loads(text)))
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_places(newline: str) -> None:
+    root = root_of(ALL.replace("\n", newline))
+
+    def at(*path: str | int) -> str:
+        node: Node | None = root
+        for part in path:
+            if isinstance(part, int):
+                assert isinstance(node, ArrayNode)
+                node = node.items[part]
+            else:
+                assert isinstance(node, ObjectNode)
+                node = node.get(part)
+        assert node is not None
+        return f"{node.span.line}:{node.span.column} {node.mark.text}"
+
+    assert at("top") == "2:7 1"
+    assert at("a") == "3:1 a"
+    assert at("a", "b", "c d", "e") == "3:17 0x1F"
+    assert at("course") == "5:1 [course]"
+    assert at("course", "title") == r'6:9 "Mass and \"inertia\""'
+    assert at("course", "when") == "14:8 1979-05-27 07:32:00Z"
+    assert at("course", "numbers") == "17:11 ["
+    assert at("course", "numbers", 4) == "17:35 1_000"
+    assert at("course", "numbers", 6) == "18:9 0b1"
+    assert at("course", "inline") == "20:10 {"
+    assert at("course", "inline", "y", "z", 1, "b") == "20:38 true"
+    assert at("level") == "22:1 [[level]]"
+    assert at("level", 0, "lesson") == "24:1 [[level.lesson]]"
+    assert at("level", 0, "lesson", 0, "more", "k") == "27:5 ["
+    assert at("level", 0, "lesson", 1, "id") == '29:6 "0.2"'
+    assert at("level", 1) == "30:1 [[level]]"
+    assert at("other") == "32:2 [other]"  # its first part stands above its header
+    assert at("other", "x") == "34:5 false"
+
+
+def test_each_character_of_a_string_knows_its_place() -> None:
+    text = "a = \"\"\"\r\nx\\ty\\\r\n   \\u00e9z\r\n\"\"\"\r\nb = '''\r\np\r\nq'''\r\n"
+    root = root_of(text)
+    a, b = root.get("a"), root.get("b")
+    assert isinstance(a, StringNode) and isinstance(b, StringNode)
+    assert a.value == "x\ty\u00e9z\n"
+    assert "".join(text[a.excerpt.offset(i)] for i in range(len(a.value))) == "x\\y\\z\r"
+    assert b.value == "p\nq"
+    assert [b.excerpt.span(i, i + 1).line for i in range(3)] == [6, 6, 7]
+
+
+def test_tex_in_a_string_that_reads_it_otherwise() -> None:
+    text = 'a = "about $\\tau$"\nb = \'about $\\tau$\'\nc = "a\\tb"\n'
+    parsed = parse_toml(Source("x.toml", text))
+    assert parsed.value is not None
+    assert shown(parsed.diagnostics) == [
+        r"1:13-17 field-value: `\t` of `\tau` is read as a control character"
+        r" [double the backslash: `\\tau`, or put the text between single quotes]"
+    ]
+
+
+# ------------------------------------------------------------------------------------- properties
+
+PIECES = st.sampled_from(
+    [
+        *"[]{}.=,\n\"'#\\ abc1",
+        *("[[", "]]", " = ", "4.2", '"x"', "'y'", '"""', "'''", "\r\n", "\r", "#c", "true", "inf"),
+        *("1979-05-27", "07:32:00", '"$\\tau$"', "\\\n", "\\u00e9", "“x”", "\u00a0"),
+        *("[a]\n", "[[a]]\n", "[a.b]\n", "[[a.b]]\n", "a.b=1\n", "a={}\n", "b=[1,2]\n"),
+        *("a.b.c=1\n", "c={a.b=1,c=[]}\n", 'd="""\nx\\\n y"""\n', "e='''x'''\n", "a=[]\n"),
+    ]
+)
+
+
+@settings(max_examples=200)
+@given(st.lists(PIECES, max_size=14).map("".join) | st.text(max_size=20))
+@example("a=[]\na.b=1\n")
+@example("[a.b.c]\n[a]\nb.x=1\n")
+@example("[x]\na.b=1\n[x.a.c]\n")
+@example('a="""""" \n')
+def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
+    parsed = parse_toml(Source("x.toml", text))
+    try:
+        expected = dated(tomllib.loads(text))
+    except ValueError:
+        assert parsed.value is None
+        assert len(parsed.diagnostics) == 1
+    else:
+        assert parsed.value is not None
+        assert repr(plain(parsed.value)) == repr(expected)
+    for diagnostic in parsed.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+        assert diagnostic.message == diagnostic.message.strip(" .")
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
+    at = data.draw(st.integers(0, len(ALL)))
+    mutated = ALL[:at] + data.draw(PIECES) + ALL[at + data.draw(st.integers(0, 3)) :]
+    parsed = parse_toml(Source("x.toml", mutated))
+    try:
+        expected = dated(tomllib.loads(mutated))
+    except ValueError:
+        assert parsed.value is None and parsed.diagnostics
+    else:
+        assert parsed.value is not None
+        assert repr(plain(parsed.value)) == repr(expected)
+
+
+@settings(max_examples=200)
+@given(st.lists(PIECES, max_size=14).map("".join))
+def test_spans_nest(text: str) -> None:
+    root = parse_toml(Source("x.toml", text)).value
+    if root is None:
+        return
+
+    def check(node: Node) -> None:
+        inner: list[Node] = []
+        if isinstance(node, ObjectNode):
+            inner = [n for member in node.members for n in (member.key, member.value)]
+        elif isinstance(node, ArrayNode):
+            inner = list(node.items)
+        assert node.span.contains(node.mark)
+        for child in inner:
+            assert root is not None
+            assert 0 <= child.span.start <= child.span.end <= len(text)
+            if node is not root and not text.count("["):
+                assert node.span.contains(child.span)
+            check(child)
+
+    check(root)

@@ -1,0 +1,214 @@
+"""What an author sees of each rule: `tests/fixtures/rules/<rule>.md`, compared to the letter.
+
+A case names a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
+that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
+command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 3 s]` say which
+engine tries the labs, for what no course can bring about, or not in time.
+`pytest tests/core/text --rewrite-fixtures` writes the expected parts and `docs/rules.md` anew.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.rules import RULES
+from coursebuild.pipeline.build import build
+from coursebuild.pipeline.check import check
+from coursebuild.pipeline.export import export
+from coursebuild.pipeline.update import update
+from coursebuild.report import Style, diagnostic_text
+from support.fixture_cases import Case, read_cases, rewrite
+from support.rule_cases import Layout, Workshop, parts
+from support.rule_catalogue import Example, ExampleFile, catalogue_page
+
+ROOT = Path(__file__).parents[3]
+FIXTURES = ROOT / "tests/fixtures/rules"
+PAGE = ROOT / "docs/rules.md"
+FILES = {path.stem: path for path in sorted(FIXTURES.glob("*.md"))}
+CASES = {name: read_cases(path) for name, path in FILES.items()}
+SENTENCE = re.compile(r"(?!MuJoCo|JavaScript|Markdown|Python)[A-Z][a-z]")
+TOLD = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
+RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
+"""In a course of which something is run or compiled."""
+
+
+class OtherEngine(LabEngine):
+    """The browser's engine, of another version."""
+
+    def __init__(self, version: str) -> None:
+        super().__init__()
+        self._other = version
+
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        return {**super().trial(request, mjb, seconds), "version": self._other}
+
+
+class ImpatientEngine(LabEngine):
+    """The browser's engine, with less time for a trial."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__()
+        self._seconds = seconds
+
+    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        return super().trial(request, mjb, self._seconds)
+
+
+def engine_of(case: Case) -> LabEngine | None:
+    """The engine that the title asks for."""
+    if found := re.search(r"\[engine of ([\d.]+)\]", case.title):
+        return OtherEngine(found[1])
+    if found := re.search(r"\[after ([\d.]+) s\]", case.title):
+        return ImpatientEngine(float(found[1]))
+    return None
+
+
+def command(case: Case) -> str:
+    """The command that a case is for."""
+    found = re.search(r"\[((?:check|update|build|export)[\w -]*)\]", case.title)
+    return found[1] if found else "check"
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
+    with Workshop(tmp_path_factory.mktemp("workshop")) as workshop:
+        yield workshop
+
+
+def told(case: Case, root: Path, workshop: Workshop) -> str:
+    """All that the tool says of a case, without colours."""
+    diagnostics = found_in(case, root, workshop)
+    text = "\n\n".join(diagnostic_text(d, Style()) for d in diagnostics)
+    assert str(root) not in text, "a message names a folder of this machine"
+    # Which part of a line a traceback underlines is different in each version of Python.
+    text = re.sub(r"^ +[~^][ ~^]*\n", "", text, flags=re.MULTILINE)
+    return without_page_lines(text) + "\n"
+
+
+def found_in(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
+    layout = Layout.of(case.input)
+    layout.write(root)
+    options = workshop.options(root)
+    if layout.later:
+        check(options)
+        layout.write_later(root)
+    if "```lab" in case.input and command(case) == "check":
+        browser = engine_of(case)
+        try:
+            return workshop.try_labs(root, browser)
+        finally:
+            if browser is not None:
+                browser.close()
+    match command(case):
+        case "check":
+            return check(options).diagnostics
+        case "check --no-cache":
+            return check(workshop.options(root, fresh=True)).diagnostics
+        case "update":
+            return update(options).diagnostics
+        case "build":
+            return build(options, Path("public")).diagnostics
+        case "export qti":
+            return export(options, "qti", Path("quizzes.zip")).diagnostics
+        case other:
+            raise ValueError(f"no command {other!r}")
+
+
+def without_page_lines(text: str) -> str:
+    """Lines of a built page depend on its template, which is not what these fixtures are about."""
+    text = re.sub(r"(?<= public/)(\S+\.html):\d+:\d+", r"\1:LINE:COLUMN", text)
+    if ":LINE:COLUMN" in text:
+        text = re.sub(r"^ *\d+ \| ", "LINE | ", text, flags=re.MULTILINE)
+        text = re.sub(r"^ +(?=\|)", "     ", text, flags=re.MULTILINE)
+    return text
+
+
+def tier(name: str) -> tuple[pytest.MarkDecorator, ...]:
+    """The mark of a rule whose cases need an engine, or run something."""
+    text = "".join(case.title + case.input for case in CASES[name])
+    if "```lab" in text:
+        return (pytest.mark.engine,)
+    return (pytest.mark.site,) if RUN.search(text) or "[" in text.split("```")[0] else ()
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=tier(name)) for name in FILES])
+def test_what_the_author_sees(
+    name: str, workshop: Workshop, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    found = []
+    for number, case in enumerate(CASES[name]):
+        found.append(replace(case, expected=told(case, tmp_path / str(number), workshop)))
+    if request.config.getoption("--rewrite-fixtures"):
+        rewrite(FILES[name], found)
+        CASES[name] = found
+    for case, now in zip(CASES[name], found, strict=True):
+        assert now.expected == case.expected, f"{FILES[name].name}:{case.line}: {case.title}"
+
+
+def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
+    assert set(FILES) == set(RULES)
+
+
+def test_each_case_of_a_fixture_shows_its_rule() -> None:
+    assert [name for name, cases in CASES.items() if not cases] == [], "they show nothing"
+    wrong = [
+        f"{name}:{case.line}: {case.title}"
+        for name, cases in CASES.items()
+        for case in cases
+        if (RULES[name].severity, name) not in TOLD.findall(case.expected)
+    ]
+    assert wrong == []
+
+
+def test_messages_keep_the_style_of_the_house() -> None:
+    """Lower case, no full stop; help too."""
+    wrong = []
+    for name, cases in CASES.items():
+        for line in "".join(case.expected for case in cases).splitlines():
+            said = re.match(r"(?:(?:error|warning)\[[a-z-]+\]| *= help): (.*)", line)
+            if said and (SENTENCE.match(said[1]) or re.search(r"(?<!\.)\.$", said[1])):
+                wrong.append(f"{name}: {line}")
+    assert wrong == []
+
+
+def test_the_page_of_rules_is_in_step(request: pytest.FixtureRequest) -> None:
+    examples = {name: example(cases[0]) for name, cases in CASES.items()}
+    page = catalogue_page(examples)
+    if request.config.getoption("--rewrite-fixtures"):
+        PAGE.write_text(page, encoding="utf-8")
+    assert PAGE.read_text(encoding="utf-8") == page, "run pytest tests/core/text --rewrite-fixtures"
+
+
+def example(case: Case) -> Example:
+    """A case as the page of rules shows it."""
+    return Example(
+        command(case),
+        tuple(shown(kind, path, body) for kind, path, body in parts(case.input)),
+        case.expected.rstrip("\n"),
+    )
+
+
+def shown(kind: str, path: str, body: str) -> ExampleFile:
+    """A file of an input as the page of rules shows it."""
+    match kind:
+        case "later":
+            return ExampleFile(path, ", once the scripts are extracted", body)
+        case "bytes":
+            return ExampleFile(path, ", where `\\x…` is a byte", body)
+        case "link":
+            path, _, target = path.partition(" -> ")
+            return ExampleFile(path, f" is a link to `{target}`", "")
+        case "folder":
+            return ExampleFile(path, " is a folder", "")
+        case "without":
+            return ExampleFile(path, " is not there", "")
+        case _:
+            return ExampleFile(path, "", body)
