@@ -1,4 +1,4 @@
-"""Arguments, exit statuses, the choice of lessons, and the forms of a report."""
+"""Arguments, exit statuses, and which course and lessons a command means."""
 
 from __future__ import annotations
 
@@ -10,27 +10,36 @@ from pathlib import Path
 
 import pytest
 
-from support.scratch_course import FIRST, GOOD, SECOND, Folder, block, without_seconds
+from support.scratch_course import FIRST, GOOD, SECOND, Done, Folder, block, without_seconds
 
 pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
+COMMANDS = ("build", "check", "update", "extract")
+MAP = "content/course.toml"
+ONE_RAN = "ok       examples/one.py  # s\n\n1 lesson, 1 script run: everything holds\n"
 
 
 # --- exit statuses
 
 
-@pytest.mark.parametrize("command", ["build", "check", "update", "extract"])
-def test_a_clean_course_gives_0(make: Make, command: str) -> None:
-    done = make(GOOD).main(command)
-    assert (done.status, done.out.splitlines()[-1].partition(": ")[2]) == (0, "everything holds")
-
-
-@pytest.mark.parametrize("command", ["build", "check", "update", "extract"])
-def test_a_mistake_in_the_course_gives_1(make: Make, command: str) -> None:
-    done = make(GOOD + "> [!nosuch]\n> Text.\n").main(command)
-    assert done.status == 1
-    assert done.out.startswith("error[callout-unknown]: ")
+def test_status_and_report_tell_whether_the_course_is_right(make: Make) -> None:
+    folder = make(GOOD)
+    for command in COMMANDS:
+        done = folder.main(command)
+        assert (done.status, done.out.splitlines()[-1].partition(": ")[2]) == (
+            0,
+            "everything holds",
+        )
+        assert folder.main(command, "--quiet") == Done(0, "", ""), command
+    folder.write(folder.lesson(), GOOD + "> [!nosuch]\n> Text.\n")
+    for command in COMMANDS:
+        done = folder.main(command)
+        assert (done.status, done.out.partition(": ")[0]) == (1, "error[callout-unknown]"), command
+    (folder.root / MAP).unlink()
+    for command in COMMANDS:
+        done = folder.main("-C", str(folder.root), command)
+        assert (done.status, done.out.partition(": ")[0]) == (1, "error[map-missing]"), command
 
 
 def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> None:
@@ -41,61 +50,68 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
     course.main("check")
     gc.collect()
     opened = len(list(folder.iterdir()))
-    for _ in range(5):
-        course.main("check")
+    for _ in range(3):
+        course.main("check", "--format", "json")
     gc.collect()
     assert len(list(folder.iterdir())) == opened
     assert (gc.get_threshold(), gc.get_freeze_count()) == before
 
 
-@pytest.mark.parametrize("command", ["build", "check", "update", "extract"])
-def test_a_folder_without_a_map_gives_1(make: Make, command: str) -> None:
-    folder = make(GOOD)
-    (folder.root / "content/course.toml").unlink()
-    done = folder.main("-C", str(folder.root), command)
-    assert done.status == 1
-    assert done.out.startswith("error[map-missing]: ")
+WRONG_USAGE = [
+    ("", "the following arguments are required: COMMAND"),
+    ("publish", "invalid choice: 'publish'"),
+    ("check --nosuch", "unrecognized arguments: --nosuch"),
+    ("che", "invalid choice: 'che'"),
+    ("check --form json", "unrecognized arguments: --form"),
+    ("check --format yaml", "invalid choice: 'yaml'"),
+    ("build extra", "unrecognized arguments: extra"),
+    ("extract --jobs 2", "unrecognized arguments: --jobs 2"),
+    ("check --jobs 0", "'0' is no number of jobs: a whole number from 1"),
+    ("check --jobs -1", "'-1' is no number of jobs"),
+    ("check --jobs 2.5", "'2.5' is no number of jobs"),
+    ("check --jobs ²", "'²' is no number of jobs"),
+    ("serve --port 65536", "'65536' is no port"),
+    ("serve --port http", "'http' is no port"),
+    ("schema nosuch", "there is no schema 'nosuch': choose from course, lab, model, quiz"),
+    ("-C", "expected one argument"),
+    ("-C no/such check", "there is no folder no/such"),
+    ("-C content/course.toml check", "content/course.toml is not a folder"),
+    ("check 1.2", "no lesson or page is called `1.2`; did you mean `1.1`?"),
+    ("check oen", "no lesson or page is called `oen`; did you mean `one`?"),
+    ("update 1.1 9.9.9", "no lesson or page is called `9.9.9`"),
+    ("check planned", "lesson 1.77 is planned, so there is nothing in it yet"),
+    ("check --sensitivity --against 3.13.0", "--sensitivity"),
+    ("check --shard 4/3", "coursebuild: --shard: there is no part 4 of 3\n"),
+    (
+        "check --shard two",
+        "coursebuild: --shard: 'two' is no part of the work; write 2/8 for the second of 8\n",
+    ),
+    (
+        "check --timings x",
+        "coursebuild: --timings says how `--shard` divides the work: it needs `--shard`\n",
+    ),
+    ("check --cache-size much", "coursebuild: --cache-size: 'much' is no size: a whole number, "),
+    ("check --cache-size -1", "--cache-size"),
+    ("check --cache gopher://x/y", "gopher"),
+    ("check --cache=", "coursebuild: --cache names no place\n"),
+    ("check --executor x", "--executor: 'x' is no place to run scripts: dask://HOST:PORT"),
+    ("build --out .", " is the project itself"),
+    ("build --out ..", " holds the project"),
+    ("build --out content/site", "content/site lies in content/ of the project"),
+    ("build --out content/course.toml", "course.toml"),
+]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ([], "the following arguments are required: COMMAND"),
-        (["publish"], "invalid choice: 'publish'"),
-        (["check", "--nosuch"], "unrecognized arguments: --nosuch"),
-        (["che"], "invalid choice: 'che'"),
-        (["check", "--form", "json"], "unrecognized arguments: --form"),
-        (["check", "--format", "yaml"], "invalid choice: 'yaml'"),
-        (["build", "extra"], "unrecognized arguments: extra"),
-        (["extract", "--jobs", "2"], "unrecognized arguments: --jobs 2"),
-        (["check", "--jobs", "0"], "'0' is no number of jobs: a whole number from 1"),
-        (["check", "--jobs", "-1"], "'-1' is no number of jobs"),
-        (["check", "--jobs", "2.5"], "'2.5' is no number of jobs"),
-        (["check", "--jobs", "²"], "'²' is no number of jobs"),
-        (["serve", "--port", "65536"], "'65536' is no port"),
-        (["serve", "--port", "http"], "'http' is no port"),
-        (["schema", "nosuch"], "there is no schema 'nosuch': choose from course, lab, model, quiz"),
-        (["-C"], "expected one argument"),
-        (["-C", "no/such", "check"], "there is no folder no/such"),
-        (["-C", "content/course.toml", "check"], "content/course.toml is not a folder"),
-        (["check", "1.2"], "no lesson or page is called `1.2`; did you mean `1.1`?"),
-        (["check", "oen"], "no lesson or page is called `oen`; did you mean `one`?"),
-        (["update", "1.1", "9.9.9"], "no lesson or page is called `9.9.9`"),
-        (["build", "--out", "."], " is the project itself"),
-        (["build", "--out", ".."], " holds the project"),
-        (["build", "--out", "content/site"], "content/site lies in content/ of the project"),
-        (["build", "--out", "content/course.toml"], "course.toml"),
-    ],
-)
-def test_wrong_usage_gives_2_and_touches_nothing(
-    make: Make, arguments: list[str], says: str
-) -> None:
+def test_wrong_usage_gives_2_and_touches_nothing(make: Make) -> None:
     folder = make(GOOD)
+    planned = '[[level.lesson]]\nid = "1.77"\nslug = "planned"\ntitle = "P"\nstatus = "planned"\n'
+    folder.write(MAP, f"{folder.text(MAP)}\n{planned}")
     before = folder.tree("content")
-    done = folder.main(*arguments)
-    assert (done.status, done.out) == (2, "")
-    assert says in done.err
-    assert "Traceback" not in done.err
+    for arguments, says in WRONG_USAGE:
+        done = folder.main(*arguments.split())
+        assert (done.status, done.out) == (2, ""), arguments
+        assert says in done.err, arguments
+        assert "Traceback" not in done.err
     assert folder.tree("content") == before
     assert not (folder.root / "public").exists()
 
@@ -107,224 +123,142 @@ def test_outside_of_a_course_gives_2(tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
-def test_a_planned_lesson_cannot_be_checked(make: Make) -> None:
-    folder = make(GOOD, SECOND)
-    folder.replace("content/course.toml", 'two"\nstatus = "complete"', 'two"\nstatus = "planned"')
-    (folder.root / folder.lesson(2)).unlink()
-    done = folder.main("check", "1.2")
-    assert (done.status, done.out) == (2, "")
-    assert "lesson 1.2 is planned, so there is nothing in it yet" in done.err
-
-
-@pytest.mark.parametrize("arguments", [["--help"], ["check", "--help"], ["--version"]])
-def test_asking_for_help_gives_0(tmp_path: Path, arguments: list[str]) -> None:
-    done = Folder(tmp_path).main(*arguments)
-    assert (done.status, done.err) == (0, "")
-    assert done.out
-
-
-@pytest.mark.parametrize("name", ["quiz", "lab", "course"])
-def test_schema_prints_json_schema(tmp_path: Path, name: str) -> None:
-    done = Folder(tmp_path).main("schema", name)
-    assert done.status == 0
-    schema = json.loads(done.out)
-    assert "$defs" in schema or "properties" in schema
-
-
-def test_tool_runs_as_a_module_of_python(make: Make) -> None:
-    done = make(GOOD).run("check")
-    assert (done.status, without_seconds(done.out)) == (
-        0,
-        "ok       examples/hello.py  # s\n\n1 lesson, 1 script run: everything holds\n",
-    )
+def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
+    for arguments in (["--help"], ["check", "--help"], ["--version"]):
+        done = Folder(tmp_path).main(*arguments)
+        assert (done.status, done.err, bool(done.out)) == (0, "", True), arguments
+    for name in ("quiz", "lab", "course"):
+        done = Folder(tmp_path).main("schema", name)
+        assert done.status == 0
+        assert json.loads(done.out).keys() & {"$defs", "properties"}, name
 
 
 # --- where the course is
 
 
-def test_a_course_is_found_from_below(make: Make) -> None:
-    folder = make(GOOD)
+def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
+    folder = make(FIRST, name="with spaces, quotes ' \" and ünïcödé 物理 🤖")
+    assert without_seconds(folder.run("check").out) == ONE_RAN  # as a module of Python
     assert folder.main("check", cwd=folder.root / "content/lessons").status == 0
-
-
-def test_option_c_takes_any_folder_from_anywhere(make: Make, tmp_path: Path) -> None:
-    folder = make(GOOD, name="with spaces, quotes ' \" and ünïcödé 物理 🤖")
     elsewhere = tmp_path / "else where"
     elsewhere.mkdir()
-    relative = os.path.relpath(folder.root, elsewhere)
-    for where in (str(folder.root), relative, f"{relative}/", f"{folder.root}/content/.."):
-        done = folder.main("-C", where, "build", cwd=elsewhere)
-        assert done.status == 0, done.err
-        assert (folder.root / "public/lessons/1.1-one.html").is_file()
-    assert not any(elsewhere.iterdir())
     link = tmp_path / "link"
     link.symlink_to(folder.root)
-    assert folder.main("-C", str(link), "check", cwd=elsewhere).status == 0
-    done = folder.main("-C", str(folder.root), "build", "--out", "../a site/öut", cwd=elsewhere)
-    assert done.status == 0
-    assert (tmp_path / "a site/öut/index.html").is_file()
-
-
-def test_a_folder_whose_name_is_not_utf8(make: Make) -> None:
-    odd = make(GOOD).root.with_name("caf\udce9")
-    make(GOOD, name="other").root.rename(odd)
-    done = Folder(odd).main("build")
+    relative = os.path.relpath(folder.root, elsewhere)
+    for where in (folder.root, relative, f"{relative}/", f"{folder.root}/content/..", link):
+        assert folder.main("-C", str(where), "check", cwd=elsewhere).status == 0, where
+    assert not any(elsewhere.iterdir())
+    where = str(folder.root)
+    assert folder.main("-C", where, "build", "--out", "../a site/öut", cwd=elsewhere).status == 0
+    assert (tmp_path / "a site/öut/lessons/1.1-one.html").is_file()
+    inner = Folder(folder.root / "inner")  # the nearest one above counts
+    inner.write(MAP, folder.text(MAP))
+    inner.write(inner.lesson(), "## Inner\n\n" + block("inner.py", "print(1)", "1"))
+    assert "examples/inner.py" in folder.main("check", cwd=inner.root / "content").out
+    odd = Folder(folder.root.with_name("caf\udce9"))
+    folder.root.rename(odd.root)
+    done = odd.main("build")
     assert (done.status, done.out) == (2, "")
     assert "the path of the course is not UTF-8: " in done.err
     assert "caf\\xe9" in done.err
 
 
-def test_nearest_course_above_counts_without_option_c(make: Make) -> None:
-    outer = make(GOOD)
-    inner = Folder(outer.root / "inner")
-    inner.write("content/course.toml", outer.text("content/course.toml"))
-    inner.write(inner.lesson(), "## Inner\n\n" + block("inner.py", "print(1)", "1"))
-    done = outer.main("check", cwd=inner.root / "content")
-    assert "examples/inner.py" in done.out
-    assert done.status == 0
-
-
 # --- which lessons
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
+def test_lessons_and_pages_are_named_by_id_slug_or_file(make: Make, tmp_path: Path) -> None:
+    folder = make(FIRST, SECOND, GOOD)
+    page = '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n'
+    folder.write(MAP, folder.text(MAP) + page)
+    folder.write("content/pages/about.md", "## About\n\n" + block("p.py", "print(5)", "6"))
+    for name in (
         "1.1",
         "one",
         "1.1-one",
         "1.1-one.md",
-        "content/lessons/1.1-one.md",
-        "./content/lessons/1.1-one.md",
+        folder.lesson(),
+        f"./{folder.lesson()}",
         "content/pages/../lessons/1.1-one.md",
-        "ABSOLUTE",
-    ],
-)
-def test_lesson_is_named_by_id_slug_or_file(make: Make, name: str) -> None:
-    folder = make(FIRST, SECOND)
-    name = str(folder.root / folder.lesson()) if name == "ABSOLUTE" else name
-    done = folder.main("check", name)
-    assert (done.status, without_seconds(done.out)) == (
-        0,
-        "ok       examples/one.py  # s\n\n1 lesson, 1 script run: everything holds\n",
-    )
-
-
-def test_lesson_file_is_named_from_the_working_directory(make: Make, tmp_path: Path) -> None:
-    folder = make(FIRST, SECOND)
-    inside = folder.root / "content/lessons"
-    assert "examples/two.py" in folder.main("check", "1.2-two.md", cwd=inside).out
-    assert "examples/two.py" in folder.main("check", "./1.2-two.md", cwd=inside).out
+        str(folder.root / folder.lesson()),
+    ):
+        done = folder.main("check", name, "--no-cache")
+        assert (done.status, without_seconds(done.out)) == (0, ONE_RAN), name
+    for name in ("1.2-two.md", "./1.2-two.md"):
+        done = folder.main("check", name, cwd=folder.root / "content/lessons")
+        assert "examples/two.py" in done.out
     other = tmp_path / "content/lessons/1.2-two.md"
     other.parent.mkdir(parents=True)
     other.write_text(SECOND)
-    done = folder.main("check", str(other))
-    assert (done.status, done.out) == (2, "")
-
-
-def test_page_is_named_by_id_or_file(make: Make) -> None:
-    folder = make(FIRST)
-    map_ = folder.text("content/course.toml")
-    page = '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n'
-    folder.write("content/course.toml", map_ + page)
-    folder.write("content/pages/about.md", "## About\n\n" + block("p.py", "print(5)", "6"))
-    done = folder.main("check")
-    assert "run `coursebuild update about`" in done.out
-    assert folder.main("check", "1.1").status == 0
+    assert folder.main("check", str(other)).status == 2
+    done = folder.main("check", "three", "1.1", "1.1")  # in the order of the course, each once
+    assert [line.split()[1] for line in done.out.splitlines()[:2]] == [
+        "examples/one.py",
+        "examples/hello.py",
+    ]
+    assert "\n2 lessons, " in done.out
+    assert "run `coursebuild update about`" in folder.main("check").out
     assert folder.main("check", "content/pages/about.md").status == 1
     assert folder.main("update", "about").status == 0
     assert folder.main("check").status == 0
 
 
-def test_several_lessons_stand_in_the_order_of_the_course(make: Make) -> None:
-    done = make(FIRST, SECOND, GOOD).main("check", "three", "1.1", "1.1")
-    assert [line.split()[1] for line in done.out.splitlines()[:2]] == [
-        "examples/one.py",
-        "examples/hello.py",
-    ]
-    assert "2 lessons, 2 scripts run" in done.out
-
-
-def test_a_mistake_elsewhere_does_not_count(make: Make) -> None:
+def test_a_mistake_elsewhere_does_not_count_but_one_in_the_map(make: Make) -> None:
     folder = make(FIRST, SECOND + "[gone](lesson:7.7)\n")
-    assert folder.main("check", "1.1").status == 0
-    assert folder.main("check", "1.2").status == 1
-    assert folder.main("check").status == 1
-
-
-def test_a_mistake_in_the_map_always_counts(make: Make) -> None:
-    folder = make(FIRST)
-    folder.replace("content/course.toml", 'title = "Scratch"', 'title = "Scratch"\nsumary = ""')
+    assert [folder.main("check", *names).status for names in (["1.1"], ["1.2"], [])] == [0, 1, 1]
+    folder.replace(MAP, 'title = "Scratch"', 'title = "Scratch"\nsumary = ""')
     done = folder.main("check", "1.1")
     assert done.status == 1
     assert "error[field-unknown]: unknown field `sumary`" in done.out
 
 
-def test_a_number_bound_to_another_lesson(make: Make) -> None:
+def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> None:
     bound = "## Two\n\n" + block("two.py", "print(2)") + "It is `41`{out=examples/one.py}.\n"
-    folder = make("## One\n\n" + block("one.py", "print(41)", "41"), bound)
-    assert folder.main("check", "1.2").status == 0
-    folder.write(folder.lesson(1), "## One\n\n" + block("one.py", "print(41)"))
-    assert folder.main("check").status == 0
-    assert folder.main("check", "1.2").status == 0
-    folder.write(folder.lesson(1), "## One\n\n" + block("one.py", "print(42)"))
-    assert "error[binding-mismatch]" in folder.main("check", "1.2").out
-    folder.write(folder.lesson(1), "## One\n\n" + block("one.py", "print(41)\n1/0"))
-    done = folder.main("check", "1.2")
-    assert (done.status, "error[script-failed]" in done.out) == (1, True)
-
-
-def test_a_question_about_a_script_of_another_lesson(make: Make) -> None:
-    quiz = """## Two
+    quiz = """## Three
 
 ```quiz
 {"id": "q", "questions": [{"kind": "output", "q": "?", "of": "examples/one.py", "line": 2}]}
 ```
 """
-    folder = make("## One\n\n" + block("one.py", "print(41)"), quiz)
-    done = folder.main("check", "1.2")
-    assert (done.status, "error[quiz-output]" in done.out) == (1, True)
-
-
-def test_a_script_that_fails_in_a_sibling_of_another_lesson(make: Make) -> None:
-    folder = make(
-        "## One\n\n" + block("one.py", "def f(x):\n    return 1 / x"),
-        "## Two\n\n" + block("two.py", "from one import f\n\nf(0)"),
-    )
-    done = folder.main("check", "1.2")
-    assert done.status == 1
-    assert "error[script-failed]: `examples/two.py` exited with status 1" in done.out
+    sibling = "## Four\n\n" + block("four.py", "from one import f\n\nf(0)")
+    folder = make(FIRST, bound, quiz, sibling)
+    for code, rules in (
+        ("print(41)\ndef f(x): return 1 / x", ("", "quiz-output", "script-failed")),
+        ("print(42)\nprint(1)\ndef f(x): return 1", ("binding-mismatch", "", "")),
+        ("print(41)\n1/0", ("script-failed", "script-failed", "script-failed")),
+    ):
+        folder.write(folder.lesson(), "## One\n\n" + block("one.py", code))
+        for name, rule in zip(("1.2", "1.3", "1.4"), rules, strict=True):
+            done = folder.main("check", name)
+            if rule:
+                assert (done.status, f"error[{rule}]" in done.out) == (1, True), (code, name)
+            else:
+                assert done.status == 0 or "error[no-scripts]" in done.out, (code, name)
 
 
 # --- nothing to do is a mistake
 
 
-def test_a_check_that_runs_no_script(make: Make) -> None:
+def test_a_check_that_verifies_nothing_is_a_mistake(make: Make) -> None:
     folder = make("## Only text\n")
-    done = folder.main("check")
-    assert done.status == 1
-    assert "error[no-scripts]: no script was run, so that nothing was verified" in done.out
+    said = "error[no-scripts]: no script was run, so that nothing was verified"
+    for shard in ([], ["--shard", "1/3"]):
+        done = folder.main("check", *shard)
+        assert (done.status, said in done.out) == (1, True)
     assert folder.main("build").status == 0
+    for info in ("norun", "requires=no_such_module"):
+        folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(1)", info=info))
+        done = folder.main("check", "1.1")
+        assert (done.status, "1.1 has none that can run here" in done.out) == (1, True), info
+    folder.write(folder.lesson(), "## One\n\n```python file=one.py\nprint(1)\n```\n")
+    done = folder.main("check")  # another mistake says why
+    assert (done.status, "no-scripts" in done.out) == (1, False)
 
 
-@pytest.mark.parametrize("info", ["norun", "requires=no_such_module"])
-def test_a_check_whose_scripts_cannot_run(make: Make, info: str) -> None:
-    done = make("## One\n\n" + block("one.py", "print(1)", info=info)).main("check", "1.1")
-    assert done.status == 1
-    assert "1.1 has none that can run here" in done.out
-
-
-def test_no_script_because_of_another_mistake(make: Make) -> None:
-    done = make("## One\n\n```python file=one.py\nprint(1)\n```\n").main("check")
-    assert done.status == 1
-    assert "no-scripts" not in done.out
-
-
-@pytest.mark.parametrize("command", ["build", "check"])
-def test_a_course_without_a_written_lesson(make: Make, command: str) -> None:
+def test_a_course_without_a_written_lesson_is_a_mistake(make: Make) -> None:
     folder = make()
-    done = folder.main(command)
-    assert done.status == 1
-    assert "error[no-lessons]: no lesson of the course is written" in done.out
-    assert "no-scripts" not in done.out
+    for command in ("build", "check"):
+        done = folder.main(command)
+        assert done.status == 1
+        assert "error[no-lessons]: no lesson of the course is written" in done.out
+        assert "no-scripts" not in done.out
     assert not (folder.root / "public").exists()

@@ -50,70 +50,46 @@ def explained(folder: Folder, path: str) -> str:
     return re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC, \d+\.\d\d s", "WHEN", done.out)
 
 
-def test_second_check_runs_no_script(course: Folder) -> None:
+EDITS = [
+    ("content/lessons/1.1-one.md", "## A", "## Another\n\nMore prose.", []),
+    ("content/course.toml", 'title = "Scratch"', 'title = "Other"', []),
+    ("content/lessons/1.1-one.md", '"hello"', '"hello" ', ["hello"]),
+    ("content/lessons/1.1-one.md", "s/hello.py", "s/hello.py timeout=9", ["hello"]),
+    ("content/lessons/1.1-one.md", "s/hello.py", 's/hello.py args="-v"', ["hello"]),
+    ("models/data.txt", "abc", "xyz", ["reads"]),
+    ("content/lessons/1.2-two.md", 'word = "help"', 'word = "held"', ["helper", "helped"]),
+]
+
+
+def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
     assert ran(course) == ["hello", "reads", "helper", "helped"]
     assert ran(course) == []
     done = course.main("check", "--shard", "1/1")
     assert "2 lessons, 0 scripts run, 4 cached: everything holds" in done.out
     assert done.out.count("  cached\n") == 4
     assert "running scripts" not in done.err
-
-
-@pytest.mark.parametrize(
-    ("path", "old", "new", "again"),
-    [
-        ("content/lessons/1.1-one.md", "## A", "## Another\n\nMore prose.", []),
-        ("content/course.toml", 'title = "Scratch"', 'title = "Other"', []),
-        ("content/lessons/1.1-one.md", '"hello"', '"hello" ', ["hello"]),
-        ("content/lessons/1.1-one.md", "s/hello.py", "s/hello.py timeout=9", ["hello"]),
-        ("content/lessons/1.1-one.md", "s/hello.py", 's/hello.py args="-v"', ["hello"]),
-        ("models/data.txt", "abc", "xyz", ["reads"]),
-        ("content/lessons/1.2-two.md", 'word = "help"', 'word = "held"', ["helper", "helped"]),
-    ],
-)  # fmt: skip
-def test_an_edit_runs_again_what_depends_on_it(
-    course: Folder, path: str, old: str, new: str, again: list[str]
-) -> None:
-    ran(course)
-    course.replace(path, old, new)
-    assert ran(course) == again
-    course.replace(path, new, old)
-    assert ran(course) == [], "this was so before"
-
-
-def test_a_new_lesson_runs_its_own_scripts_only(make: Make) -> None:
-    folder = make(LESSON)
-    folder.write("models/data.txt", "abc")
-    ran(folder)
-    text = folder.text("content/course.toml")
-    folder.write(
-        "content/course.toml",
-        text + '\n[[level.lesson]]\nid = "1.2"\nslug = "two"\ntitle = "B"\nstatus = "complete"\n',
-    )
-    folder.write(folder.lesson(2), OTHER)
-    assert ran(folder) == ["helper", "helped"]
-
-
-def test_new_file_with_the_name_of_an_imported_module_runs_its_importers(course: Folder) -> None:
-    """What a script imports may be found elsewhere from now on."""
-    ran(course)
-    course.write("examples/pathlib.py", "raise ValueError\n")
-    assert ran(course) == ["reads"]
-
-
-def test_a_moved_course_runs_nothing(course: Folder) -> None:
-    ran(course)
+    for path, old, new, again in EDITS:
+        course.replace(path, old, new)
+        assert ran(course) == again, new
+        course.replace(path, new, old)
+        assert ran(course) == [], "this was so before"
     moved = Folder(course.root.with_name("elsewhere"))
     shutil.copytree(course.root, moved.root, symlinks=True)
     moved.tmp.mkdir()
     assert ran(moved) == []
+    # What a script imports may be found elsewhere from now on.
+    course.write("examples/pathlib.py", "raise ValueError\n")
+    assert ran(course) == ["reads"]
+    assert ran(course, "--no-cache") == ["hello", "reads", "helper", "helped"]
+    assert ran(course) == []
 
 
 def test_shared_cache_spares_runs_in_other_courses(
     course: Folder, make: Make, tmp_path: Path
 ) -> None:
     shared = str(tmp_path / "shared")
-    assert ran(course, "--cache", shared) == ["hello", "reads", "helper", "helped"]
+    done = course.run("check", env={"COURSEBUILD_CACHE": shared})
+    assert done.status == 0, done.err
     other = make(LESSON, OTHER, name="another")
     other.write("models/data.txt", "abc")
     assert ran(other, "--cache", shared) == []
@@ -132,14 +108,14 @@ def test_a_failure_is_remembered_and_told_again(make: Make) -> None:
     assert "ValueError: no good" in again.out
 
 
-def test_no_cache_runs_everything(course: Folder) -> None:
-    ran(course)
-    assert ran(course, "--no-cache") == ["hello", "reads", "helper", "helped"]
-    assert ran(course) == []
-
-
-def test_damaged_entry_is_told_on_standard_error(course: Folder) -> None:
-    ran(course)
+def test_a_damaged_entry_and_an_unreachable_cache_are_told_once_and_no_mistake(
+    course: Folder,
+) -> None:
+    done = course.main("check", "--cache", "/not/mounted/cache")
+    assert done.status == 0
+    told = [line for line in done.err.splitlines() if "shared cache" in line]
+    said = "the shared cache /not/mounted/cache cannot be used: no such file or directory"
+    assert told == [said]
     (path, *_) = sorted(p for p in (course.root / ".coursebuild/scripts").rglob("*") if p.is_file())
     path.write_bytes(path.read_bytes()[:-1])
     done = course.main("check", "--shard", "1/1")
@@ -150,77 +126,47 @@ def test_damaged_entry_is_told_on_standard_error(course: Folder) -> None:
     )
 
 
-def test_an_unreachable_cache_is_told_once_and_no_mistake(course: Folder) -> None:
-    done = course.main("check", "--cache", "/not/mounted/cache")
-    assert done.status == 0
-    told = [line for line in done.err.splitlines() if "shared cache" in line]
-    said = "the shared cache /not/mounted/cache cannot be used: no such file or directory"
-    assert told == [said]
-
-
-def test_environment_variable_names_a_shared_cache(course: Folder, tmp_path: Path) -> None:
-    shared = tmp_path / "shared"
-    done = course.run("check", env={"COURSEBUILD_CACHE": str(shared)})
-    assert done.status == 0, done.err
-    assert any(path.is_file() for path in shared.rglob("*"))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--cache", ""], "--cache names no place"),
-        (["--cache-size", "much"],
-         "--cache-size: 'much' is no size: a whole number, perhaps with K, M, G or T"),
-        (["--cache-size", "-1"], None),
-        (["--cache", "gopher://x/y"], None),
-    ],
-)  # fmt: skip
-def test_wrong_cache_arguments_give_2(
-    course: Folder, arguments: list[str], said: str | None
-) -> None:
-    done = course.main("check", *arguments)
-    assert done.status == 2
-    if said is not None:
-        assert done.err == f"coursebuild: {said}\n"
-
-
 # --- update
 
 
 def test_update_runs_again_what_is_remembered_and_differs(course: Folder) -> None:
-    """A remembered result is one of them, so that what varies is still found."""
-    course.write("models/count.txt", "0")
-    lesson = "## A\n\n" + block(
-        "dice.py", "import os\nprint(os.getpid())\n", "one of many", info=""
-    )
+    """A remembered result is one of two, so that what varies is still found."""
+    course.main("check")
+    done = course.main("update")
+    assert (done.status, "running scripts" in done.err) == (0, False)
+    assert "every recorded output is up to date" in done.out
+    lesson = "## A\n\n" + block("dice.py", "import os\nprint(os.getpid())\n", "one of many")
     course.write(course.lesson(1), lesson)
     assert course.main("check").status == 1
     done = course.main("update", "1.1")
-    assert done.status == 1
-    assert "error[output-unstable]" in done.out
+    assert (done.status, "error[output-unstable]" in done.out) == (1, True)
     assert course.text(course.lesson(1)) == lesson
-
-
-def test_update_takes_a_remembered_result_that_holds(course: Folder) -> None:
-    course.main("check")
-    done = course.main("update")
-    assert done.status == 0
-    assert "every recorded output is up to date" in done.out
-    assert "running scripts" not in done.err
 
 
 # --- explain
 
 
-def test_explain_script_that_never_ran(course: Folder) -> None:
+REASONS = [
+    ("models/data.txt", "abc", "xyz", "models/data.txt changed"),
+    ("content/lessons/1.1-one.md", "read_text()))", "read_text() ))", "its text changed"),
+    (
+        "content/lessons/1.1-one.md",
+        "file=examples/reads.py",
+        "file=examples/reads.py timeout=9",
+        "its option `timeout` changed: 60 → 9",
+    ),
+]
+
+
+def test_explain_says_why_a_script_would_run(
+    course: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
     assert explained(course, "examples/hello.py") == (
         "examples/hello.py would run\n"
         "  because there is no result of it on this machine\n"
         "  of 1.1, not run yet on this machine\n"
     )
-
-
-def test_explain_remembered_script(course: Folder) -> None:
     course.main("check")
     told = explained(course, "examples/reads.py")
     assert told.startswith(
@@ -229,81 +175,39 @@ def test_explain_remembered_script(course: Folder) -> None:
     )
     assert told.endswith("shown, linked or quoted in:\n  content/lessons/1.1-one.md\n")
     assert re.search(r"^  Python: CPython \d", told, re.MULTILINE)
-
-
-@pytest.mark.parametrize(
-    ("path", "old", "new", "reason"),
-    [
-        ("models/data.txt", "abc", "xyz", "models/data.txt changed"),
-        ("content/lessons/1.1-one.md", "read_text()))", "read_text() ))", "its text changed"),
-        ("content/lessons/1.1-one.md", "file=examples/reads.py", "file=examples/reads.py timeout=9",
-         "its option `timeout` changed: 60 → 9"),
-    ],
-)  # fmt: skip
-def test_explain_says_why_a_script_would_run_again(
-    course: Folder, path: str, old: str, new: str, reason: str
-) -> None:
-    course.main("check")
-    course.replace(path, old, new)
-    told = explained(course, "examples/reads.py")
-    assert told.startswith(
-        f"examples/reads.py would run again\n  because {reason}\n  of 1.1, last run WHEN: ok\n"
-    )
-
-
-def test_explain_names_a_file_that_is_gone(course: Folder) -> None:
-    course.main("check")
+    for path, old, new, reason in REASONS:
+        course.replace(path, old, new)
+        assert explained(course, "examples/reads.py").startswith(
+            f"examples/reads.py would run again\n  because {reason}\n  of 1.1, last run WHEN: ok\n"
+        )
+        course.replace(path, new, old)
     (course.root / "models/data.txt").unlink()
     assert "  because models/data.txt is gone\n" in explained(course, "examples/reads.py")
-
-
-def test_explain_names_a_changed_environment_variable(
-    course: Folder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    course.main("check")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
     told = explained(course, "examples/hello.py")
     assert "  because environment variable MUJOCO_GL: unset → osmesa\n" in told
 
 
-def test_explain_script_that_starts_other_programs(make: Make) -> None:
-    code = 'import subprocess, sys\nsubprocess.run([sys.executable, "-c", ""])\nprint(1)\n'
-    folder = make("## A\n\n" + block("starts.py", code, "1"))
+def test_explain_says_why_a_result_is_not_remembered(make: Make) -> None:
+    starts = 'import subprocess, sys\nsubprocess.run([sys.executable, "-c", ""])\nprint(1)\n'
+    folder = make(
+        "## A\n\n"
+        + block("starts.py", starts, "1")
+        + block("slow.py", "import time\ntime.sleep(60)\n", info="timeout=0.3")
+        + block("idle.py", "print(1)\n", info="norun")
+    )
     folder.main("check")
     assert explained(folder, "examples/starts.py").startswith(
         "examples/starts.py would run again\n"
         "  because its last result is not remembered: it starts other programs\n"
     )
-
-
-def test_explain_script_that_was_stopped_after_its_time(make: Make) -> None:
-    code = "import time\ntime.sleep(60)\n"
-    folder = make("## A\n\n" + block("slow.py", code, info="timeout=0.3"))
-    folder.main("check")
     told = explained(folder, "examples/slow.py")
     assert "because its last result is not remembered: it was stopped after its time limit" in told
-
-
-def test_explain_script_that_is_never_run(make: Make) -> None:
-    folder = make("## A\n\n" + block("idle.py", "print(1)\n", info="norun"))
     told = explained(folder, "examples/idle.py")
     assert told.startswith("examples/idle.py is never run: its lesson says `norun`\n")
 
 
-@pytest.mark.parametrize("name", ["1.1", "one", "1.1-one", "content/lessons/1.1-one.md"])
-def test_explain_lesson_by_any_of_its_names(course: Folder, name: str) -> None:
-    course.main("check")
-    course.write("models/data.txt", "changed")
-    assert explained(course, name) == (
-        "content/lessons/1.1-one.md: 2 scripts, of which 1 would run\n\n"
-        "examples/hello.py is remembered\n\n"
-        "examples/reads.py would run again\n"
-        "  because models/data.txt changed\n"
-    )
-
-
-def test_explain_file_lists_what_depends_on_it(course: Folder) -> None:
+def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None:
     course.main("check")
     assert explained(course, "models/data.txt") == (
         "models/data.txt\n\n"
@@ -316,36 +220,28 @@ def test_explain_file_lists_what_depends_on_it(course: Folder) -> None:
     assert explained(course, "content/course.toml") == (
         "content/course.toml\n\nno result of a script or lab depends on it\n"
     )
-
-
-def test_explain_takes_a_path_from_the_working_directory(course: Folder) -> None:
-    course.main("check")
     done = course.main("explain", "data.txt", cwd=course.root / "models")
-    assert done.status == 0
-    assert done.out.startswith("models/data.txt\n")
-
-
-def test_explain_as_json(course: Folder) -> None:
-    course.main("check")
+    assert (done.status, done.out.startswith("models/data.txt\n")) == (0, True)
     course.write("models/data.txt", "changed")
+    for name in ("1.1", "one", "1.1-one", "content/lessons/1.1-one.md"):
+        assert explained(course, name) == (
+            "content/lessons/1.1-one.md: 2 scripts, of which 1 would run\n\n"
+            "examples/hello.py is remembered\n\n"
+            "examples/reads.py would run again\n"
+            "  because models/data.txt changed\n"
+        )
     value = json.loads(course.main("explain", "examples/reads.py", "--format", "json").out)
-    assert value["path"] == "examples/reads.py"
-    assert value["kind"] == "script"
+    assert (value["path"], value["kind"]) == ("examples/reads.py", "script")
     (own,) = value["own"]
-    assert own["state"] == "would run"
-    assert own["reasons"] == ["models/data.txt changed"]
-    assert own["owner"] == "1.1"
-    assert own["outcome"] == "ok"
+    assert (own["state"], own["reasons"]) == ("would run", ["models/data.txt changed"])
+    assert (own["owner"], own["outcome"]) == ("1.1", "ok")
     assert isinstance(own["made"], int)
 
 
-def test_explain_unknown_name_proposes_a_near_one(course: Folder) -> None:
+def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
     done = course.main("explain", "examples/helo.py")
     said = "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
     assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
-
-
-def test_explain_with_broken_map_gives_2(course: Folder) -> None:
     course.write("content/course.toml", "[")
     done = course.main("explain", "1.1")
     said = "the course map cannot be read; `coursebuild check` says why"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import pytest
@@ -28,22 +27,18 @@ EDITED = (
 )
 
 
-def test_files_are_written_once(make: Make) -> None:
+def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> None:
     folder = make(TWO)
     done = folder.main("extract")
     assert done.status == 0
     assert "wrote examples/a.py\nwrote examples/sub/b.py\n" in done.out
     assert folder.read("examples/a.py") == b"print('a')\n"
     times = {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in folder.tree("examples")}
-    done = folder.main("extract")
-    assert done.status == 0
-    assert "every script is extracted already" in done.out
+    for how in ((), ("--adopt",)):
+        done = folder.main("extract", *how)
+        assert (done.status, "every script is extracted already" in done.out) == (0, True)
     assert times == {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in times}
-
-
-def test_a_script_that_is_gone_is_removed(make: Make) -> None:
-    folder = make(TWO)
-    folder.main("extract")
+    assert folder.text(folder.lesson()) == TWO
     folder.write("examples/mine.txt", "not extracted")
     folder.write(folder.lesson(), GOOD)
     done = folder.main("extract")
@@ -53,185 +48,145 @@ def test_a_script_that_is_gone_is_removed(make: Make) -> None:
     assert not (folder.root / "examples/sub").exists()
 
 
-@pytest.mark.parametrize("command", ["extract", "check", "build", "update"])
-def test_an_edited_file_is_never_overwritten(make: Make, command: str) -> None:
+def test_an_edited_file_is_never_overwritten(make: Make) -> None:
     folder = make(TWO)
     assert folder.main("build").status == 0
-    site = folder.tree("public")
+    site, lesson = folder.tree("public"), folder.read(folder.lesson())
     folder.write("examples/a.py", "print('a')  # by hand\n")
-    lesson = folder.read(folder.lesson())
-    done = folder.main(command)
-    assert done.status == 1
-    assert "error[example-edited]: examples/a.py was edited by hand" in done.out
-    assert "+print('a')  # by hand" in done.out
-    assert "`coursebuild extract --adopt` brings what the file holds into the lesson" in done.out
+    for command in ("extract", "check", "build", "update"):
+        done = folder.main(command)
+        assert done.status == 1
+        assert "error[example-edited]: examples/a.py was edited by hand" in done.out
+        assert "+print('a')  # by hand" in done.out
+        help = "`coursebuild extract --adopt` brings what the file holds into the lesson"
+        assert help in done.out
+        assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
+    assert (folder.tree("public"), folder.read(folder.lesson())) == (site, lesson)
+    folder.write(folder.lesson(), GOOD)  # its script is gone
+    done = folder.main("extract")
+    assert (done.status, "no lesson has this script any more" in done.out) == (1, True)
     assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
-    assert folder.read(folder.lesson()) == lesson
-    assert folder.tree("public") == site
-
-
-def test_a_file_that_was_there_before_is_never_overwritten(make: Make) -> None:
-    folder = make(TWO)
+    (folder.root / "examples/a.py").unlink()  # which drops the edit
+    assert folder.main("extract").status == 0
+    folder.write(folder.lesson(), TWO)
     folder.write("examples/a.py", "something of mine\n")
     done = folder.main("extract")
-    assert done.status == 1
-    assert "examples/a.py holds something else than this block" in done.out
+    assert (done.status, "examples/a.py holds something else than this block" in done.out) == (
+        1,
+        True,
+    )
     assert folder.read("examples/a.py") == b"something of mine\n"
     assert folder.read("examples/sub/b.py") == b"print('b')\n"
 
 
-def test_an_edited_file_whose_script_is_gone_stays(make: Make) -> None:
+def test_extract_without_manifest_overwrites_no_other_text(make: Make) -> None:
     folder = make(TWO)
-    folder.main("extract")
-    folder.write("examples/a.py", "edited\n")
-    folder.write(folder.lesson(), GOOD)
-    done = folder.main("extract")
-    assert done.status == 1
-    assert "no lesson has this script any more" in done.out
-    assert folder.read("examples/a.py") == b"edited\n"
-    (folder.root / "examples/a.py").unlink()
-    assert folder.main("extract").status == 0
-
-
-def test_deleting_the_file_drops_the_edit(make: Make) -> None:
-    folder = make(TWO)
-    folder.main("extract")
-    folder.write("examples/a.py", "edited\n")
-    (folder.root / "examples/a.py").unlink()
-    assert folder.main("extract").status == 0
-    assert folder.read("examples/a.py") == b"print('a')\n"
-
-
-@pytest.mark.parametrize("manifest", [b"", b"{", b"[]", b'{"files": {"../x": []}}', None])
-def test_extract_without_manifest_overwrites_no_other_text(
-    make: Make, manifest: bytes | None
-) -> None:
-    folder = make(TWO)
-    folder.main("extract")
-    if manifest is None:
-        (folder.root / "examples/.extracted.json").unlink()
-    else:
-        folder.write("examples/.extracted.json", manifest)
-    folder.replace(folder.lesson(), "print('a')", "print('A')")
-    done = folder.main("extract")
-    assert done.status == 1
-    assert done.out.count("error[example-edited]") == 1
-    assert folder.read("examples/a.py") == b"print('a')\n"
+    for manifest in (b"", b"{", b"[]", b'{"files": {"../x": []}}', None):
+        folder.write(folder.lesson(), TWO)
+        (folder.root / "examples/a.py").unlink(missing_ok=True)
+        assert folder.main("extract").status == 0
+        if manifest is None:
+            (folder.root / "examples/.extracted.json").unlink()
+        else:
+            folder.write("examples/.extracted.json", manifest)
+        folder.replace(folder.lesson(), "print('a')", "print('A')")
+        done = folder.main("extract")
+        assert (done.status, done.out.count("error[example-edited]")) == (1, 1), manifest
+        assert folder.read("examples/a.py") == b"print('a')\n"
 
 
 # --- adopting
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
-@pytest.mark.parametrize(
-    "saved",
-    [
-        EDITED,
-        EDITED.replace("\n", "\r\n"),
-        "\ufeff" + EDITED,
-        EDITED.rstrip("\n"),
-        EDITED + "\n\n",
-    ],
-    ids=["plain", "crlf", "bom", "no end", "long end"],
+SAVED = (
+    EDITED,
+    EDITED.replace("\n", "\r\n"),
+    "\ufeff" + EDITED,
+    EDITED.rstrip("\n"),
+    EDITED + "\n\n",
 )
-def test_edit_is_adopted_into_a_block_of_every_shape(make: Make, newline: str, saved: str) -> None:
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_edit_is_adopted_into_a_block_of_every_shape(make: Make, newline: str) -> None:
     """One lesson for each shape."""
     texts = [
         ("## One\n\n" + shape.replace("/x.py", f"/x{number}.py")).replace("\n", newline)
         for number, shape in enumerate(SHAPES.values(), 1)
     ]
     folder = make(*texts)
-    assert folder.main("extract").status == 0
-    for number in range(1, len(texts) + 1):
-        folder.write(f"examples/x{number}.py", saved)
-    done = folder.main("extract", "--adopt")
-    assert done.status == 0, done.out
-    assert "+" in done.out
-    for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
-        before, _, after = text.partition("print(1)" + newline)
-        lead = before.rpartition(newline)[2]
-        body = [(lead + line if line else lead.rstrip()) + newline for line in EDITED.splitlines()]
-        kept = before[: len(before) - len(lead)] if lead else before
-        assert folder.text(folder.lesson(number)) == kept + "".join(body) + after, shape
-        assert folder.text(f"examples/x{number}.py") == EDITED, shape
-        assert f"updated {folder.lesson(number)}\n" in done.out, shape
-    assert folder.main("extract").status == 0
-    assert "every script is extracted already" in folder.main("extract", "--adopt").out
+    for saved in SAVED:
+        for number, text in enumerate(texts, 1):
+            folder.write(folder.lesson(number), text)
+            (folder.root / f"examples/x{number}.py").unlink(missing_ok=True)
+        assert folder.main("extract").status == 0
+        for number in range(1, len(texts) + 1):
+            folder.write(f"examples/x{number}.py", saved)
+        done = folder.main("extract", "--adopt")
+        assert done.status == 0, done.out
+        for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
+            before, _, after = text.partition("print(1)" + newline)
+            lead = before.rpartition(newline)[2]
+            body = [(lead + line if line else lead.rstrip()) for line in EDITED.splitlines()]
+            kept = before[: len(before) - len(lead)] if lead else before
+            whole = kept + newline.join(body) + newline + after
+            assert folder.text(folder.lesson(number)) == whole, (shape, saved)
+            assert folder.text(f"examples/x{number}.py") == EDITED, (shape, saved)
+            assert f"updated {folder.lesson(number)}\n" in done.out, shape
+        assert "every script is extracted already" in folder.main("extract", "--adopt").out
 
 
-def test_several_edits_of_one_lesson_at_once(make: Make) -> None:
-    folder = make(TWO, GOOD)
+def test_several_edits_of_one_lesson_are_adopted_at_once(make: Make) -> None:
+    folder = make(TWO + block("c.py", "print('c')", "c"), GOOD)
     folder.main("extract")
+    folder.replace(folder.lesson(), "print('c')", "print('C')")  # edited there, which stays
     folder.write("examples/a.py", "print('a')\nprint('more')\n")
     folder.write("examples/sub/b.py", "# b\n\nprint('b')\n")
-    done = folder.main("extract", "--adopt")
-    assert done.status == 0
-    assert folder.text(folder.lesson()) == TWO.replace(
-        "print('a')\n", "print('a')\nprint('more')\n"
-    ).replace("print('b')\n", "# b\n\nprint('b')\n")
-    assert folder.main("check", "1.1").status == 1  # more is printed than recorded
+    assert folder.main("extract", "--adopt").status == 0
+    adopted = TWO.replace("print('a')\n", "print('a')\nprint('more')\n").replace(
+        "print('b')\n", "# b\n\nprint('b')\n"
+    )
+    assert folder.text(folder.lesson()) == adopted + block("c.py", "print('C')", "c")
+    assert folder.read("examples/c.py") == b"print('C')\n"
+    assert folder.main("check", "1.1").status == 1  # other things are printed than recorded
     assert folder.main("update", "1.1").status == 0
     assert folder.main("check").status == 0
 
 
-@pytest.mark.parametrize(
-    ("data", "says"),
-    [
+def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make) -> None:
+    folder = make(TWO)
+    folder.main("extract")
+    for data, says in (
         (b"caf\xe9\n", "it is not UTF-8"),
         (b"\n\n", "it is empty"),
         (b"x = '''\n```\n'''\n", "one of its lines would close the fence"),
         (b"a\0b\n", "it holds a NUL"),
-    ],
-)
-def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make, data: bytes, says: str) -> None:
-    folder = make(TWO)
-    folder.main("extract")
-    folder.write("examples/a.py", data)
-    done = folder.main("extract", "--adopt")
-    assert done.status == 1
-    assert f"examples/a.py cannot be brought into the lesson: {says}" in done.out
-    assert folder.read("examples/a.py") == data
-    assert folder.text(folder.lesson()) == TWO
+    ):
+        folder.write("examples/a.py", data)
+        done = folder.main("extract", "--adopt")
+        assert done.status == 1
+        assert f"examples/a.py cannot be brought into the lesson: {says}" in done.out
+        assert folder.read("examples/a.py") == data
+        assert folder.text(folder.lesson()) == TWO
 
 
-def test_only_edits_are_adopted(make: Make) -> None:
-    folder = make(TWO)
-    folder.main("extract")
-    folder.replace(folder.lesson(), "print('b')", "print('B')")
-    folder.write("examples/a.py", "print('edited')\n")
-    assert folder.main("extract", "--adopt").status == 0
-    assert "print('B')" in folder.text(folder.lesson())
-    assert "print('edited')" in folder.text(folder.lesson())
-    assert folder.read("examples/sub/b.py") == b"print('B')\n"
-
-
-@pytest.mark.parametrize("command", [["extract"], ["extract", "--adopt"], ["check"]])
-def test_of_two_edits_neither_is_lost(make: Make, command: list[str]) -> None:
+def test_of_two_edits_neither_is_lost(make: Make) -> None:
     folder = make(TWO)
     folder.main("extract")
     folder.write("examples/a.py", "print('a')  # by hand\n")
     folder.replace(folder.lesson(), "print('a')", "print('A')")
     lesson = folder.read(folder.lesson())
-    done = folder.main(*command)
-    assert done.status == 1
-    assert "-print('A')\n            +print('a')  # by hand\n" in done.out
-    assert "the block was changed as well" in done.out
-    assert "--adopt" not in done.out
-    assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
-    assert folder.read(folder.lesson()) == lesson
+    for command in (["extract"], ["extract", "--adopt"], ["check"]):
+        done = folder.main(*command)
+        assert done.status == 1
+        assert "-print('A')\n            +print('a')  # by hand\n" in done.out
+        assert "the block was changed as well" in done.out
+        assert "--adopt" not in done.out
+        assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
+        assert folder.read(folder.lesson()) == lesson
     folder.replace(folder.lesson(), "print('A')", "print('A')  # by hand")
     (folder.root / "examples/a.py").unlink()
     assert folder.main("extract").status == 0
-
-
-def test_adopting_without_edits_is_extracting(make: Make) -> None:
-    folder = make(TWO)
-    assert folder.main("extract", "--adopt").status == 0
-    assert folder.text(folder.lesson()) == TWO
-    assert set(json.loads(folder.text("examples/.extracted.json"))["files"]) == {
-        "examples/a.py",
-        "examples/sub/b.py",
-    }
 
 
 def test_where_a_lesson_is_read_only_none_is_changed(make: Make) -> None:

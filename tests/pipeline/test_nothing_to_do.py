@@ -30,8 +30,8 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
     aged(folder)
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
-        "print(sorted(m for m in sys.modules if m.startswith('coursebuild.')), file=sys.stderr);"
-        "sys.exit(status)"
+        "heavy = {'argparse', 'msgspec', 'coursebuild.core.model', 'coursebuild.pipeline'};"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr); sys.exit(status)"
     )
     for _ in range(2):
         done = subprocess.run(
@@ -46,11 +46,7 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
         "nothing has changed since the last check\n\n"
         "1 lesson, 0 scripts run, 1 cached: everything holds\n"
     )
-    assert done.stderr == (
-        "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
-        "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
-        "'coursebuild.core.run', 'coursebuild.core.files.course_root']\n"
-    )
+    assert done.stderr == "[]\n"
 
 
 def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
@@ -80,87 +76,81 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     assert "coursebuild.core.run.v8" in done.stderr
 
 
-@pytest.mark.parametrize("wrong", [["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"]])
-def test_wrong_usage_is_told_also_where_there_is_nothing_to_do(
-    make: Make, wrong: list[str]
-) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    assert folder.main("check", *wrong).status == 2
-
-
 def test_nothing_changed_counts_for_the_same_command_only(make: Make) -> None:
     """And not by how it is said which course is meant."""
     folder = make(FIRST)
+    (folder.root / "data").mkdir()
     aged(folder)
     told = "nothing has changed"
     assert told not in folder.main("check").out
     assert told in folder.main("check").out
     assert told in folder.main("-C", str(folder.root), "check", cwd=folder.root.parent).out
     assert told in folder.main("check", cwd=folder.root / "content").out
+    assert told in folder.main("-C", "", "check").out
+    assert "map-missing" in folder.main("-C", "", "check", cwd=folder.root / "content").out
     assert told not in folder.main("check", "--no-cache").out
     assert told in folder.main("check").out
-    for other in (["check", "-j", "1"], ["check", folder.lesson()], ["check", "--no-such"]):
+    for other in (["check", "-j", "1"], ["check", folder.lesson()]):
         assert told not in folder.main(*other).out
     for elsewhere in (["-C", str(folder.root / "content"), "check"], [], ["-C"]):
         assert told not in folder.main(*elsewhere).out
-
-
-def test_edit_is_seen_after_a_check_with_nothing_to_do(make: Make) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(2)", "1"))
-    assert folder.main("check").status == 1
-
-
-def test_lesson_replaced_by_a_link_out_of_the_course_is_seen(make: Make) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    away = folder.root.with_name("away.md")
-    (folder.root / folder.lesson()).rename(away)
-    (folder.root / folder.lesson()).symlink_to(away)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "nothing has changed" not in done.out
-
-
-@pytest.mark.parametrize("name", sorted({*_PASSED_ON} - _SAYS_NOTHING))
-def test_changed_environment_variable_is_seen(
-    make: Make, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    assert "nothing has changed" in folder.main("check").out
-    monkeypatch.setenv(name, "egl")
-    assert "nothing has changed" not in folder.main("check").out
-
-
-def test_relative_path_from_another_folder_is_another_command(make: Make) -> None:
-    folder = make(FIRST)
-    (folder.root / "data").mkdir()
-    aged(folder)
+    for wrong in (["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"], ["--no-such"]):
+        assert folder.main("check", *wrong).status == 2
+    # A path from another folder is another path.
     command = ("check", f"../{folder.lesson().removeprefix('content/')}")
     inner = folder.root / "content" / "lessons"
-    for told in (False, True):
+    for known in (False, True):
         done = folder.main(*command, cwd=inner)
-        assert (done.status, "nothing has changed" in done.out) == (0, told)
+        assert (done.status, told in done.out) == (0, known)
     done = folder.main(*command, cwd=folder.root / "data")
     assert (done.status, done.out) == (2, "")
     assert "no lesson or page is called" in done.err
 
 
-def test_empty_folder_argument_is_the_working_directory(make: Make) -> None:
+def edit(folder: Folder) -> None:
+    folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(2)", "1"))
+
+
+def replace_by_a_link_out_of_the_course(folder: Folder) -> None:
+    away = folder.root.with_name("away.md")
+    (folder.root / folder.lesson()).rename(away)
+    (folder.root / folder.lesson()).symlink_to(away)
+
+
+def edit_and_put_the_time_back(folder: Folder) -> None:
+    lesson = folder.root / folder.lesson()
+    before = lesson.stat()
+    lesson.write_bytes(lesson.read_bytes().replace(b"print(1)", b"print(2)"))
+    os.utime(lesson, ns=(before.st_atime_ns, before.st_mtime_ns))
+    after = lesson.stat()
+    assert (after.st_size, after.st_mtime_ns) == (before.st_size, before.st_mtime_ns)
+
+
+@pytest.mark.parametrize(
+    "change", [edit, replace_by_a_link_out_of_the_course, edit_and_put_the_time_back]
+)
+def test_change_is_seen_after_a_check_with_nothing_to_do(
+    make: Make, change: Callable[[Folder], None]
+) -> None:
     folder = make(FIRST)
     aged(folder)
-    assert folder.main("-C", "", "check").status == 0
-    assert "nothing has changed" in folder.main("-C", "", "check").out
-    done = folder.main("-C", "", "check", cwd=folder.root / "content")
-    assert done.status == 1
-    assert "map-missing" in done.out
+    assert folder.main("check").status == 0
+    assert "nothing has changed" in folder.main("check").out
+    change(folder)
+    done = folder.main("check")
+    assert (done.status, "nothing has changed" in done.out) == (1, False)
+
+
+def test_changed_environment_variable_is_seen(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = make(FIRST)
+    aged(folder)
+    assert folder.main("check").status == 0
+    for name in sorted({*_PASSED_ON} - _SAYS_NOTHING):
+        with monkeypatch.context() as patched:
+            patched.setenv(name, "egl")
+            assert "nothing has changed" not in folder.main("check").out, name
+        assert folder.main("check").status == 0
+        assert "nothing has changed" in folder.main("check").out
 
 
 def test_working_directory_that_is_gone_gives_2(make: Make) -> None:
@@ -180,17 +170,3 @@ def test_working_directory_that_is_gone_gives_2(make: Make) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.endswith("the working directory is not there any more\n")
     assert "Traceback" not in done.stderr
-
-
-def test_an_edit_that_puts_the_time_of_its_file_back_is_seen(make: Make) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    assert "nothing has changed" in folder.main("check").out
-    lesson = folder.root / folder.lesson()
-    before = lesson.stat()
-    lesson.write_bytes(lesson.read_bytes().replace(b"print(1)", b"print(2)"))
-    os.utime(lesson, ns=(before.st_atime_ns, before.st_mtime_ns))
-    after = lesson.stat()
-    assert (after.st_size, after.st_mtime_ns) == (before.st_size, before.st_mtime_ns)
-    assert folder.main("check").status == 1

@@ -14,7 +14,6 @@ from support.scratch_course import (
     FIRST,
     GOOD,
     SECOND,
-    Done,
     Folder,
     block,
     without_seconds,
@@ -25,23 +24,16 @@ pytestmark = pytest.mark.site
 Make = Callable[..., Folder]
 
 
-@pytest.mark.parametrize("command", ["build", "check", "update", "extract"])
-def test_quiet_says_nothing_when_all_is_well(make: Make, command: str) -> None:
-    assert make(GOOD).main(command, "--quiet") == Done(0, "", "")
-
-
-@pytest.mark.parametrize("command", ["build", "check"])
-def test_quiet_says_what_is_wrong_and_no_more(make: Make, command: str) -> None:
-    done = make(DRIFTED).main(command, "-q")
-    assert (done.status, done.err) == (1, "")
-    assert done.out.startswith("error[output-drift]: ")
-    assert "examples/one.py  " not in done.out
-    assert "published" not in done.out
-
-
-def test_quiet_keeps_warnings(make: Make) -> None:
-    done = make(GOOD + "![](../pic.png)\n\n#### Skipped\n").main("check", "-q")
-    assert "warning[heading-skip]" in done.out
+def test_quiet_says_what_is_wrong_and_no_more(make: Make) -> None:
+    folder = make(DRIFTED, GOOD + "![](../pic.png)\n\n#### Skipped\n")
+    folder.write("content/pic.png", "")
+    for command in ("build", "check"):
+        done = folder.main(command, "-q")
+        assert (done.status, done.err) == (1, "")
+        assert done.out.startswith("error[output-drift]: ")
+        assert "warning[heading-skip]" in done.out
+        assert "examples/one.py  " not in done.out
+        assert "published" not in done.out
 
 
 def test_plain_lines_say_what_runs_and_what_ran(make: Make) -> None:
@@ -121,29 +113,19 @@ def test_json_report_of_drift(make: Make) -> None:
     assert (summary["lessons"], summary["scripts"], summary["skipped"]) == (1, 2, 1)
 
 
-def test_json_of_a_clean_course(make: Make) -> None:
-    done = make(GOOD).main("check", "--format", "json", "--quiet")
-    assert (done.status, done.err) == (0, "")
-    found = json.loads(done.out)
-    assert found["diagnostics"] == []
-    assert found["summary"]["ok"] is True
-
-
-def test_json_tells_what_ran_from_what_is_remembered(make: Make) -> None:
+def test_json_of_a_clean_course_tells_what_ran_and_of_a_broken_map_the_mistake(make: Make) -> None:
     folder = make(GOOD)
-    for expected in ((1, 0), (0, 1)):
-        found = json.loads(folder.main("check", "--format", "json", "--quiet").out)
-        assert (found["summary"]["ran"], found["summary"]["cached"]) == expected
-
-
-def test_json_of_a_broken_map(make: Make) -> None:
-    folder = make(GOOD)
+    for ran, cached in ((1, 0), (0, 1)):
+        done = folder.main("check", "--format", "json", "--quiet")
+        assert (done.status, done.err) == (0, "")
+        found = json.loads(done.out)
+        assert (found["diagnostics"], found["summary"]["ok"]) == ([], True)
+        assert (found["summary"]["ran"], found["summary"]["cached"]) == (ran, cached)
     folder.write("content/course.toml", "[course\n")
     done = folder.main("check", "--format", "json")
     assert done.status == 1
     found = json.loads(done.out)
-    assert [d["rule"] for d in found["diagnostics"]] == ["map-syntax"]
-    assert found["scripts"] == []
+    assert ([d["rule"] for d in found["diagnostics"]], found["scripts"]) == (["map-syntax"], [])
 
 
 def test_json_is_utf8_whatever_the_locale(make: Make) -> None:
@@ -155,36 +137,30 @@ def test_json_is_utf8_whatever_the_locale(make: Make) -> None:
     assert json.loads(done.out)["scripts"][0]["path"] == "examples/größe.py"
 
 
-def test_junit_report_of_drift(make: Make) -> None:
-    done = make(DRIFTED).main("check", "--format", "junit")
-    assert done.status == 1
-    suite = ET.fromstring(done.out)[0]
+def test_other_forms_of_a_report_of_drift(make: Make) -> None:
+    folder = make(DRIFTED)
+
+    def shown(form: str) -> str:
+        done = folder.main("check", "--format", form)
+        assert done.status == 1
+        return done.out
+
+    suite = ET.fromstring(shown("junit"))[0]
     assert {key: suite.get(key) for key in ("tests", "failures")} == {"tests": "2", "failures": "2"}
     [script, lesson] = suite
     assert script.get("name") == "examples/one.py"
     failure = lesson.find("failure")
     assert failure is not None and failure.get("type") == "output-drift"
-
-
-def test_sarif_report_of_drift(make: Make) -> None:
-    folder = make(DRIFTED)
-    done = folder.main("check", "--format", "sarif")
-    assert done.status == 1
-    [run] = json.loads(done.out)["runs"]
+    [run] = json.loads(shown("sarif"))["runs"]
     [result] = run["results"]
     assert result["ruleId"] == "output-drift"
     place = result["locations"][0]["physicalLocation"]
     assert place["artifactLocation"]["uri"] == folder.lesson()
     assert place["region"]["startColumn"] == 7
-
-
-def test_github_annotation_of_drift(make: Make) -> None:
-    folder = make(DRIFTED)
-    done = folder.main("check", "--format", "github")
-    assert done.status == 1
-    [line] = done.out.splitlines()
+    [line] = shown("github").splitlines()
     assert line.startswith(f"::error file={folder.lesson()},line=")
-    assert make(GOOD, name="b").main("check", "--format", "github").out == ""
+    folder.write(folder.lesson(), GOOD)
+    assert folder.main("check", "--format", "github").out == ""
 
 
 def test_everything_wrong_is_told_at_once(make: Make) -> None:

@@ -100,20 +100,20 @@ def test_a_learner_runs_the_extracted_file(make: Make) -> None:
     assert learner.stdout == "1 ['a']\n"
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_a_traceback_names_the_lesson(make: Make, newline: str) -> None:
+def test_a_traceback_names_the_lesson(make: Make) -> None:
     code = "def f(x):\n    return 1 / x\n\n\nprint('before')\nf(0)"
-    quoted = "> " + block("x.py", code).replace("\n", "\n> ")
-    folder = make(("## One\n\n- text\n\n" + quoted).replace("\n", newline))
+    lesson = "## One\n\n- text\n\n> " + block("x.py", code).replace("\n", "\n> ")
+    folder = make(lesson, lesson.replace("x.py", "y.py").replace("\n", "\r\n"))
     done = folder.main("check")
     assert done.status == 1
-    lines = folder.text(folder.lesson()).split(newline)
-    division = lines.index(">     return 1 / x") + 1
-    call = lines.index("> f(0)") + 1
-    assert "error[script-failed]: `examples/x.py` exited with status 1" in done.out
-    assert f"--> {folder.lesson()}:{division}:" in done.out
-    assert f'File "{folder.lesson()}", line {division}, in f' in done.out
-    assert f'File "{folder.lesson()}", line {call}, in <module>' in done.out
+    lines = lesson.split("\n")
+    division, call = lines.index(">     return 1 / x") + 1, lines.index("> f(0)") + 1
+    for number, script in ((1, "x.py"), (2, "y.py")):
+        path = folder.lesson(number)
+        assert f"error[script-failed]: `examples/{script}` exited with status 1" in done.out
+        assert f"--> {path}:{division}:" in done.out
+        assert f'File "{path}", line {division}, in f' in done.out
+        assert f'File "{path}", line {call}, in <module>' in done.out
     assert "ZeroDivisionError: division by zero" in done.out
     assert str(folder.root) not in done.out
 
@@ -201,14 +201,65 @@ def test_a_model_of_the_course(make: Make) -> None:
     assert "`parts/ball`" in done.out or "parts/ball" in done.out
 
 
-@pytest.mark.parametrize("first", ["examples", "examples/sub"])
-def test_a_link_in_place_of_a_folder_is_not_followed(make: Make, first: str) -> None:
+def test_a_link_in_place_of_a_folder_is_not_followed(make: Make) -> None:
     folder = make("## One\n\n" + block("sub/x.py", "print(1)", "1"))
     outside = folder.root.parent / "outside"
     (outside / "sub").mkdir(parents=True)
-    (folder.root / first).parent.mkdir(exist_ok=True)
-    (folder.root / first).symlink_to(outside)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "link" in done.out + done.err
-    assert [path.name for path in outside.rglob("*")] == ["sub"]
+    for link in (folder.root / "examples", folder.root / "examples/sub"):
+        link.parent.mkdir(exist_ok=True)
+        link.symlink_to(outside)
+        done = folder.main("check")
+        assert (done.status, "link" in done.out + done.err) == (1, True), link
+        assert [path.name for path in outside.rglob("*")] == ["sub"]
+        link.unlink()
+
+
+# --- simulations that are lost
+
+MODEL = """
+<mujoco model="cart">
+  <worldbody><body><joint type="slide" axis="1 0 0"/><geom size="1" mass="1"/></body></worldbody>
+</mujoco>
+"""
+LOST = f"""
+import mujoco
+
+model = mujoco.MjModel.from_xml_string('''{MODEL}''')
+data = mujoco.MjData(model)
+data.qfrc_applied[0] = 1e15
+mujoco.mj_step(model, data)
+print("error", data.qpos[0])
+"""
+
+
+def test_lost_simulation_fails_every_command_unless_its_lesson_says_so(make: Make) -> None:
+    def lesson(force: str, info: str = "", output: str = "error 0.0") -> str:
+        return "## One\n\n" + block("a.py", LOST.replace("1e15", force), output, info=info)
+
+    def rules() -> list[str]:
+        found = json.loads(folder.main("check", "--format", "json").out)
+        return [each["rule"] for each in found["diagnostics"]]
+
+    folder = make(lesson("1e15"))
+    first, again = folder.main("check"), folder.main("check")
+    assert (first.status, again.status, "cached" in again.out) == (1, 1, True)
+    assert "MuJoCo warned of bad accelerations of model `cart` at t = 0.0000 s" in first.out
+    assert "diverged examples/a.py" in first.out
+    assert first.out.split("\n\n")[0] == again.out.split("\n\n")[0]
+    report = json.loads(folder.main("check", "--format", "json").out)
+    assert [script["status"] for script in report["scripts"]] == ["diverged"]
+    assert '<failure type="diverged"' in folder.main("check", "--format", "junit").out
+    assert folder.main("build").status == 1
+    assert not (folder.root / "public").exists()
+    assert not list(folder.root.rglob("MUJOCO_LOG*"))
+    folder.write(folder.lesson(), lesson("1e15", output="error 1.0"))
+    done = folder.main("update")
+    assert (done.status, "error[script-diverged]" in done.out) == (1, True)
+    for text, expected in (
+        (lesson("1e15"), ["script-diverged"]),
+        (lesson("1e15", "diverges"), []),  # as it is remembered
+        (lesson("0.0", "diverges"), ["script-stable"]),
+        (lesson("0.0"), []),
+    ):
+        folder.write(folder.lesson(), text)
+        assert rules() == expected

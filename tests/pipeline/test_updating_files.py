@@ -23,107 +23,77 @@ HELD = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(
 """A script that goes on when there is a file `go`."""
 
 
-def test_a_lesson_saved_meanwhile_is_not_overwritten(make: Make) -> None:
+STALE = GOOD.replace("hello 3.14159\n", "OLD\n")
+
+
+def test_a_lesson_saved_or_removed_meanwhile_is_not_written(make: Make) -> None:
     saves = "from pathlib import Path\np = Path('{}')\np.write_text(p.read_text() + 'saved')\n"
+    removes = "from pathlib import Path\nPath('{}').unlink(missing_ok=True)\nprint(3)"
+    one, three = "content/lessons/1.1-one.md", "content/lessons/1.3-three.md"
     folder = make(
         "## One\n\n" + block("x.py", "print(1)", "OLD"),
-        "## Two\n\n" + block("y.py", saves.format("content/lessons/1.1-one.md"), "OLD"),
+        "## Two\n\n" + block("y.py", saves.format(one) + "print(2)", "OLD"),
+        "## Three\n\n" + block("z.py", removes.format(three), "OLD"),
     )
-    folder.replace(folder.lesson(2), "'saved')", "'saved')\nprint(2)")
-    before = folder.text(folder.lesson(1))
+    before = folder.text(one)
     done = folder.main("update")
     assert done.status == 1
-    assert f"{folder.lesson(1)} was changed in the meantime" in done.out
+    assert f"{one} was changed in the meantime" in done.out
     assert "run the command again" in done.out
-    assert folder.text(folder.lesson(1)) == before + "savedsaved"
+    assert folder.text(one) == before + "savedsaved"
     assert "2\n```" in folder.text(folder.lesson(2))
     assert f"updated {folder.lesson(2)}" in done.out
+    assert f"{three} was removed in the meantime" in done.out
+    assert not (folder.root / three).exists()
 
 
-def test_a_lesson_removed_meanwhile_is_not_made_again(make: Make) -> None:
-    code = "from pathlib import Path\nPath('content/lessons/1.1-one.md').unlink(missing_ok=True)"
-    folder = make("## One\n\n" + block("x.py", code + "\nprint(1)", "OLD"))
+def test_a_linked_lesson_stays_a_link_and_none_outside_is_written(make: Make) -> None:
+    folder = make(GOOD, GOOD)
+    folder.write("drafts/hello.md", STALE)
+    outside = folder.root.parent / "outside.md"
+    outside.write_text(STALE.replace("hello.py", "outside.py"))
+    for number, target in ((1, "../../drafts/hello.md"), (2, outside)):
+        (folder.root / folder.lesson(number)).unlink()
+        (folder.root / folder.lesson(number)).symlink_to(target)
     done = folder.main("update")
-    assert done.status == 1
-    assert "was removed in the meantime" in done.out
-    assert not (folder.root / folder.lesson()).exists()
-
-
-def test_a_linked_lesson_stays_a_link(make: Make) -> None:
-    folder = make(GOOD)
-    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
-    folder.write("drafts/hello.md", stale)
-    (folder.root / folder.lesson()).unlink()
-    (folder.root / folder.lesson()).symlink_to("../../drafts/hello.md")
-    assert folder.main("update").status == 0
+    assert (done.status, "leads out of the project" in done.out) == (1, True)
+    assert "OLD" in outside.read_text()
     assert (folder.root / folder.lesson()).is_symlink()
     assert folder.text("drafts/hello.md") == GOOD
     assert [path.name for path in (folder.root / "drafts").iterdir()] == ["hello.md"]
 
 
-def test_a_lesson_linked_from_outside_is_never_written(make: Make) -> None:
-    folder = make(GOOD)
-    outside = folder.root.parent / "outside.md"
-    outside.write_text(GOOD.replace("hello 3.14159\n", "OLD\n"))
-    (folder.root / folder.lesson()).unlink()
-    (folder.root / folder.lesson()).symlink_to(outside)
-    done = folder.main("update")
-    assert done.status == 1
-    assert "leads out of the project" in done.out
-    assert "OLD" in outside.read_text()
-
-
-@pytest.mark.parametrize("mode", [0o600, 0o644, 0o755])
-def test_update_keeps_permissions(make: Make, mode: int) -> None:
-    folder = make(GOOD.replace("hello 3.14159\n", "OLD\n"))
-    (folder.root / folder.lesson()).chmod(mode)
-    assert folder.main("update").status == 0
-    assert folder.text(folder.lesson()) == GOOD
-    assert stat.S_IMODE((folder.root / folder.lesson()).stat().st_mode) == mode
-
-
-@pytest.mark.parametrize("mode", [0o444, 0o555, 0o464])
-def test_a_read_only_lesson_is_left_alone(make: Make, mode: int) -> None:
+def test_update_keeps_permissions_and_leaves_a_read_only_lesson_alone(make: Make) -> None:
     """By root too, who may write it."""
-    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
-    folder = make(stale, "## Two\n\n" + block("y.py", "print(2)", "OLD"))
-    path = folder.root / folder.lesson()
-    path.chmod(mode)
+    folder = make(STALE, "## Two\n\n" + block("y.py", "print(2)", "OLD"))
+    path, other = folder.root / folder.lesson(), folder.root / folder.lesson(2)
+    path.chmod(0o444)
+    other.chmod(0o640)
     before = path.stat()
-    done = folder.main("update")
-    assert done.status == 1
-    assert (
-        f"""error[output-not-updatable]: {folder.lesson()} is read-only
+    for how in (["--dry-run"], []):
+        done = folder.main("update", *how)
+        assert done.status == 1
+        assert (
+            f"""error[output-not-updatable]: {folder.lesson()} is read-only
   --> {folder.lesson()}:10:1
     |
  10 | OLD
     | ^^^
     = help: nothing was written to it; make it writable, and run the command again
 """
-        in done.out
-    )
+            in done.out
+        )
+        assert f"update {folder.lesson()}" not in done.out
     after = path.stat()
     assert (after.st_ino, after.st_mode) == (before.st_ino, before.st_mode)
-    assert folder.text(folder.lesson()) == stale
+    assert folder.text(folder.lesson()) == STALE
     assert "2\n```" in folder.text(folder.lesson(2))
+    assert stat.S_IMODE(other.stat().st_mode) == 0o640
     assert f"updated {folder.lesson(2)}" in done.out
-    assert f"updated {folder.lesson()}" not in done.out
-
-
-def test_a_dry_run_says_that_a_lesson_is_read_only(make: Make) -> None:
-    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
-    folder = make(stale)
-    (folder.root / folder.lesson()).chmod(0o444)
-    done = folder.main("update", "--dry-run")
-    assert done.status == 1
-    assert f"error[output-not-updatable]: {folder.lesson()} is read-only" in done.out
-    assert "would update" not in done.out
-
-
-def test_a_read_only_lesson_that_is_right_is_no_mistake(make: Make) -> None:
-    folder = make(GOOD)
-    (folder.root / folder.lesson()).chmod(0o444)
-    assert folder.main("update").status == 0
+    path.chmod(0o644)
+    folder.write(folder.lesson(), GOOD)
+    path.chmod(0o444)
+    assert folder.main("update").status == 0  # there is nothing to write
 
 
 def _as_an_ordinary_user() -> None:
@@ -134,11 +104,12 @@ def _as_an_ordinary_user() -> None:
         libc.prctl(drop, capability, 0, 0, 0)
 
 
-def test_update_in_a_folder_that_cannot_be_written_tells_it(make: Make) -> None:
-    stale = GOOD.replace("hello 3.14159\n", "OLD\n")
-    folder = make(stale)
+def test_update_tells_what_cannot_be_read_or_written(make: Make) -> None:
+    unreadable = "## Two\n\n" + block("y.py", "print(2)", "OLD")
+    folder = make(STALE, unreadable)
     folder.main("extract")
     lessons = folder.root / "content/lessons"
+    (folder.root / folder.lesson(2)).chmod(0)
     lessons.chmod(0o555)
     try:
         done = subprocess.run(
@@ -153,26 +124,11 @@ def test_update_in_a_folder_that_cannot_be_written_tells_it(make: Make) -> None:
         lessons.chmod(0o755)
     assert done.returncode == 1, done.stdout + done.stderr
     assert f"{folder.lesson()} cannot be written: permission denied" in done.stdout
-    assert folder.text(folder.lesson()) == stale
-    assert [path.name for path in lessons.iterdir()] == ["1.1-one.md"]
-
-
-def test_check_tells_a_lesson_that_cannot_be_read(make: Make) -> None:
-    folder = make(GOOD, "## Two\n\n" + block("y.py", "print(2)", "2"))
-    (folder.root / folder.lesson()).chmod(0)
-    done = subprocess.run(
-        command("check"),
-        cwd=folder.root,
-        env=folder.environment(),
-        capture_output=True,
-        text=True,
-        preexec_fn=_as_an_ordinary_user,
-    )
-    assert done.returncode == 1
-    assert f"error[file-unreadable]: {folder.lesson()} cannot be read: permission denied" in (
-        done.stdout
-    )
+    said = f"error[file-unreadable]: {folder.lesson(2)} cannot be read: permission denied"
+    assert said in done.stdout
     assert "error[lesson-missing]" not in done.stdout
+    assert folder.text(folder.lesson()) == STALE
+    assert len(list(lessons.iterdir())) == 2
 
 
 def test_build_and_update_begun_together_take_turns(make: Make) -> None:
